@@ -1,0 +1,1 @@
+"""A digital twin for mobile robots; `docs/architecture.md` is the map of this package."""

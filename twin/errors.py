@@ -1,0 +1,91 @@
+"""Every error a user can act on, on one page.
+
+TwinError
+├── ModelError        a robot file (URDF, xacro, mesh) cannot be used
+├── ConversionError   a robot description has no faithful MuJoCo model
+├── ScenarioError     a scenario or arena file is wrong
+├── MapError          a map file is wrong
+├── BridgeError       the bus: a port in use, an unknown message type, a name that ROS does not allow
+├── RecordingError    a recording cannot be written or read
+└── SimulationError   the physics cannot go on (diverged)
+
+The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and exits 2;
+anything else that escapes is a bug and keeps its traceback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault in an input file."""
+
+    message: str
+    """One sentence: what is wrong and what would be valid."""
+    file: Path | None = None
+    line: int | None = None
+    """1-based line in `file`."""
+
+    def __str__(self) -> str:
+        if self.file is None:
+            return self.message
+        where = str(self.file) if self.line is None else f"{self.file}:{self.line}"
+        return f"{where}: {self.message}"
+
+
+class TwinError(Exception):
+    """Base of all errors a user can act on; carries every problem found, not only the first."""
+
+    def __init__(self, problems: str | Problem | Iterable[Problem]) -> None:
+        if isinstance(problems, str):
+            problems = Problem(problems)
+        self.problems: tuple[Problem, ...] = (
+            (problems,) if isinstance(problems, Problem) else tuple(problems)
+        )
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+class ModelError(TwinError):
+    """A robot file cannot be used."""
+
+
+class ConversionError(TwinError):
+    """A robot description has no faithful MuJoCo model."""
+
+
+class ScenarioError(TwinError):
+    """A scenario or arena file is wrong."""
+
+
+class MapError(TwinError):
+    """A map file is wrong."""
+
+
+class BridgeError(TwinError):
+    """The bus cannot do what was asked: a port in use, an unknown type, an invalid name."""
+
+
+class RecordingError(TwinError):
+    """A recording cannot be written or read."""
+
+
+class SimulationError(TwinError):
+    """The physics cannot go on."""
+
+
+def nearest(word: str, valid: Iterable[str]) -> str:
+    """Return the tail of an error message that lists valid names, the nearest one first.
+
+    >>> nearest("lidr", ["imu", "lidar"])
+    "did you mean 'lidar'? Valid: imu, lidar"
+    """
+    import difflib
+
+    names = sorted(valid)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'? " if close else ""
+    return f"{hint}Valid: {', '.join(names)}"

@@ -1,0 +1,282 @@
+"""What a robot file says, as data: links, joints, drive and sensors, each with the line it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from twin.geometry import Array, Pose3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A box."""
+
+    size: tuple[float, float, float]
+    """Full edge lengths along x, y, z [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """A cylinder along its z axis."""
+
+    radius: float
+    """[m]"""
+    length: float
+    """[m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere:
+    """A sphere."""
+
+    radius: float
+    """[m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capsule:
+    """A capsule along its z axis (an extension of URDF that Gazebo and Drake read too)."""
+
+    radius: float
+    """[m]"""
+    length: float
+    """Of the cylindrical part [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """A mesh file."""
+
+    path: Path
+    """Resolved, existing file."""
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+Geometry = Box | Cylinder | Sphere | Capsule | Mesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertial:
+    """Mass properties of a link."""
+
+    T_link_com: Pose3
+    """Pose of the inertial frame in the link frame."""
+    mass: float
+    """[kg]"""
+    inertia: Array
+    """About the centre of mass, in the inertial frame [kg m²], shape (3, 3)."""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visual:
+    """A shape to look at."""
+
+    T_link_geometry: Pose3
+    geometry: Geometry
+    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
+    """Resolved from the file's materials."""
+    name: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collision:
+    """A shape to touch."""
+
+    T_link_geometry: Pose3
+    geometry: Geometry
+    name: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Contact parameters of a link, from `<gazebo reference="link">`."""
+
+    friction: float | None = None
+    """Coulomb coefficient, from mu1."""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A rigid body and the frame of the same name."""
+
+    name: str
+    inertial: Inertial | None = None
+    visuals: tuple[Visual, ...] = ()
+    collisions: tuple[Collision, ...] = ()
+    surface: Surface = field(default_factory=Surface)
+    line: int = 0
+
+
+JointType = Literal["fixed", "continuous", "revolute", "prismatic", "floating", "planar"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """Limits of a joint; None means that the file gives none."""
+
+    lower: float | None = None
+    """[rad] or [m]"""
+    upper: float | None = None
+    """[rad] or [m]"""
+    effort: float | None = None
+    """[Nm] or [N]"""
+    velocity: float | None = None
+    """[rad/s] or [m/s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mimic:
+    """This joint's position is `multiplier` times the leader's plus `offset`."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """A connection of two links."""
+
+    name: str
+    type: JointType
+    parent: str
+    child: str
+    T_parent_joint: Pose3
+    """Pose of the joint (and child link) frame in the parent link frame at position zero."""
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    """Unit vector in the joint frame."""
+    limit: Limit = field(default_factory=Limit)
+    damping: float = 0.0
+    """[Nm s/rad] or [N s/m]"""
+    friction: float = 0.0
+    """[Nm] or [N]"""
+    mimic: Mimic | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveSpec:
+    """A wheeled drive, from the diff-drive or skid-steer plugin in `<gazebo>`."""
+
+    kind: Literal["diff_drive", "skid_steer"]
+    left_joints: tuple[str, ...]
+    right_joints: tuple[str, ...]
+    wheel_separation: float
+    """Distance of the left and right wheels' contact points [m]."""
+    wheel_radius: float
+    """[m]"""
+    max_wheel_torque: float | None = None
+    """[Nm] per wheel"""
+    max_linear_velocity: float | None = None
+    """[m/s]"""
+    max_linear_acceleration: float | None = None
+    """[m/s²]"""
+    max_angular_velocity: float | None = None
+    """[rad/s]"""
+    max_angular_acceleration: float | None = None
+    """[rad/s²]"""
+    odometry_frame: str = "odom"
+    base_frame: str = "base_footprint"
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandSpec:
+    """How a joint is commanded, from `<ros2_control>` (wheels of a drive need none)."""
+
+    joint: str
+    interface: Literal["position", "velocity", "effort"]
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorSpec:
+    """Common part of all sensors, from `<gazebo reference="link"><sensor>`."""
+
+    name: str
+    link: str
+    """The frame in which it measures and that stamps its messages."""
+    topic: str
+    """Relative ROS name, such as `scan`."""
+    rate_hz: float
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarSpec(SensorSpec):
+    """A planar lidar: `samples` rays from angle_min to angle_max, both included."""
+
+    angle_min: float
+    """[rad]"""
+    angle_max: float
+    """[rad]"""
+    samples: int
+    range_min: float
+    """[m]"""
+    range_max: float
+    """[m]"""
+    noise_stddev: float = 0.0
+    """[m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeSpec(SensorSpec):
+    """An ultrasonic ranger: the nearest echo in a cone about +x (REP-103)."""
+
+    field_of_view: float
+    """Full angle of the cone [rad]."""
+    range_min: float
+    """[m]"""
+    range_max: float
+    """[m]"""
+    noise_stddev: float = 0.0
+    """[m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuSpec(SensorSpec):
+    """Gyroscope and accelerometer."""
+
+    gyro_noise_stddev: float = 0.0
+    """[rad/s]"""
+    gyro_bias_stddev: float = 0.0
+    """Of the constant bias, drawn once a run [rad/s]."""
+    accel_noise_stddev: float = 0.0
+    """[m/s²]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSpec(SensorSpec):
+    """A bumper: tells whether its link touches anything."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDescription:
+    """A robot: a tree of links that are connected by joints, its drive and its sensors."""
+
+    name: str
+    source: Path
+    """The file as given by the user."""
+    urdf: str
+    """The URDF text after xacro; what `/robot_description` publishes."""
+    links: Mapping[str, Link]
+    """By name, in file order."""
+    joints: Mapping[str, Joint]
+    """By name, in file order."""
+    root: str
+    """The link without a parent."""
+    drive: DriveSpec | None = None
+    commands: Mapping[str, CommandSpec] = field(default_factory=dict)
+    """By joint."""
+    sensors: tuple[SensorSpec, ...] = ()
+
+    def children(self, link: str) -> tuple[Joint, ...]:
+        """Return the joints below `link`, in file order."""
+        return tuple(joint for joint in self.joints.values() if joint.parent == link)

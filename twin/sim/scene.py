@@ -1,0 +1,55 @@
+"""A scene as data: everything around the robots that a world is composed of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from twin.geometry import Pose3
+from twin.models.description import Box, Capsule, Cylinder, Sphere
+
+Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """A primitive that belongs to a body."""
+
+    geometry: Box | Cylinder | Sphere | Capsule
+    T_body_geometry: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
+    rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticBody:
+    """Something that never moves: a wall, a shelf, stock that no run touches."""
+
+    name: str
+    T_world_body: Pose3
+    shapes: tuple[Shape, ...]
+    friction: float = 0.8
+    """Coulomb coefficient."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeBody:
+    """Something that can be pushed, grasped and dropped; its inertia is that of its shapes at uniform density."""
+
+    name: str
+    T_world_body: Pose3
+    shapes: tuple[Shape, ...]
+    mass: float
+    """[kg]"""
+    friction: float = 0.8
+    """Coulomb coefficient."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """The floor (plane z = 0) and what stands on it."""
+
+    name: str
+    floor_friction: float = 0.8
+    floor_size: tuple[float, float] = (40.0, 40.0)
+    """Extent to draw along x and y [m]."""
+    statics: tuple[StaticBody, ...] = ()
+    goods: tuple[FreeBody, ...] = ()
