@@ -1,1 +1,1 @@
-
+"""Arm motion and grasping as pure classes: numbers in, numbers out."""

@@ -1,0 +1,40 @@
+# Every target sets up its own environment in .venv; nothing but Python (>= 3.11), git and make is needed.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SCENARIO ?= scenarios/warehouse.yaml
+
+.PHONY: run test check bench scenarios smoke clean
+
+$(VENV)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+run: $(VENV)/.ready  ## the environment, then the warehouse scenario to its verdict
+	$(BIN)/twin run $(SCENARIO)
+
+test: $(VENV)/.ready  ## the whole test suite
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+check: $(VENV)/.ready  ## format, lint, types, layers
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.ready  ## the run's CPU time as a ratio to the raw limit of physics and rays
+	$(BIN)/python -m tests.benchmarks.run_cost
+
+scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
+	$(BIN)/twin test scenarios
+
+smoke: constraints.txt  ## the wheel alone, in a fresh environment without the development tools
+	rm -rf build/smoke && mkdir -p build/smoke
+	$(PYTHON) -m venv build/smoke/venv
+	build/smoke/venv/bin/python -m pip wheel --quiet --no-deps --wheel-dir build/smoke .
+	build/smoke/venv/bin/python -m pip install --quiet --constraint constraints.txt build/smoke/*.whl
+	cd build/smoke && venv/bin/twin run ../../scenarios/diff_bot_figure8.yaml --out run
+
+clean:
+	rm -rf $(VENV) build runs .mypy_cache .ruff_cache .pytest_cache

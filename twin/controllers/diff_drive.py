@@ -1,0 +1,80 @@
+"""Kinematics of differential and skid-steer drives, with limits and a command time-out.
+
+Parameter names and behaviour follow ros2_controllers' `diff_drive_controller`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from twin.controllers.limiter import AxisLimits, SpeedLimiter
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiffDriveConfig:
+    """Geometry and limits of a drive."""
+
+    wheel_separation: float
+    """Distance of the left and right wheels' contact points [m]."""
+    wheel_radius: float
+    """[m]"""
+    wheel_separation_multiplier: float = 1.0
+    """Effective track over geometric track: 1 for two wheels; for skid steer calibrated once, near 1 + (a/b)²
+    (half wheelbase a, half track b; isotropic Coulomb friction, equal load)."""
+    linear: AxisLimits = AxisLimits(max_velocity=1.0, max_acceleration=1.0)
+    angular: AxisLimits = AxisLimits(max_velocity=2.0, max_acceleration=3.0)
+    max_wheel_velocity: float = math.inf
+    """[rad/s]; both wheels are scaled together, so that the curvature is kept."""
+    cmd_vel_timeout: float = 0.5
+    """Without a command for this long the robot is brought to a stop [s]."""
+
+
+@dataclass(frozen=True)
+class WheelCommand:
+    """Set-points for the wheels of each side [rad/s]."""
+
+    left: float
+    right: float
+
+
+class DiffDriveController:
+    """Turns velocity commands into wheel speeds."""
+
+    def __init__(self, config: DiffDriveConfig) -> None:
+        self.config = config
+        self._linear = SpeedLimiter(config.linear)
+        self._angular = SpeedLimiter(config.angular)
+        self._command = (0.0, 0.0)
+        self._age = math.inf
+        self.rejected = 0
+        """Commands refused because they were not finite."""
+
+    def set_command(self, linear: float, angular: float) -> bool:
+        """Take a command [m/s, rad/s]; return False, and keep the old one, if it is not finite."""
+        if not (math.isfinite(linear) and math.isfinite(angular)):
+            self.rejected += 1
+            return False
+        self._command = (linear, angular)
+        self._age = 0.0
+        return True
+
+    @property
+    def track(self) -> float:
+        """Effective wheel separation [m]."""
+        return self.config.wheel_separation * self.config.wheel_separation_multiplier
+
+    def update(self, dt: float) -> WheelCommand:
+        """Advance by `dt` [s] and return the wheel set-points within all limits."""
+        timed_out = self._age > self.config.cmd_vel_timeout
+        self._age += dt
+        linear, angular = (0.0, 0.0) if timed_out else self._command
+        v = self._linear.limit(linear, dt)
+        w = self._angular.limit(angular, dt)
+        radius, half = self.config.wheel_radius, self.track / 2.0
+        left, right = (v - w * half) / radius, (v + w * half) / radius
+        fastest = max(abs(left), abs(right))
+        if fastest > self.config.max_wheel_velocity:
+            scale = self.config.max_wheel_velocity / fastest
+            left, right = left * scale, right * scale
+        return WheelCommand(left, right)

@@ -1,0 +1,71 @@
+"""Dead reckoning from wheel encoders, with a covariance that grows with the distance driven."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometryConfig:
+    """Geometry and error model."""
+
+    wheel_radius: float
+    """[m]"""
+    track: float
+    """Effective wheel separation [m]."""
+    distance_variance: float = 1e-4
+    """Variance of the driven distance per metre [m²/m]."""
+    angle_variance: float = 2e-4
+    """Variance of the heading per radian turned [rad²/rad]."""
+    drift_variance: float = 1e-4
+    """Variance of the heading per metre driven [rad²/m]."""
+
+
+class Odometry:
+    """Integrates wheel angles into a pose in `odom` (exact for constant curvature between two readings)."""
+
+    def __init__(self, config: OdometryConfig) -> None:
+        self.config = config
+        self.pose = Pose2(0.0, 0.0, 0.0)
+        self.velocity = (0.0, 0.0)
+        """Linear [m/s] and angular [rad/s] velocity over the last interval."""
+        self.covariance: Array = np.zeros((3, 3))
+        """Of (x, y, yaw) in `odom`."""
+        self._last: tuple[float, float] | None = None
+
+    def update(self, left: float, right: float, dt: float) -> Pose2:
+        """Take the wheels' angles [rad] (mean of each side), `dt` [s] after the last ones; return the pose."""
+        if self._last is None:
+            self._last = (left, right)
+            return self.pose
+        radius = self.config.wheel_radius
+        step_left, step_right = (left - self._last[0]) * radius, (right - self._last[1]) * radius
+        self._last = (left, right)
+        distance = (step_left + step_right) / 2.0
+        angle = (step_right - step_left) / self.config.track
+        heading = self.pose.yaw + angle / 2.0
+        # The chord of an arc is its length times sinc of half the angle.
+        chord = distance * float(np.sinc(angle / (2.0 * math.pi)))
+        self._grow_covariance(distance, angle, heading)
+        self.pose = Pose2(
+            self.pose.x + chord * math.cos(heading),
+            self.pose.y + chord * math.sin(heading),
+            wrap_angle(self.pose.yaw + angle),
+        )
+        self.velocity = (distance / dt, angle / dt)
+        return self.pose
+
+    def _grow_covariance(self, distance: float, angle: float, heading: float) -> None:
+        c, s = math.cos(heading), math.sin(heading)
+        jacobian = np.array([[1.0, 0.0, -distance * s], [0.0, 1.0, distance * c], [0.0, 0.0, 1.0]])
+        along = self.config.distance_variance * abs(distance)
+        turn = self.config.angle_variance * abs(angle) + self.config.drift_variance * abs(distance)
+        direction = np.array([c, s, 0.0])
+        noise = along * np.outer(direction, direction)
+        noise[2, 2] += turn
+        self.covariance = jacobian @ self.covariance @ jacobian.T + noise
