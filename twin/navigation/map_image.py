@@ -1,0 +1,85 @@
+"""Map images as grey levels: PGM by hand, everything else through pillow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import MapError, Problem
+
+
+def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    """Return the grey levels 0..255, shape (h, w), row 0 on top, and the alpha channel if there is one.
+
+    Raises:
+        MapError: the file is no image, or its format needs pillow and pillow is missing.
+    """
+    content = path.read_bytes()
+    if content[:2] in (b"P5", b"P2"):
+        return _read_pgm(path, content), None
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ImportError as error:
+        message = f"{path.suffix or 'this'} images need pillow; valid is `pip install pillow` or a PGM image"
+        raise MapError(Problem(message, path)) from error
+    try:
+        with Image.open(path) as image:
+            has_alpha = "A" in image.getbands() or "transparency" in image.info
+            rgba = np.asarray(image.convert("RGBA")) if has_alpha else None
+            gray = np.asarray(image.convert("L"), dtype=np.uint8)
+    except (UnidentifiedImageError, OSError, ValueError) as error:
+        raise MapError(Problem("the file is not an image; valid is PGM or PNG", path)) from error
+    return gray, None if rgba is None else rgba[..., 3]
+
+
+def write_pgm(path: Path, gray: NDArray[np.uint8]) -> None:
+    """Write a binary PGM of grey levels, shape (h, w), row 0 on top."""
+    height, width = gray.shape
+    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + gray.tobytes())
+
+
+def _read_pgm(path: Path, content: bytes) -> NDArray[np.uint8]:
+    """Decode PGM (netpbm): magic, width, height, maxval separated by white space and comments, then samples."""
+    (width, height, maxval), offset = _read_header(path, content)
+    count = width * height
+    if content[:2] == b"P2":
+        words = [line.split(b"#", 1)[0] for line in content[offset:].splitlines()]
+        try:
+            samples = np.array(b" ".join(words).split(), dtype=np.int64)
+        except ValueError as error:
+            raise MapError(Problem("the samples of the PGM are not all numbers", path)) from error
+    else:
+        dtype = np.dtype(">u2") if maxval > 255 else np.dtype(np.uint8)
+        body = content[offset:]
+        samples = np.frombuffer(body[: len(body) // dtype.itemsize * dtype.itemsize], dtype=dtype)
+    if samples.size < count:
+        message = f"the PGM has {samples.size} samples; valid is {count} ({width} x {height} by its header)"
+        raise MapError(Problem(message, path))
+    levels = np.clip(samples[:count].reshape(height, width), 0, maxval)
+    if maxval == 255:
+        return levels.astype(np.uint8)
+    return np.rint(levels * (255.0 / maxval)).astype(np.uint8)
+
+
+def _read_header(path: Path, content: bytes) -> tuple[tuple[int, int, int], int]:
+    fields: list[int] = []
+    i = 2
+    while len(fields) < 3 and i < len(content):
+        if content[i : i + 1].isspace():
+            i += 1
+        elif content[i : i + 1] == b"#":
+            end = content.find(b"\n", i)
+            i = len(content) if end < 0 else end + 1
+        else:
+            start = i
+            while i < len(content) and content[i : i + 1].isdigit():
+                i += 1
+            if start == i:
+                break
+            fields.append(int(content[start:i]))
+    if len(fields) < 3 or fields[0] < 1 or fields[1] < 1 or not 1 <= fields[2] <= 65535:
+        message = "the PGM header is broken; valid is P5 or P2, width, height and maxval (1..65535)"
+        raise MapError(Problem(message, path))
+    return (fields[0], fields[1], fields[2]), i + 1
