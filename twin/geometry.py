@@ -133,14 +133,14 @@ def rpy_from_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
 
 def yaw_from_quat_wxyz(quat_wxyz: ArrayLike) -> float:
     """Return the yaw [rad] of a rotation."""
-    w, x, y, z = quat_wxyz  # type: ignore[misc,union-attr]
+    w, x, y, z = (float(value) for value in np.asarray(quat_wxyz, dtype=np.float64))
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def multiply_wxyz(a: ArrayLike, b: ArrayLike) -> Array:
     """Return the Hamilton product a·b of two quaternions."""
-    aw, ax, ay, az = a  # type: ignore[misc,union-attr]
-    bw, bx, by, bz = b  # type: ignore[misc,union-attr]
+    aw, ax, ay, az = (float(value) for value in np.asarray(a, dtype=np.float64))
+    bw, bx, by, bz = (float(value) for value in np.asarray(b, dtype=np.float64))
     return np.array(
         [
             aw * bw - ax * bx - ay * by - az * bz,

@@ -83,7 +83,8 @@ def plan_joint_move(
         lim = limits[name]
         if not lim.lower - 1e-6 <= goal[name] <= lim.upper + 1e-6:
             raise ValueError(
-                f"joint '{name}' cannot reach {goal[name]:.3f}; its range is {lim.lower:.3f} … {lim.upper:.3f}"
+                f"joint '{name}' cannot reach {goal[name]:.3f}; "
+                f"its range is {lim.lower:.3f} … {lim.upper:.3f}"
             )
     p0 = np.array([start[name] for name in names])
     p1 = np.array([goal[name] for name in names])
@@ -92,7 +93,7 @@ def plan_joint_move(
     span = np.abs(p1 - p0)
     if not np.any(span > 1e-9):
         return Trajectory(names, np.array([0.0]), p1[None], np.zeros((1, len(names))))
-    # Quintic blend: smooth acceleration; 1.875 and 5.7735 are its peak speed and acceleration for a unit move.
+    # Quintic blend: for a unit move in unit time its speed peaks at 1.875, its acceleration at 5.7735.
     duration = max(
         float(np.max(1.875 * span / velocity)), float(np.max(np.sqrt(5.7735 * span / acceleration)))
     )
@@ -103,7 +104,9 @@ def plan_joint_move(
     return Trajectory(names, times, p0 + blend[:, None] * (p1 - p0), rate[:, None] * (p1 - p0))
 
 
-def concatenate(names: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]) -> Trajectory:
+def concatenate(
+    names: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]
+) -> Trajectory:
     """Return a trajectory through way-points, with Catmull-Rom velocities inside and rest at both ends."""
     t = np.asarray(times, dtype=np.float64)
     p = np.asarray(positions, dtype=np.float64).reshape(len(t), len(names))

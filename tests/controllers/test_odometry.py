@@ -1,0 +1,44 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from twin.controllers.odometry import Odometry, OdometryConfig
+
+CONFIG = OdometryConfig(wheel_radius=0.05, track=0.3)
+
+
+def drive(v: float, w: float, seconds: float, steps: int = 100) -> Odometry:
+    odometry = Odometry(CONFIG)
+    for i in range(steps + 1):
+        t = seconds * i / steps
+        odometry.update((v - w * 0.15) * t / 0.05, (v + w * 0.15) * t / 0.05, seconds / steps)
+    return odometry
+
+
+@given(st.floats(-1, 1), st.floats(-2, 2))
+def test_a_constant_curvature_is_integrated_exactly(v: float, w: float) -> None:
+    pose = drive(v, w, 2.0, steps=3).pose
+    yaw = 2.0 * w
+    x, y = (v / w * math.sin(yaw), v / w * (1 - math.cos(yaw))) if abs(w) > 1e-6 else (2.0 * v, v * w * 2.0)
+    assert pose.x == pytest.approx(x, abs=1e-6)
+    assert pose.y == pytest.approx(y, abs=1e-6)
+
+
+def test_the_first_reading_is_the_reference() -> None:
+    odometry = Odometry(CONFIG)
+    odometry.update(100.0, -40.0, 0.02)
+    assert odometry.pose == (0.0, 0.0, 0.0)
+
+
+def test_velocity_is_that_of_the_last_interval() -> None:
+    assert drive(0.4, -0.7, 1.0).velocity == pytest.approx((0.4, -0.7))
+
+
+def test_covariance_grows_and_stays_symmetric_positive() -> None:
+    short, long = drive(0.5, 0.2, 1.0).covariance, drive(0.5, 0.2, 10.0).covariance
+    assert np.trace(long) > np.trace(short) > 0.0
+    np.testing.assert_allclose(long, long.T)
+    assert np.linalg.eigvalsh(long).min() >= -1e-15

@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from twin.manipulation.trajectory import JointLimits, concatenate, plan_joint_move
+
+LIMITS = {
+    "lift": JointLimits(lower=0.0, upper=1.0, max_velocity=0.4, max_acceleration=0.5),
+    "wrist": JointLimits(lower=-1.6, upper=1.6, max_velocity=1.0, max_acceleration=2.0),
+}
+
+
+@given(st.floats(0, 1), st.floats(0, 1), st.floats(-1.6, 1.6), st.floats(-1.6, 1.6))
+def test_moves_keep_every_joint_within_its_speed_and_acceleration(
+    a: float, b: float, c: float, d: float
+) -> None:
+    trajectory = plan_joint_move({"lift": a, "wrist": c}, {"lift": b, "wrist": d}, LIMITS)
+    times = np.linspace(0.0, trajectory.duration, 400)
+    positions = np.array([trajectory.sample(t) for t in times])
+    np.testing.assert_allclose(positions[-1], [b, d], atol=1e-9)
+    if trajectory.duration > 0.1:
+        velocity = np.gradient(positions, times, axis=0)
+        assert np.all(np.abs(velocity).max(axis=0) <= np.array([0.4, 1.0]) * 1.02)
+
+
+def test_joints_start_and_stop_together() -> None:
+    trajectory = plan_joint_move({"lift": 0.0, "wrist": 0.0}, {"lift": 0.5, "wrist": 0.1}, LIMITS)
+    half = trajectory.sample(trajectory.duration / 2)
+    np.testing.assert_allclose(half, [0.25, 0.05], atol=1e-6)
+
+
+def test_an_unreachable_goal_names_joint_value_and_range() -> None:
+    with pytest.raises(ValueError, match=r"'lift' cannot reach 1\.200; its range is 0\.000 … 1\.000"):
+        plan_joint_move({"lift": 0.0}, {"lift": 1.2}, LIMITS)
+
+
+def test_a_trajectory_passes_its_way_points_and_holds_its_ends() -> None:
+    trajectory = concatenate(["a"], [0.0, 1.0, 3.0], [[0.0], [2.0], [1.0]])
+    assert trajectory.sample(-1.0) == pytest.approx([0.0])
+    assert trajectory.sample(1.0) == pytest.approx([2.0])
+    assert trajectory.sample(9.0) == pytest.approx([1.0])

@@ -1,0 +1,119 @@
+"""The drive: `cmd_vel` in, wheel speeds to the hardware, `odom` and the odom → base transform out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import (
+    Header,
+    Odometry as OdometryMsg,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+    stamp,
+)
+from twin.bridge.tf import TransformBroadcaster
+from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
+from twin.controllers.odometry import Odometry, OdometryConfig
+from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
+from twin.nodes.hardware import HardwareInterface
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiffDriveNodeConfig:
+    """Wiring of the drive."""
+
+    drive: DiffDriveConfig
+    left_joints: tuple[str, ...]
+    right_joints: tuple[str, ...]
+    odom_frame: str = "odom"
+    base_frame: str = "base_footprint"
+    period_ns: int = 20_000_000
+
+
+class DiffDriveControllerNode:
+    """`/diff_drive_controller`: consumes `cmd_vel`, publishes `odom` and `tf`."""
+
+    def __init__(
+        self, bus: Bus, hardware: HardwareInterface, config: DiffDriveNodeConfig, *, namespace: str = ""
+    ) -> None:
+        self.node = bus.create_node("diff_drive_controller", namespace)
+        self.config = config
+        self.controller = DiffDriveController(config.drive)
+        self.odometry = Odometry(
+            OdometryConfig(wheel_radius=config.drive.wheel_radius, track=self.controller.track)
+        )
+        self._hardware = hardware
+        index = {name: i for i, name in enumerate(hardware.joint_names)}
+        self._left = [index[name] for name in config.left_joints]
+        self._right = [index[name] for name in config.right_joints]
+        self._publisher = self.node.create_publisher(OdometryMsg, "odom", 10)
+        self._tf = TransformBroadcaster(self.node)
+        self.node.create_subscription(Twist, "cmd_vel", self._on_cmd_vel, 10)
+        self.node.create_timer(config.period_ns, self._update)
+
+    def _on_cmd_vel(self, message: Twist) -> None:
+        if not self.controller.set_command(message.linear.x, message.angular.z):
+            self.node.get_logger().error(
+                f"cmd_vel refused: linear.x {message.linear.x}, angular.z {message.angular.z} must be finite"
+            )
+
+    def _update(self) -> None:
+        dt = self.config.period_ns * 1e-9
+        position = self._hardware.read().position
+        left = float(np.mean(position[self._left]))
+        right = float(np.mean(position[self._right]))
+        pose = self.odometry.update(left, right, dt)
+        wheels = self.controller.update(dt)
+        for joint in self.config.left_joints:
+            self._hardware.command(joint, wheels.left)
+        for joint in self.config.right_joints:
+            self._hardware.command(joint, wheels.right)
+        self._publish(pose)
+
+    def _publish(self, pose: Pose2) -> None:
+        now = self.node.now_ns
+        w, _, _, z = quat_wxyz_from_yaw(pose.yaw)
+        linear, angular = self.odometry.velocity
+        self._publisher.publish(
+            OdometryMsg(
+                header=Header(stamp=stamp(now), frame_id=self.config.odom_frame),
+                child_frame_id=self.config.base_frame,
+                pose=PoseWithCovariance(
+                    pose=Pose(
+                        position=Point(x=pose.x, y=pose.y, z=0.0),
+                        orientation=Quaternion(x=0.0, y=0.0, z=z, w=w),
+                    ),
+                    covariance=planar_covariance(self.odometry.covariance),
+                ),
+                twist=TwistWithCovariance(
+                    twist=Twist(
+                        linear=Vector3(x=linear, y=0.0, z=0.0), angular=Vector3(x=0.0, y=0.0, z=angular)
+                    ),
+                    covariance=_TWIST_COVARIANCE,
+                ),
+            )
+        )
+        self._tf.send(self.config.odom_frame, self.config.base_frame, Pose3.from_pose2(pose), now)
+
+
+_UNUSED_AXIS = 1e6
+"""Variance that tells filters not to use an axis that a planar drive does not measure."""
+
+
+def planar_covariance(covariance: Array) -> Array:
+    """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose."""
+    full = np.zeros((6, 6))
+    full[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
+    full[2, 2] = full[3, 3] = full[4, 4] = _UNUSED_AXIS
+    return full.ravel()
+
+
+_TWIST_COVARIANCE = planar_covariance(np.diag([1e-3, 1e-4, 1e-3]))

@@ -1,0 +1,58 @@
+"""`/gripper_controller`: opens and closes the fingers (ros2_controllers' `gripper_action_controller`)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+from twin.bridge import types
+from twin.bridge.actions import ActionServer, ServerGoal
+from twin.bridge.bus import Bus
+from twin.manipulation.gripper import GripperConfig, GripperMonitor
+from twin.nodes.hardware import HardwareInterface
+
+ACTION = "control_msgs/action/GripperCommand"
+_Result = types.get(f"{ACTION}_Result")
+
+
+class GripperControllerNode:
+    """Commands the finger joint and tells how the move ended: `reached_goal` or `stalled` on something."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        hardware: HardwareInterface,
+        joint: str,
+        *,
+        config: GripperConfig | None = None,
+        period_ns: int = 20_000_000,
+        namespace: str = "",
+    ) -> None:
+        self.node = bus.create_node("gripper_controller", namespace)
+        self.config = config or GripperConfig()
+        self._hardware = hardware
+        self._joint = joint
+        self._index = hardware.joint_names.index(joint)
+        self._dt = period_ns * 1e-9
+        ActionServer(self.node, ACTION, "gripper_controller/gripper_cmd", self._execute)
+
+    def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
+        target = float(goal.request.command.position)
+        monitor = GripperMonitor(self.config, target)
+        self._hardware.command(self._joint, target)
+        while True:
+            yield
+            reading = self._hardware.read()
+            position = float(reading.position[self._index])
+            state = monitor.update(position, float(reading.velocity[self._index]), self._dt)
+            if goal.is_cancel_requested:
+                self._hardware.command(self._joint, position)
+                goal.canceled()
+            elif state == "moving":
+                continue
+            return _Result(
+                position=position,
+                effort=float(reading.effort[self._index]),
+                stalled=state == "stalled",
+                reached_goal=state == "reached",
+            )

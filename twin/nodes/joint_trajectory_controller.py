@@ -1,0 +1,98 @@
+"""`/arm_controller`: follows joint trajectories (ros2_controllers' `joint_trajectory_controller`)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import Any
+
+from twin.bridge import types
+from twin.bridge.actions import ActionServer, ServerGoal
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import ns
+from twin.manipulation.trajectory import Trajectory, concatenate
+from twin.nodes.hardware import HardwareInterface
+
+ACTION = "control_msgs/action/FollowJointTrajectory"
+_Result = types.get(f"{ACTION}_Result")
+_SUCCESSFUL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -2, -5
+
+
+class JointTrajectoryControllerNode:
+    """Commands positions along the trajectory, then waits until the joints have arrived."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        hardware: HardwareInterface,
+        joints: Sequence[str],
+        *,
+        name: str = "arm_controller",
+        namespace: str = "",
+        goal_tolerance: float = 0.005,
+        goal_time_tolerance_s: float = 2.0,
+    ) -> None:
+        self.node = bus.create_node(name, namespace)
+        self._hardware = hardware
+        self._index = {joint: hardware.joint_names.index(joint) for joint in joints}
+        self._tolerance = goal_tolerance
+        self._patience_ns = int(goal_time_tolerance_s * 1e9)
+        ActionServer(self.node, ACTION, f"{name}/follow_joint_trajectory", self._execute)
+
+    def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
+        names = list(goal.request.trajectory.joint_names)
+        unknown = [name for name in names if name not in self._index]
+        if unknown or not goal.request.trajectory.points:
+            goal.abort()
+            return _Result(
+                error_code=_INVALID_JOINTS,
+                error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
+            )
+        trajectory = self._with_start(names, goal.request.trajectory.points)
+        start = self.node.now_ns
+        while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
+            if goal.is_cancel_requested:
+                goal.canceled()
+                return _Result(error_code=_SUCCESSFUL, error_string="canceled")
+            self._command(names, trajectory.sample(elapsed))
+            yield
+        self._command(names, trajectory.positions[-1])
+        return (yield from self._settle(goal, names, trajectory))
+
+    def _settle(
+        self, goal: ServerGoal, names: list[str], trajectory: Trajectory
+    ) -> Generator[None, None, Any]:
+        deadline = self.node.now_ns + self._patience_ns
+        while True:
+            measured = self._hardware.read().position
+            errors = {
+                name: float(measured[self._index[name]] - target)
+                for name, target in zip(names, trajectory.positions[-1], strict=True)
+            }
+            worst = max(errors, key=lambda name: abs(errors[name]))
+            if abs(errors[worst]) <= self._tolerance:
+                return _Result(error_code=_SUCCESSFUL, error_string="")
+            if self.node.now_ns > deadline:
+                goal.abort()
+                return _Result(
+                    error_code=_GOAL_TOLERANCE_VIOLATED,
+                    error_string=f"'{worst}' is {errors[worst]:+.4f} away from its goal, "
+                    f"{self._tolerance} is allowed",
+                )
+            yield
+
+    def _with_start(self, names: list[str], points: Sequence[Any]) -> Trajectory:
+        """Prepend where the joints are now, as trajectories need not contain it."""
+        measured = self._hardware.read().position
+        times, positions = [0.0], [[float(measured[self._index[name]]) for name in names]]
+        for point in points:
+            time = ns(point.time_from_start) * 1e-9
+            if time > times[-1]:
+                times.append(time)
+                positions.append([float(value) for value in point.positions])
+        if len(times) == 1:
+            positions[0] = [float(value) for value in points[-1].positions]
+        return concatenate(names, times, positions)
+
+    def _command(self, names: list[str], positions: Any) -> None:
+        for name, value in zip(names, positions, strict=True):
+            self._hardware.command(name, float(value))

@@ -1,0 +1,75 @@
+"""`/robot_state_publisher`: link frames from joint states; fixed joints on `tf_static`, moving ones on `tf`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import JointState, String
+from twin.bridge.node import LATCHED
+from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster
+from twin.geometry import Pose3
+from twin.models.description import Joint, RobotDescription
+
+
+def joint_transform(joint: Joint, position: float) -> Pose3:
+    """Return the pose of a joint's child link in its parent link at `position` [rad or m]."""
+    axis = np.asarray(joint.axis)
+    if joint.type == "prismatic":
+        motion = Pose3(axis * position, np.array([1.0, 0.0, 0.0, 0.0]))
+    else:
+        half = position / 2.0
+        motion = Pose3(np.zeros(3), np.array([math.cos(half), *(math.sin(half) * axis)]))
+    return joint.T_parent_joint @ motion
+
+
+class RobotStatePublisherNode:
+    """Subscribes to `joint_states`; publishes `tf`, `tf_static` and `robot_description`."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        description: RobotDescription,
+        *,
+        namespace: str = "",
+        publish_period_ns: int = 50_000_000,
+    ) -> None:
+        self.node = bus.create_node("robot_state_publisher", namespace)
+        self._tf = TransformBroadcaster(self.node)
+        self._period_ns = publish_period_ns
+        self._last_ns = -publish_period_ns
+        self._joints = {joint.name: joint for joint in description.joints.values() if joint.type != "fixed"}
+        self._mimics = [joint for joint in self._joints.values() if joint.mimic is not None]
+        description_publisher = self.node.create_publisher(String, "robot_description", LATCHED)
+        description_publisher.publish(String(data=description.urdf))
+        StaticTransformBroadcaster(self.node).send_all(
+            [
+                (joint.parent, joint.child, joint.T_parent_joint)
+                for joint in description.joints.values()
+                if joint.type == "fixed"
+            ],
+            self.node.now_ns,
+        )
+        self.node.create_subscription(JointState, "joint_states", self._on_joint_states, 10)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        now = self.node.now_ns
+        if now - self._last_ns < self._period_ns:
+            return
+        self._last_ns = now
+        positions = dict(zip(message.name, message.position.tolist(), strict=True))
+        for joint in self._mimics:
+            assert joint.mimic is not None
+            if joint.mimic.joint in positions:
+                leader = positions[joint.mimic.joint]
+                positions[joint.name] = joint.mimic.multiplier * leader + joint.mimic.offset
+        self._tf.send_all(
+            [
+                (joint.parent, joint.child, joint_transform(joint, positions[name]))
+                for name, joint in self._joints.items()
+                if name in positions
+            ],
+            now,
+        )

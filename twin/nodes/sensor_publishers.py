@@ -1,0 +1,97 @@
+"""One function per kind of sensor: a reading becomes the ROS message that its topic carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import Bool, Header, Imu, LaserScan, Quaternion, Range, Vector3, stamp
+from twin.bridge.node import SENSOR_DATA
+from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+
+
+class SensorDevice(Protocol):
+    """A sensor that can be sampled; simulated by `twin.sim.sensors`, or a physical one's driver."""
+
+    @property
+    def spec(self) -> SensorSpec:
+        """What it is."""
+
+    @property
+    def period_ns(self) -> int:
+        """Time between samples [ns]."""
+
+    def sample(self, time_ns: int) -> Any:
+        """Return the reading at `time_ns`."""
+
+
+def _laser_scan(spec: LidarSpec, header: Header, reading: Any) -> LaserScan:
+    return LaserScan(
+        header=header,
+        angle_min=spec.angle_min,
+        angle_max=spec.angle_max,
+        angle_increment=(spec.angle_max - spec.angle_min) / (spec.samples - 1),
+        time_increment=0.0,
+        scan_time=1.0 / spec.rate_hz,
+        range_min=spec.range_min,
+        range_max=spec.range_max,
+        ranges=reading.ranges.astype(np.float32),
+        intensities=np.zeros(0, np.float32),
+    )
+
+
+def _imu(spec: ImuSpec, header: Header, reading: Any) -> Imu:
+    unknown = np.zeros(9)
+    unknown[0] = -1.0  # REP-145: this sensor gives no orientation
+    gyro, accel = reading.angular_velocity, reading.linear_acceleration
+    return Imu(
+        header=header,
+        orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=unknown,
+        angular_velocity=Vector3(x=float(gyro[0]), y=float(gyro[1]), z=float(gyro[2])),
+        angular_velocity_covariance=np.eye(3).ravel() * spec.gyro_noise_stddev**2,
+        linear_acceleration=Vector3(x=float(accel[0]), y=float(accel[1]), z=float(accel[2])),
+        linear_acceleration_covariance=np.eye(3).ravel() * spec.accel_noise_stddev**2,
+    )
+
+
+def _range(spec: RangeSpec, header: Header, reading: Any) -> Range:
+    return Range(
+        header=header,
+        radiation_type=Range.ULTRASOUND,
+        field_of_view=spec.field_of_view,
+        min_range=spec.range_min,
+        max_range=spec.range_max,
+        range=float(reading.range),
+    )
+
+
+def _contact(_spec: ContactSpec, _header: Header, reading: Any) -> Bool:
+    return Bool(data=bool(reading.touching))
+
+
+_MESSAGES: Mapping[type[SensorSpec], tuple[type, Callable[[Any, Header, Any], Any]]] = {
+    LidarSpec: (LaserScan, _laser_scan),
+    ImuSpec: (Imu, _imu),
+    RangeSpec: (Range, _range),
+    ContactSpec: (Bool, _contact),
+}
+
+
+class SensorPublisher:
+    """Publishes one sensor's readings on its topic; the runtime calls it when the sensor is due."""
+
+    def __init__(self, bus: Bus, sensor: SensorDevice, *, namespace: str = "") -> None:
+        self.sensor = sensor
+        self.node = bus.create_node(f"{sensor.spec.name}_driver", namespace)
+        msgtype, self._to_message = _MESSAGES[type(sensor.spec)]
+        self._publisher = self.node.create_publisher(msgtype, sensor.spec.topic, SENSOR_DATA)
+
+    def publish(self, time_ns: int) -> None:
+        """Sample at `time_ns` and publish, stamped with it."""
+        spec = self.sensor.spec
+        header = Header(stamp=stamp(time_ns), frame_id=spec.link)
+        self._publisher.publish(self._to_message(spec, header, self.sensor.sample(time_ns)))

@@ -1,0 +1,33 @@
+"""`/twist_mux`: passes the velocity command of the live source with the highest priority on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import Twist
+from twin.controllers.twist_mux import MuxInput, TwistMux
+
+DEFAULT_INPUTS = (
+    MuxInput(name="navigation", topic="cmd_vel_smoothed", priority=10),
+    MuxInput(name="docking", topic="cmd_vel_docking", priority=20),
+    MuxInput(name="teleop", topic="cmd_vel_teleop", priority=100),
+)
+
+
+class TwistMuxNode:
+    """Subscribes to every input's topic and publishes `cmd_vel`."""
+
+    def __init__(self, bus: Bus, *, inputs: Sequence[MuxInput] = DEFAULT_INPUTS, namespace: str = "") -> None:
+        self.node = bus.create_node("twist_mux", namespace)
+        self.mux = TwistMux(inputs)
+        self._publisher = self.node.create_publisher(Twist, "cmd_vel", 10)
+        for source in inputs:
+            self.node.create_subscription(Twist, source.topic, self._callback(source.name), 10)
+
+    def _callback(self, name: str) -> Callable[[Twist], None]:
+        def on_twist(message: Twist) -> None:
+            if self.mux.accept(name, self.node.now_ns * 1e-9):
+                self._publisher.publish(message)
+
+        return on_twist
