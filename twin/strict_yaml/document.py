@@ -1,0 +1,178 @@
+"""A YAML file as plain data that remembers the line of every value, and overrides of single values."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic_core import to_json
+
+from twin.errors import Problem, TwinError
+
+Loc = tuple[str | int, ...]
+"""Keys and indices from the root of a file to a value."""
+
+_MAX_NODES = 100_000
+"""More values than any file we read has; stops a file whose aliases multiply without end."""
+
+
+class _CoreLoader(yaml.SafeLoader):
+    """PyYAML's composer with the scalar rules of YAML 1.2's core schema."""
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML's own attribute)
+
+
+for _tag, _pattern in (
+    ("null", r"~|null|Null|NULL|"),
+    ("bool", r"true|True|TRUE|false|False|FALSE"),
+    ("int", r"[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+"),
+    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"),
+):
+    _CoreLoader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(rf"(?:{_pattern})\Z"), None)
+
+
+@dataclass
+class Document:
+    """Plain data of a file, where each value came from, and what is wrong with the YAML itself."""
+
+    file: Path
+    data: Any = None
+    lines: dict[Loc, int] = field(default_factory=dict)
+    overrides: dict[Loc, str] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+    def problem(self, loc: Loc, message: str) -> Problem:
+        """Place a message: at the override that set the value, else at the innermost known line."""
+        for end in range(len(loc), -1, -1):
+            if loc[:end] in self.overrides:
+                return Problem(f"override {self.overrides[loc[:end]]}: {message}")
+            if loc[:end] in self.lines:
+                return Problem(message, self.file, self.lines[loc[:end]])
+        return Problem(message, self.file, 1)
+
+
+def _scalar(node: yaml.ScalarNode) -> Any:
+    kind = node.tag.rpartition(":")[2]
+    if kind == "null":
+        return None
+    if kind == "bool":
+        return node.value.lower() == "true"
+    if kind == "int":
+        return int(node.value, 10 if node.value[:2] not in ("0x", "0o") else 0)
+    return float(node.value) if kind == "float" else node.value
+
+
+def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, ...]) -> Any:
+    """Turn a composed node into plain data, noting lines, duplicate keys and endless aliases."""
+    document.lines.setdefault(loc, node.start_mark.line + 1)
+    if id(node) in above or len(document.lines) > _MAX_NODES:
+        document.problems.append(
+            document.problem(loc, "alias contains itself or grows without end; write the value out")
+        )
+        return None
+    if isinstance(node, yaml.ScalarNode):
+        return _scalar(node)
+    above = (*above, id(node))
+    if isinstance(node, yaml.SequenceNode):
+        return [_construct(document, item, (*loc, i), above) for i, item in enumerate(node.value)]
+    data: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
+        line = key_node.start_mark.line + 1
+        if key is None:
+            document.problems.append(Problem("a key must be text", document.file, line))
+        elif key in data:
+            first = document.lines[(*loc, key)]
+            message = f"duplicate key '{key}'{within(loc)}, first given in line {first}; keep one of them"
+            document.problems.append(Problem(message, document.file, line))
+        else:
+            document.lines[(*loc, key)] = line
+            data[key] = _construct(document, value_node, (*loc, key), above)
+    return data
+
+
+def _compose(text: str) -> yaml.Node | None:
+    loader = _CoreLoader(text)
+    try:
+        return loader.get_single_node()
+    finally:
+        loader.dispose()
+
+
+def _yaml_message(fault: yaml.YAMLError) -> str:
+    """Return PyYAML's complaint as one sentence."""
+    parts = [getattr(fault, "context", None), getattr(fault, "problem", None)]
+    return f"invalid YAML: {', '.join(part for part in parts if part) or fault}"
+
+
+def read(path: Path, error: type[TwinError]) -> Document:
+    """Read a file; faults of the YAML itself are raised as `error`."""
+    document = Document(path)
+    try:
+        node = _compose(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise error(Problem(f"cannot read the file: {fault.strerror}", path)) from None
+    except UnicodeDecodeError as fault:
+        raise error(
+            Problem(f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}", path)
+        ) from None
+    except yaml.YAMLError as fault:
+        mark = getattr(fault, "problem_mark", None)
+        raise error(Problem(_yaml_message(fault), path, None if mark is None else mark.line + 1)) from None
+    if node is None:
+        raise error(Problem("the file is empty", path, 1))
+    document.data = _construct(document, node, (), ())
+    document.lines[()] = 1
+    return document
+
+
+def apply_override(document: Document, dotted: str, text: str) -> None:
+    """Set one value; whether its keys exist is the schema's business, indices must exist here."""
+    name = f"{dotted}={text}"
+    try:
+        node = _compose(text)
+    except yaml.YAMLError as fault:
+        document.problems.append(Problem(f"override {name}: {_yaml_message(fault)}"))
+        return
+    keys: list[str | int] = []
+    target: Any = document.data
+    parts = dotted.split(".")
+    for i, part in enumerate(parts):
+        last = i == len(parts) - 1
+        if isinstance(target, list):
+            if not part.isdecimal() or int(part) >= len(target):
+                valid = f"indices 0 to {len(target) - 1}" if target else "none, the list is empty"
+                document.problems.append(
+                    Problem(f"override {name}: no item '{part}'{within(tuple(keys))}; valid: {valid}")
+                )
+                return
+            keys.append(int(part))
+        elif isinstance(target, dict):
+            keys.append(part)
+        else:
+            here = ".".join(map(str, keys)) or "the file"
+            message = f"override {name}: {here} is {shown(target)} and has no key '{part}'"
+            document.problems.append(Problem(message))
+            return
+        if last:
+            document.overrides[tuple(keys)] = name
+            target[keys[-1]] = None if node is None else _construct(Document(document.file), node, (), ())
+        else:
+            if isinstance(target, dict) and target.get(part) is None:
+                target[part] = {}
+                document.overrides[tuple(keys)] = name
+            target = target[keys[-1]]
+
+
+def within(loc: Loc) -> str:
+    """Return the tail of a message that says where in the file."""
+    return f" in {'.'.join(map(str, loc))}" if loc else ""
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: short."""
+    text = repr(value) if not isinstance(value, dict | list) else to_json(value).decode()
+    return text if len(text) <= 60 else text[:57] + "..."

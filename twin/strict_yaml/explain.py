@@ -1,0 +1,118 @@
+"""Pydantic's errors as sentences with a place in the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from twin.errors import nearest
+from twin.strict_yaml.document import Loc, shown, within
+
+
+class Fault(NamedTuple):
+    """A fault between fields, found after every single field is valid."""
+
+    loc: Loc
+    """Keys and indices from the model that raises to the value at fault."""
+    message: str
+    """What is wrong and what would be valid."""
+
+
+class Faults(ValueError):
+    """Raised by a model's own validator; `load` gives each fault its file and line."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("; ".join(f"{'.'.join(map(str, f.loc))}: {f.message}" for f in self.faults))
+
+
+_WORDS = MappingProxyType(
+    {
+        "float_type": "must be a number",
+        "float_parsing": "must be a number",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "bool_type": "must be true or false",
+        "string_type": "must be text",
+        "string_too_short": "must not be empty",
+        "list_type": "must be a list",
+        "tuple_type": "must be a list",
+        "dict_type": "must be a mapping (key: value)",
+        "model_type": "must be a mapping (key: value)",
+        "greater_than": "must be greater than {gt}",
+        "greater_than_equal": "must be at least {ge}",
+        "less_than": "must be less than {lt}",
+        "less_than_equal": "must be at most {le}",
+    }
+)
+
+
+def _data_loc(data: Any, loc: Loc) -> Loc:
+    """Drop the union tags that pydantic puts into a location; keep a last key that the data lacks."""
+    kept: list[str | int] = []
+    for part in loc:
+        inside = (
+            part in data
+            if isinstance(data, dict)
+            else isinstance(data, list) and isinstance(part, int) and part < len(data)
+        )
+        if inside:
+            kept.append(part)
+            data = data[part]
+    return tuple(kept)
+
+
+def _valid_keys(schema: type[BaseModel], loc: Loc) -> list[str]:
+    """Return the keys that the schema allows at a location, found in its JSON schema."""
+    root = schema.model_json_schema()
+    nodes = _expand(root, root)
+    for part in loc:
+        step: list[dict[str, Any]] = []
+        for node in nodes:
+            mapping = node.get("discriminator", {}).get("mapping", {})
+            child = {"$ref": mapping[part]} if part in mapping else node.get("properties", {}).get(part)
+            child = node.get("items") if isinstance(part, int) else child or node.get("additionalProperties")
+            step += _expand(child, root) if isinstance(child, dict) else []
+        nodes = step
+    return sorted({key for node in nodes for key in node.get("properties", {})})
+
+
+def _expand(node: dict[str, Any], root: dict[str, Any]) -> list[dict[str, Any]]:
+    """Follow references and alternatives of a JSON schema node."""
+    if "$ref" in node:
+        return _expand(root["$defs"][node["$ref"].rpartition("/")[2]], root)
+    alternatives = node.get("anyOf", [])
+    return [node, *(found for alternative in alternatives for found in _expand(alternative, root))]
+
+
+def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Iterator[tuple[Loc, str]]:
+    """Yield place and sentence of one pydantic error about `data`."""
+    kind, loc, context = fault["type"], tuple(fault["loc"]), fault.get("ctx", {})
+    at = _data_loc(data, loc)
+    name = ".".join(map(str, at)) or "the file"
+    if kind == "extra_forbidden":
+        hint = nearest(str(loc[-1]), _valid_keys(schema, loc[:-1]))
+        yield at, f"unknown key '{loc[-1]}'{within(at[:-1])}; {hint}"
+    elif kind == "missing":
+        yield (*at, loc[-1]), f"missing key '{loc[-1]}'{within(at)}"
+    elif kind == "union_tag_not_found":
+        key = context["discriminator"].strip("'")
+        yield (*at, key), f"missing key '{key}'{within(at)}"
+    elif kind in ("union_tag_invalid", "literal_error"):
+        word = str(context.get("tag", fault["input"]))
+        valid = re.findall(r"'([^']*)'", context.get("expected_tags") or context["expected"])
+        key = context["discriminator"].strip("'") if "discriminator" in context else None
+        where = at if key is None else (*at, key)
+        yield where, f"{'.'.join(map(str, where))}: unknown value '{word}'; {nearest(word, valid)}"
+    elif isinstance(context.get("error"), Faults):
+        for inner in context["error"].faults:
+            yield (*at, *inner.loc), inner.message
+    elif isinstance(context.get("error"), ValueError):
+        yield at, f"{name}: {context['error']}, not {shown(fault['input'])}"
+    else:
+        words = _WORDS.get(kind, fault["msg"][:1].lower() + fault["msg"][1:]).format(**context)
+        yield at, f"{name}: {words}, not {shown(fault['input'])}"

@@ -1,0 +1,72 @@
+"""Physical values of a file: an SI number, or text with a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Metadata of an `Annotated[float, Unit(...)]` that accepts an SI number or text with a unit."""
+
+    quantity: str
+    factors: tuple[tuple[str, str | float], ...]
+    """Unit and its size in SI (exact text, or a float for irrational ones); the SI unit comes first."""
+
+    def parse(self, value: object) -> float:
+        """Return `value` in SI; raises PydanticCustomError naming the valid units."""
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return float(value)
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        names = ", ".join(name for name, _ in self.factors)
+        si = self.factors[0][0]
+        if match is None or not match[2]:
+            raise PydanticCustomError(
+                "unit",
+                "must be a number ({q} in {si}) or text with a unit ({n})",
+                {"q": self.quantity, "si": si, "n": names},
+            )
+        factor = dict(self.factors).get(match[2])
+        if factor is None:
+            raise PydanticCustomError(
+                "unit",
+                "must have a unit of {q} ({n})",
+                {"u": match[2], "q": self.quantity, "n": names},
+            )
+        number = Fraction(match[1])
+        return float(number) * factor if isinstance(factor, float) else float(number * Fraction(factor))
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.parse, handler(source))
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        names = "|".join(re.escape(name) for name, _ in self.factors)
+        text = {"type": "string", "pattern": rf"^[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*({names})$"}
+        return {"anyOf": [handler(core), text]}
+
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+_DEG = math.pi / 180.0
+
+Seconds = Annotated[
+    float, Unit("time", (("s", "1"), ("ms", "1/1000"), ("us", "1/1000000"), ("min", "60"), ("h", "3600")))
+]
+Metres = Annotated[float, Unit("length", (("m", "1"), ("cm", "1/100"), ("mm", "1/1000"), ("km", "1000")))]
+Radians = Annotated[float, Unit("angle", (("rad", "1"), ("deg", _DEG), ("°", _DEG)))]
+Kilograms = Annotated[float, Unit("mass", (("kg", "1"), ("g", "1/1000"), ("t", "1000")))]
+MetresPerSecond = Annotated[
+    float, Unit("speed", (("m/s", "1"), ("cm/s", "1/100"), ("mm/s", "1/1000"), ("km/h", "5/18")))
+]
+RadiansPerSecond = Annotated[
+    float, Unit("turn rate", (("rad/s", "1"), ("deg/s", _DEG), ("°/s", _DEG), ("rpm", math.pi / 30.0)))
+]
+Newtons = Annotated[float, Unit("force", (("N", "1"), ("mN", "1/1000"), ("kN", "1000")))]
+Hertz = Annotated[float, Unit("frequency", (("Hz", "1"), ("kHz", "1000")))]
+Joules = Annotated[float, Unit("energy", (("J", "1"), ("kJ", "1000"), ("Wh", "3600"), ("kWh", "3600000")))]
