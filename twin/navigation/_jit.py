@@ -1,4 +1,4 @@
-"""The one way this package compiles a function: numba, cached on disk, with the Python signature kept for mypy."""
+"""The one way this package compiles a function: numba, cached on disk, typed as the Python function."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Why navigation could not do what was asked, with the error codes of Nav2's actions.
 
-These end an action with an error code; they are answers of the robot, not mistakes of the user (`twin.errors`).
+These end an action with an error code: answers of the robot, not mistakes of the user (`twin.errors`).
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def write_pgm(path: Path, gray: NDArray[np.uint8]) -> None:
 
 
 def _read_pgm(path: Path, content: bytes) -> NDArray[np.uint8]:
-    """Decode PGM (netpbm): magic, width, height, maxval separated by white space and comments, then samples."""
+    """Decode PGM (netpbm): magic, width, height, maxval with white space and comments between, samples."""
     (width, height, maxval), offset = _read_header(path, content)
     count = width * height
     if content[:2] == b"P2":

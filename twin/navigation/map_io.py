@@ -131,7 +131,8 @@ class _MetadataReader:
         free = self._get("free_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
         mode = self._get("mode", _mode) if "mode" in self.values else "trinary"
         if occupied is not None and free is not None and free >= occupied:
-            self._report(f"is {free}; valid is less than occupied_thresh ({occupied})", "free_thresh", name=True)
+            message = f"is {free}; valid is less than occupied_thresh ({occupied})"
+            self._report(message, "free_thresh", name=True)
         if self.problems:
             raise MapError(self.problems)
         return MapMetadata(
@@ -159,7 +160,9 @@ class _MetadataReader:
             line = mark.line + 1 if mark else None
             raise MapError(Problem(f"the file is not YAML: {reason}", self.path, line)) from error
         if not isinstance(root, yaml.MappingNode):
-            raise MapError(Problem(f"the file holds no keys; valid keys: {', '.join(REQUIRED)}", self.path, 1))
+            raise MapError(
+                Problem(f"the file holds no keys; valid keys: {', '.join(REQUIRED)}", self.path, 1)
+            )
         for key_node, _ in root.value:
             key, line = str(key_node.value), key_node.start_mark.line + 1
             if key in self.lines:
@@ -200,7 +203,9 @@ def _number(
         number = float(value)  # also YAML 1.1's strings such as 5e-2
     except (TypeError, ValueError):
         raise ValueError(f"is {value!r}; valid is {valid}") from None
-    if isinstance(value, bool) or not (math.isfinite(number) and number > above and at_least <= number <= at_most):
+    if isinstance(value, bool) or not (
+        math.isfinite(number) and number > above and at_least <= number <= at_most
+    ):
         raise ValueError(f"is {value!r}; valid is {valid}")
     return number
 

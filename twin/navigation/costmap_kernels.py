@@ -1,0 +1,203 @@
+"""The compiled loops of the costmap: ray tracing, inflation, footprints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+from twin.navigation._jit import jit
+
+Cells = NDArray[np.uint8]
+
+
+@jit
+def trace_scan(
+    obstacles: Cells,
+    points: Array,
+    sensor_x: float,
+    sensor_y: float,
+    obstacle_min_range: float,
+    obstacle_max_range: float,
+    raytrace_max_range: float,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> None:
+    """Clear the cells along the rays from the sensor to the points, then mark the cells of the points.
+
+    All rays clear before any point marks, so that a grazing ray never deletes what its neighbour sees (nav2's
+    ObstacleLayer::updateBounds). Cells are visited exactly as the ray crosses them (Amanatides and Woo 1987).
+    """
+    height, width = obstacles.shape
+    sx, sy = (sensor_x - origin_x) / resolution, (sensor_y - origin_y) / resolution
+    if sx < 0.0 or sy < 0.0 or sx >= width or sy >= height:
+        return
+    for k in range(points.shape[0]):
+        ex, ey = (points[k, 0] - origin_x) / resolution, (points[k, 1] - origin_y) / resolution
+        dx, dy = ex - sx, ey - sy
+        length = math.hypot(dx, dy)
+        if not length > 0.0 or length == math.inf:
+            continue
+        t_end = min(1.0, raytrace_max_range / (length * resolution))
+        ix, iy = int(sx), int(sy)
+        step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
+        t_dx = abs(1.0 / dx) if dx != 0.0 else math.inf
+        t_dy = abs(1.0 / dy) if dy != 0.0 else math.inf
+        t_x = ((ix + 1 - sx) if dx > 0.0 else (sx - ix)) * t_dx if dx != 0.0 else math.inf
+        t_y = ((iy + 1 - sy) if dy > 0.0 else (sy - iy)) * t_dy if dy != 0.0 else math.inf
+        while True:
+            obstacles[iy, ix] = 0
+            if t_x < t_y:
+                if t_x > t_end:
+                    break
+                ix += step_x
+                t_x += t_dx
+            else:
+                if t_y > t_end:
+                    break
+                iy += step_y
+                t_y += t_dy
+            if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                break
+    for k in range(points.shape[0]):
+        distance = math.hypot(points[k, 0] - sensor_x, points[k, 1] - sensor_y)
+        if not (obstacle_min_range <= distance <= obstacle_max_range):
+            continue
+        jx = math.floor((points[k, 0] - origin_x) / resolution)
+        jy = math.floor((points[k, 1] - origin_y) / resolution)
+        if 0 <= jx < width and 0 <= jy < height:
+            obstacles[int(jy), int(jx)] = 254
+
+
+@jit
+def combine_and_inflate(
+    costs: Cells,
+    base: Cells,
+    obstacles: Cells,
+    stamp: Cells,
+    inflate_unknown: bool,
+    x0: int,
+    y0: int,
+    x1: int,
+    y1: int,
+) -> None:
+    """Rewrite costs[y0:y1, x0:x1] from the inflated static layer and the obstacle layer.
+
+    Args:
+        costs: The master grid, written.
+        base: Static layer, already inflated.
+        obstacles: Obstacle layer: 255 never seen, 0 seen free, 254 lethal.
+        stamp: Costs around one lethal cell, shape (2 r + 1, 2 r + 1); 0 beyond the inflation radius.
+        inflate_unknown: Whether inflation writes every cost into unknown cells, not only 253 and above.
+        x0: First column; x1 and y1 are one past the last.
+        y0: First row.
+        x1: Column past the last.
+        y1: Row past the last.
+    """
+    height, width = costs.shape
+    r = stamp.shape[0] // 2
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            cost = base[y, x]
+            costs[y, x] = 0 if cost == 255 and obstacles[y, x] == 0 else cost
+    for y in range(max(0, y0 - r), min(height, y1 + r)):
+        for x in range(max(0, x0 - r), min(width, x1 + r)):
+            if obstacles[y, x] != 254 or base[y, x] == 254:
+                continue
+            if (
+                0 < x < width - 1
+                and 0 < y < height - 1
+                and obstacles[y, x - 1] == 254
+                and obstacles[y, x + 1] == 254
+                and obstacles[y - 1, x] == 254
+                and obstacles[y + 1, x] == 254
+            ):
+                if x0 <= x < x1 and y0 <= y < y1:
+                    costs[y, x] = 254
+                continue  # an inner cell is never the nearest one to anything outside
+            for v in range(max(y0, y - r), min(y1, y + r + 1)):
+                for u in range(max(x0, x - r), min(x1, x + r + 1)):
+                    cost = stamp[v - y + r, u - x + r]
+                    old = costs[v, u]
+                    if old == 255:
+                        if cost >= 253 or (inflate_unknown and cost > 0):
+                            costs[v, u] = cost
+                    elif cost > old:
+                        costs[v, u] = cost
+
+
+@jit
+def outline_cost(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> int:
+    """Return the highest cost under the outline of a footprint at a pose; 254 off the map.
+
+    Lethal outranks unknown (255). The outline is sampled every half cell.
+    """
+    height, width = costs.shape
+    c, s = math.cos(yaw), math.sin(yaw)
+    n = corners.shape[0]
+    worst = 0
+    for k in range(n):
+        ax = (x + c * corners[k, 0] - s * corners[k, 1] - origin_x) / resolution
+        ay = (y + s * corners[k, 0] + c * corners[k, 1] - origin_y) / resolution
+        m = (k + 1) % n
+        bx = (x + c * corners[m, 0] - s * corners[m, 1] - origin_x) / resolution
+        by = (y + s * corners[m, 0] + c * corners[m, 1] - origin_y) / resolution
+        pieces = max(1, int(math.ceil(2.0 * math.hypot(bx - ax, by - ay))))
+        for i in range(pieces):
+            t = i / pieces
+            ix = int(math.floor(ax + t * (bx - ax)))
+            iy = int(math.floor(ay + t * (by - ay)))
+            if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                return 254
+            cost = int(costs[iy, ix])
+            if cost == 254:
+                return 254
+            worst = max(worst, cost)
+    return worst
+
+
+@jit
+def steps_to_collision(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    v: float,
+    w: float,
+    dt: float,
+    max_distance: float,
+    max_steps: int,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> int:
+    """Return the number of steps of `dt` at constant (v, w) until the outline is lethal, or -1 if it never is.
+
+    Step 0 is the given pose itself. The projection ends after `max_steps`, or `max_distance` from the start.
+    With a single corner at the origin the inscribed cost (253) of the centre counts as a collision.
+    """
+    radius_only = corners.shape[0] == 1
+    x0, y0 = x, y
+    for step in range(max_steps + 1):
+        cost = outline_cost(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        if cost == 254 or (radius_only and cost == 253):
+            return step
+        if math.hypot(x - x0, y - y0) > max_distance:
+            return -1
+        x += v * dt * math.cos(yaw)
+        y += v * dt * math.sin(yaw)
+        yaw += w * dt
+    return -1
