@@ -154,11 +154,11 @@ def outline_cost(
         m = (k + 1) % n
         bx = (x + c * corners[m, 0] - s * corners[m, 1] - origin_x) / resolution
         by = (y + s * corners[m, 0] + c * corners[m, 1] - origin_y) / resolution
-        pieces = max(1, int(math.ceil(2.0 * math.hypot(bx - ax, by - ay))))
+        pieces = max(1, math.ceil(2.0 * math.hypot(bx - ax, by - ay)))
         for i in range(pieces):
             t = i / pieces
-            ix = int(math.floor(ax + t * (bx - ax)))
-            iy = int(math.floor(ay + t * (by - ay)))
+            ix = math.floor(ax + t * (bx - ax))
+            iy = math.floor(ay + t * (by - ay))
             if ix < 0 or iy < 0 or ix >= width or iy >= height:
                 return 254
             cost = int(costs[iy, ix])
@@ -184,7 +184,7 @@ def steps_to_collision(
     origin_y: float,
     resolution: float,
 ) -> int:
-    """Return the number of steps of `dt` at constant (v, w) until the outline is lethal, or -1 if it never is.
+    """Return the number of steps of `dt` at constant (v, w) until the outline is lethal; -1 if never.
 
     Step 0 is the given pose itself. The projection ends after `max_steps`, or `max_distance` from the start.
     With a single corner at the origin the inscribed cost (253) of the centre counts as a collision.

@@ -129,7 +129,7 @@ class _MetadataReader:
         negate = self._get("negate", _flag)
         occupied = self._get("occupied_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
         free = self._get("free_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
-        mode = self._get("mode", _mode) if "mode" in self.values else "trinary"
+        mode: Any = self._get("mode", _mode) if "mode" in self.values else "trinary"
         if occupied is not None and free is not None and free >= occupied:
             message = f"is {free}; valid is less than occupied_thresh ({occupied})"
             self._report(message, "free_thresh", name=True)
@@ -203,9 +203,8 @@ def _number(
         number = float(value)  # also YAML 1.1's strings such as 5e-2
     except (TypeError, ValueError):
         raise ValueError(f"is {value!r}; valid is {valid}") from None
-    if isinstance(value, bool) or not (
-        math.isfinite(number) and number > above and at_least <= number <= at_most
-    ):
+    in_range = math.isfinite(number) and number > above and at_least <= number <= at_most
+    if isinstance(value, bool) or not in_range:
         raise ValueError(f"is {value!r}; valid is {valid}")
     return number
 
