@@ -1,1 +1,1 @@
-
+"""MuJoCo worlds: scene and robots composed, stepped, sensed."""

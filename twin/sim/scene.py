@@ -28,11 +28,13 @@ class StaticBody:
     shapes: tuple[Shape, ...]
     friction: float = 0.8
     """Coulomb coefficient."""
+    solid: bool = True
+    """False for paint on the floor: seen, but never touched nor hit by rays."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeBody:
-    """Something that can be pushed, grasped and dropped; its inertia is that of its shapes at uniform density."""
+    """Something to push, grasp and drop; its inertia is that of its shapes at uniform density."""
 
     name: str
     T_world_body: Pose3

@@ -1,0 +1,188 @@
+"""Put a scene and robots into one MjSpec."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import mujoco
+
+from twin.errors import Problem, ScenarioError
+from twin.models.description import Box, Capsule, Cylinder
+from twin.sim.physics import Physics
+from twin.sim.robot import RobotPlacement
+from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+
+FLOOR = "floor"
+"""Name of the floor's geom."""
+
+GROUP_SOLID = 0
+"""Floor, statics and goods: seen and touched."""
+GROUP_PAINT = 1
+"""Seen only."""
+GROUP_VISUAL = 2
+"""The robots' visuals, set by the converter."""
+GROUP_COLLISION = 3
+"""The robots' collision shapes, set by the converter."""
+
+
+def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics) -> mujoco.MjSpec:
+    """Return the uncompiled world; elements of robot `r` are named `r/<name>`.
+
+    Raises:
+        ScenarioError: Two things have the same name.
+    """
+    _check_names(scene, robots)
+    spec = mujoco.MjSpec()
+    spec.modelname = scene.name
+    physics.apply(spec)
+    _look(spec, scene)
+    _floor(spec, scene)
+    # Stiff contacts rest within 0.1 mm of the surface; the time constant must span two steps.
+    solref = [max(0.004, 2.0 * physics.timestep), 1.0]
+    for static in scene.statics:
+        _add_static(spec, static, solref)
+    for goods in scene.goods:
+        _add_goods(spec, goods, solref)
+    for placement in robots:
+        _attach(spec, placement)
+    return spec
+
+
+def static_geom(name: str, index: int) -> str:
+    """Return the name of a static body's i-th geom."""
+    return f"{name}#{index}"
+
+
+def _check_names(scene: Scene, robots: Sequence[RobotPlacement]) -> None:
+    names = Counter(
+        [FLOOR, *(s.name for s in scene.statics), *(g.name for g in scene.goods), *(r.name for r in robots)]
+    )
+    problems = [
+        Problem(f"{count} things in scene '{scene.name}' have the name '{name}'; give each its own")
+        for name, count in sorted(names.items())
+        if count > 1
+    ]
+    if problems:
+        raise ScenarioError(problems)
+
+
+def _look(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Light and cameras' buffers; changes no physics."""
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    spec.visual.headlight.diffuse = [0.45, 0.45, 0.45]
+    spec.visual.headlight.specular = [0.1, 0.1, 0.1]
+    spec.visual.map.zfar = 100.0
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    # MuJoCo would derive these from all bodies, the 40 m floor included.
+    spec.stat.extent, spec.stat.center = 10.0, [0.0, 0.0, 0.5]
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.87, 0.91, 0.95],
+        rgb2=[0.62, 0.68, 0.75],
+        width=256,
+        height=1536,
+    )
+    spec.worldbody.add_light(
+        name="sun",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[0.0, 0.0, 10.0],
+        dir=[0.35, 0.5, -1.0],
+        diffuse=[0.5, 0.5, 0.48],
+        castshadow=True,
+    )
+
+
+def _floor(spec: mujoco.MjSpec, scene: Scene) -> None:
+    spec.add_texture(
+        name="checker",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.66, 0.67, 0.68],
+        rgb2=[0.62, 0.63, 0.645],
+        width=512,
+        height=512,
+    )
+    material = spec.add_material(name="floor", reflectance=0.0, texrepeat=[0.5, 0.5], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "checker"
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[scene.floor_size[0] / 2.0, scene.floor_size[1] / 2.0, 1.0],
+        material="floor",
+        friction=[scene.floor_friction, 0.005, 0.0001],
+        group=GROUP_SOLID,
+    )
+
+
+def _add_static(spec: mujoco.MjSpec, static: StaticBody, solref: list[float]) -> None:
+    # Geoms of the world body: never tested against each other, and found by one bounding tree.
+    frame = spec.worldbody.add_frame(pos=static.T_world_body.xyz, quat=static.T_world_body.quat_wxyz)
+    for index, shape in enumerate(static.shapes):
+        geom = _add_geom(spec.worldbody, shape, static.friction, solref)
+        geom.name = static_geom(static.name, index)
+        geom.set_frame(frame)
+        if not static.solid:
+            geom.contype = geom.conaffinity = 0
+            geom.group = GROUP_PAINT
+
+
+def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> None:
+    body = spec.worldbody.add_body(
+        name=goods.name, pos=goods.T_world_body.xyz, quat=goods.T_world_body.quat_wxyz
+    )
+    body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED
+    body.add_freejoint(name=goods.name)
+    volumes = [volume(shape) for shape in goods.shapes]
+    for index, (shape, part) in enumerate(zip(goods.shapes, volumes, strict=True)):
+        geom = _add_geom(body, shape, goods.friction, solref)
+        geom.name = static_geom(goods.name, index)
+        geom.mass = goods.mass * part / sum(volumes)
+
+
+def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[float]) -> mujoco.MjsGeom:
+    kind, size = _primitive(shape)
+    return body.add_geom(
+        type=kind,
+        size=size,
+        pos=shape.T_body_geometry.xyz,
+        quat=shape.T_body_geometry.quat_wxyz,
+        rgba=shape.rgba,
+        friction=[friction, 0.005, 0.0001],
+        solref=solref,
+        group=GROUP_SOLID,
+    )
+
+
+def _primitive(shape: Shape) -> tuple[mujoco.mjtGeom, list[float]]:
+    """Return MuJoCo's type and half sizes."""
+    geometry = shape.geometry
+    if isinstance(geometry, Box):
+        return mujoco.mjtGeom.mjGEOM_BOX, [edge / 2.0 for edge in geometry.size]
+    if isinstance(geometry, Cylinder):
+        return mujoco.mjtGeom.mjGEOM_CYLINDER, [geometry.radius, geometry.length / 2.0, 0.0]
+    if isinstance(geometry, Capsule):
+        return mujoco.mjtGeom.mjGEOM_CAPSULE, [geometry.radius, geometry.length / 2.0, 0.0]
+    return mujoco.mjtGeom.mjGEOM_SPHERE, [geometry.radius, 0.0, 0.0]
+
+
+def volume(shape: Shape) -> float:
+    """Return the volume of a shape [m³]."""
+    geometry = shape.geometry
+    if isinstance(geometry, Box):
+        return geometry.size[0] * geometry.size[1] * geometry.size[2]
+    disc = 3.141592653589793 * geometry.radius**2
+    if isinstance(geometry, Cylinder):
+        return disc * geometry.length
+    ball = disc * geometry.radius * 4.0 / 3.0
+    return disc * geometry.length + ball if isinstance(geometry, Capsule) else ball
+
+
+def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
+    robot = placement.conversion.spec.copy()
+    spec.attach(robot, prefix=f"{placement.name}/", frame=spec.worldbody.add_frame())
+    root = spec.body(f"{placement.name}/{placement.conversion.description.root}")
+    root.pos, root.quat = placement.T_world_root.xyz, placement.T_world_root.quat_wxyz
+    root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER

@@ -1,0 +1,59 @@
+"""Contacts of robots with other things: the truth, for checks and bumpers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+
+class Contact(NamedTuple):
+    """A robot's body touches another body."""
+
+    body1: str
+    """Link of a robot, `<robot>/<link>`."""
+    body2: str
+    """What it touches: a static, goods, or another robot's link."""
+    force_N: float
+    """Sum of the normal forces [N]."""
+    geoms: tuple[tuple[str, str], ...]
+    """The touching geoms, body1's first."""
+
+
+class ContactReader:
+    """Finds the few contacts that matter among all contacts of a world, by masks over geoms."""
+
+    def __init__(self, model: mujoco.MjModel, owners: Sequence[str], robot_of_geom: Sequence[int]) -> None:
+        """Bind to a model.
+
+        Args:
+            model: The compiled world.
+            owners: Name of the body or static that each geom belongs to.
+            robot_of_geom: Index of the robot that each geom belongs to, -1 for none, -2 for the floor.
+        """
+        self._model = model
+        self._owners = tuple(owners)
+        self._names = tuple(model.geom(i).name or f"geom {i}" for i in range(model.ngeom))
+        self._robot = np.array(robot_of_geom, dtype=np.int32)
+        self._force = np.zeros(6)
+
+    def read(self, data: mujoco.MjData) -> list[Contact]:
+        """Return what robots touch except for themselves and the floor, one entry for each pair of bodies."""
+        if data.ncon == 0:
+            return []
+        geoms = data.contact.geom
+        robots = self._robot[geoms]
+        first, second = robots[:, 0], robots[:, 1]
+        kept = (first != second) & (first != -2) & (second != -2) & (data.contact.efc_address >= 0)
+        pairs: dict[tuple[str, str], tuple[float, list[tuple[str, str]]]] = {}
+        for index in np.flatnonzero(kept):
+            a, b = (int(geom) for geom in geoms[index])
+            if self._robot[a] < 0:
+                a, b = b, a
+            mujoco.mj_contactForce(self._model, data, index, self._force)
+            key = self._owners[a], self._owners[b]
+            force, names = pairs.get(key, (0.0, []))
+            pairs[key] = force + float(self._force[0]), [*names, (self._names[a], self._names[b])]
+        return [Contact(*key, force, tuple(names)) for key, (force, names) in pairs.items()]

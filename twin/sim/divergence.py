@@ -1,0 +1,89 @@
+"""Notice that the physics has diverged, keep what led to it, and say which part did it."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from twin.errors import SimulationError
+from twin.geometry import Array
+
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_BAD = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+_WHAT = ("position", "velocity", "acceleration")
+
+
+class DivergenceGuard:
+    """A rolling memory of the last states, written to a file when the physics cannot go on."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, *, capacity: int = 50) -> None:
+        self._model = model
+        self._data = data
+        self._warnings = [data.warning[kind] for kind in _BAD]
+        self._states: deque[Array] = deque(maxlen=capacity)
+        self._size = mujoco.mj_stateSize(model, _STATE)
+
+    def remember(self) -> None:
+        """Keep the present state."""
+        state = np.empty(self._size)
+        mujoco.mj_getState(self._model, self._data, state, _STATE)
+        self._states.append(state)
+
+    def check(self, folder: Path | None) -> None:
+        """Do nothing if the state is finite.
+
+        Args:
+            folder: Where to write `diverged.npz`; None writes nothing.
+
+        Raises:
+            SimulationError: Names the joint or body at fault, the time, and the file.
+        """
+        if not any(warning.number for warning in self._warnings) and np.isfinite(self._data.qvel).all():
+            return
+        what, part = self._replay()
+        time = self._data.time
+        message = f"the physics diverged at t = {time:.3f} s: the {what} of {part} is not finite or too large"
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = folder / "diverged.npz"
+            times = np.array([state[0] for state in self._states])
+            np.savez(file, states=np.array(self._states), times=times, state_spec=int(_STATE))
+            message += f"; the last {len(self._states)} states are in {file}"
+        hint = "check masses, inertias and commands there, or take a smaller physics step"
+        raise SimulationError(f"{message}; {hint}")
+
+    def _replay(self) -> tuple[str, str]:
+        """Step singly from the last good state to find the first bad number; appends each step's state."""
+        model, data = self._model, self._data
+        mujoco.mj_setState(model, data, self._states[-1], _STATE)
+        for warning in self._warnings:
+            warning.number = 0
+        for _ in range(10_000):
+            mujoco.mj_step(model, data)
+            for kind, (warning, what) in enumerate(zip(self._warnings, _WHAT, strict=True)):
+                if warning.number:
+                    joint = _joint_of(model, warning.lastinfo, is_qpos=kind == 0)
+                    return what, _describe(model, joint)
+            self.remember()
+        return "state", "the world"
+
+
+def _joint_of(model: mujoco.MjModel, index: int, *, is_qpos: bool) -> int:
+    """Return the joint that owns an entry of qpos or qvel."""
+    if is_qpos:
+        return int(np.searchsorted(model.jnt_qposadr, index, side="right")) - 1
+    return int(model.dof_jntid[index])
+
+
+def _describe(model: mujoco.MjModel, joint: int) -> str:
+    body = model.body(model.jnt_bodyid[joint]).name
+    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+        return f"body '{body}'"
+    return f"joint '{model.joint(joint).name}' (body '{body}')"

@@ -1,0 +1,132 @@
+"""A robot's actuators and joint sensors: what ros2_control calls the hardware interface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from twin.errors import SimulationError, nearest
+from twin.geometry import Array
+from twin.models.description import RobotDescription
+from twin.sim.noise import NoiseStream
+
+
+@dataclass(frozen=True, kw_only=True)
+class HardwareConfig:
+    """How well joints are measured."""
+
+    encoder_ticks: int = 4096
+    """Ticks per turn of the encoders of wheels and other continuous joints."""
+    position_noise_stddev: float = 1e-4
+    """Of all other joints [rad] or [m]."""
+    velocity_noise_stddev: float = 1e-3
+    """Of all other joints [rad/s] or [m/s]."""
+
+
+class JointReading(NamedTuple):
+    """Measured joints in the order of `Hardware.joint_names`, each of shape (n,)."""
+
+    position: Array
+    """[rad] or [m]"""
+    velocity: Array
+    """[rad/s] or [m/s]"""
+    effort: Array
+    """Of the actuators [Nm] or [N]."""
+
+
+class Hardware:
+    """Reads joints as measured and hands commands to the actuators.
+
+    An encoder counts whole ticks; its velocity is the difference of two counts, as on a real motor driver.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        robot: str,
+        description: RobotDescription,
+        seed: int,
+        config: HardwareConfig | None = None,
+    ) -> None:
+        """Bind the names of a robot to a compiled model."""
+        self.config = config or HardwareConfig()
+        self._data = data
+        self._timestep = float(model.opt.timestep)
+        moving = ("continuous", "revolute", "prismatic")
+        self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in moving)
+        joints = [model.joint(f"{robot}/{name}") for name in self.joint_names]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
+        self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
+        self._encoder = np.array(
+            [description.joints[n].type == "continuous" for n in self.joint_names], dtype=bool
+        )
+        self._tick = 2.0 * math.pi / self.config.encoder_ticks
+        self._noise = NoiseStream(seed, f"{robot}/joints")
+        self._counts = self._count()
+        self._step = 0
+        n = len(self.joint_names)
+        self._reading = JointReading(self._counts * self._tick, np.zeros(n), np.zeros(n))
+
+        prefix = f"{robot}/"
+        self._actuators = np.array(
+            [i for i in range(model.nu) if model.actuator(i).name.startswith(prefix)], dtype=np.intp
+        )
+        names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
+        self._index = {name: i for i, name in enumerate(names)}
+        self._commands = data.ctrl[self._actuators].copy()
+        self.refused = 0
+        """Commands ignored because they were not finite."""
+
+    @property
+    def commanded_joints(self) -> tuple[str, ...]:
+        """Joints that `command` accepts."""
+        return tuple(self._index)
+
+    def read(self) -> JointReading:
+        """Measure all joints; twice at one time gives the same reading."""
+        step = round(self._data.time / self._timestep)
+        if step == self._step:
+            return self._reading
+        counts = self._count()
+        elapsed = (step - self._step) * self._timestep
+        n = len(self.joint_names)
+        noise = self._noise.normal(step, 2 * n)
+        position = self._data.qpos[self._qpos] + self.config.position_noise_stddev * noise[:n]
+        velocity = self._data.qvel[self._dof] + self.config.velocity_noise_stddev * noise[n:]
+        position = np.where(self._encoder, counts * self._tick, position)
+        velocity = np.where(self._encoder, (counts - self._counts) * (self._tick / elapsed), velocity)
+        self._counts, self._step = counts, step
+        self._reading = JointReading(position, velocity, self._data.qfrc_actuator[self._dof])
+        return self._reading
+
+    def command(self, joint: str, value: float) -> None:
+        """Set what the joint's actuator is to do from the next `apply` on.
+
+        Args:
+            joint: One of `commanded_joints`.
+            value: Position, velocity or effort, whichever the actuator takes (SI); one that is not finite is
+                ignored and counted.
+
+        Raises:
+            SimulationError: No actuator moves this joint.
+        """
+        index = self._index.get(joint)
+        if index is None:
+            raise SimulationError(f"no actuator for joint '{joint}'; {nearest(joint, self._index)}")
+        if math.isfinite(value):
+            self._commands[index] = value
+        else:
+            self.refused += 1
+
+    def apply(self) -> None:
+        """Hand the commands to the physics; called once a tick, before the step."""
+        self._data.ctrl[self._actuators] = self._commands
+
+    def _count(self) -> Array:
+        return np.round(self._data.qpos[self._qpos] / self._tick)

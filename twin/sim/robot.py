@@ -1,0 +1,87 @@
+"""A robot in a world: where it is put, and the handle by which the runtime drives it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import mujoco
+
+from twin.geometry import Pose2, Pose3
+from twin.models.description import RobotDescription
+
+if TYPE_CHECKING:
+    from twin.sim.hardware import Hardware
+    from twin.sim.sensors import Sensor
+
+
+class ConvertedRobot(Protocol):
+    """What a world needs of `twin.convert.Conversion`."""
+
+    @property
+    def spec(self) -> mujoco.MjSpec:
+        """The robot alone: every link a body of its name; is copied, not changed."""
+
+    @property
+    def spawn_height(self) -> float:
+        """Height of the root link at which the robot just stands on the floor [m]."""
+
+    @property
+    def description(self) -> RobotDescription:
+        """What the robot file says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotPlacement:
+    """A robot and where it starts; `convert(base=...)` chose whether its base is free, fixed or kinematic."""
+
+    name: str
+    """Prefix of its elements in the model: link `base_link` is the body `<name>/base_link`."""
+    conversion: ConvertedRobot
+    pose: Pose2 | Pose3
+    """Of the root link in the world; a Pose2 stands the robot on the floor."""
+
+    @property
+    def T_world_root(self) -> Pose3:
+        """The root link's pose."""
+        if isinstance(self.pose, Pose2):
+            return Pose3.from_pose2(self.pose, self.conversion.spawn_height)
+        return self.pose
+
+
+class RobotHandle:
+    """One robot of a compiled world."""
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        description: RobotDescription,
+        hardware: Hardware,
+        sensors: tuple[Sensor, ...],
+        data: mujoco.MjData,
+        mocap_id: int,
+    ) -> None:
+        self.name = name
+        self.description = description
+        self.hardware = hardware
+        self.sensors = sensors
+        self.base = f"{name}/{description.root}"
+        """Name of the root link's body."""
+        self._data = data
+        self._mocap_id = mocap_id
+
+    def body(self, link: str) -> str:
+        """Return the name of a link's body."""
+        return f"{self.name}/{link}"
+
+    def set_kinematic_pose(self, T_world_root: Pose3) -> None:
+        """Put a robot with a kinematic base somewhere; takes effect with the next step.
+
+        Raises:
+            ValueError: The robot was not converted with `base="kinematic"`.
+        """
+        if self._mocap_id < 0:
+            raise ValueError(f"robot '{self.name}' has no kinematic base; convert it with base='kinematic'")
+        self._data.mocap_pos[self._mocap_id] = T_world_root.xyz
+        self._data.mocap_quat[self._mocap_id] = T_world_root.quat_wxyz

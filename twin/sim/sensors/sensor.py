@@ -1,0 +1,72 @@
+"""What all sensors have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from twin.errors import ModelError, Problem
+from twin.models.description import SensorSpec
+from twin.sim.noise import NoiseStream
+
+if TYPE_CHECKING:
+    from twin.sim.world import World
+
+
+class Sensor(Protocol):
+    """Measures the world as it is now."""
+
+    @property
+    def spec(self) -> SensorSpec:
+        """What the robot file says about it."""
+
+    @property
+    def period_ns(self) -> int:
+        """Time between two samples, a whole multiple of the physics step [ns]."""
+
+    def sample(self, time_ns: int) -> Any:
+        """Return a reading, a frozen dataclass; `time_ns` is the world's time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount:
+    """Where a sensor is: a link of a robot of a world."""
+
+    world: World
+    robot: str
+    link: str
+    source: Path
+    """The robot's file, for error messages."""
+
+    @property
+    def body(self) -> str:
+        """Name of the body whose frame the sensor measures in."""
+        return f"{self.robot}/{self.link}"
+
+    @property
+    def body_id(self) -> int:
+        """Id of that body."""
+        return int(self.world.model.body(self.body).id)
+
+    def noise(self, sensor: str, part: str = "noise") -> NoiseStream:
+        """Return the stream of one noisy part of a sensor."""
+        return NoiseStream(self.world.seed, f"{self.robot}/{sensor}/{part}")
+
+    def period_ns(self, spec: SensorSpec) -> int:
+        """Return the period of a rate.
+
+        Raises:
+            ModelError: It is not a whole multiple of the physics step.
+        """
+        period = round(1e9 / spec.rate_hz)
+        step = self.world.timestep_ns
+        if period % step == 0:
+            return period
+        below = max(1, period // step)
+        valid = " or ".join(f"{1e9 / (n * step):.6g} Hz" for n in (below + 1, below))
+        message = (
+            f"sensor '{spec.name}' of robot '{self.robot}' samples every {period / 1e6:g} ms, not a whole "
+            f"multiple of the physics step of {step / 1e6:g} ms; valid near its rate of {spec.rate_hz:g} Hz: {valid}"
+        )
+        raise ModelError(Problem(message, self.source, spec.line or None))

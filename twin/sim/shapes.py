@@ -1,0 +1,48 @@
+"""What a world looks like, for a recorder or a viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from twin.geometry import Pose3
+from twin.models.description import Geometry
+from twin.sim.robot import RobotPlacement
+from twin.sim.scene import Rgba, Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyShape:
+    """One shape of one body."""
+
+    body: str
+    """Name for `World.pose`; for a moving body also in `World.body_names`."""
+    geometry: Geometry
+    T_body_geometry: Pose3
+    rgba: Rgba
+    static: bool
+    """True when the body never moves (scenery)."""
+
+
+def shapes(scene: Scene, robots: Sequence[RobotPlacement]) -> Iterator[BodyShape]:
+    """Yield scenery, goods and the robots' visuals, in this order."""
+    for bodies, static in ((scene.statics, True), (scene.goods, False)):
+        for body in bodies:
+            for shape in body.shapes:
+                yield BodyShape(
+                    body=body.name,
+                    geometry=shape.geometry,
+                    T_body_geometry=shape.T_body_geometry,
+                    rgba=shape.rgba,
+                    static=static,
+                )
+    for robot in robots:
+        for link in robot.conversion.description.links.values():
+            for visual in link.visuals:
+                yield BodyShape(
+                    body=f"{robot.name}/{link.name}",
+                    geometry=visual.geometry,
+                    T_body_geometry=visual.T_link_geometry,
+                    rgba=visual.rgba,
+                    static=False,
+                )

@@ -1,0 +1,216 @@
+"""The world: a scene and robots in one compiled MuJoCo model, and the only caller of `mj_step`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+
+from twin.errors import ScenarioError, nearest
+from twin.geometry import Array, Pose3
+from twin.sim.compose import FLOOR, build_spec, static_geom
+from twin.sim.contacts import Contact, ContactReader
+from twin.sim.divergence import DivergenceGuard
+from twin.sim.hardware import Hardware
+from twin.sim.physics import Physics
+from twin.sim.robot import RobotHandle, RobotPlacement
+from twin.sim.scene import Scene
+from twin.sim.sensors import Mount, create_sensor
+from twin.sim.shapes import BodyShape, shapes
+
+
+class World:
+    """Owns model and data. Build one with `compose`.
+
+    After `step`, positions are those of the present time (MuJoCo leaves them one substep old), so rays and
+    poses are exact; what depends on velocities is refreshed when a sensor asks for it. Neither changes what
+    the next step does.
+    """
+
+    def __init__(
+        self,
+        *,
+        spec: mujoco.MjSpec,
+        scene: Scene,
+        robots: Sequence[RobotPlacement],
+        physics: Physics,
+        seed: int,
+        crash_folder: Path | None,
+    ) -> None:
+        self._spec = spec
+        self._placements = tuple(robots)
+        self.scene = scene
+        self.physics = physics
+        self.seed = seed
+        self.crash_folder = crash_folder
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.timestep_ns = physics.timestep_ns
+        self.step_count = 0
+        """Physics steps since the start."""
+        self._motion_step = self._contact_step = -1
+        self._contacts: list[Contact] = []
+        mujoco.mj_forward(self.model, self.data)
+
+        self._guard = DivergenceGuard(self.model, self.data)
+        self._statics = {static.name: static.T_world_body for static in scene.statics}
+        self._bind_bodies()
+        self._contact_reader = ContactReader(self.model, *self._geom_owners())
+        self.robots: Mapping[str, RobotHandle] = MappingProxyType(
+            {placement.name: self._bind_robot(placement) for placement in robots}
+        )
+
+    @classmethod
+    def compose(
+        cls,
+        scene: Scene,
+        robots: Sequence[RobotPlacement],
+        physics: Physics | None = None,
+        seed: int = 0,
+        *,
+        crash_folder: Path | None = None,
+    ) -> World:
+        """Build and compile.
+
+        Args:
+            scene: Floor, scenery and goods.
+            robots: Their elements get the prefix `<name>/`.
+            physics: Options; None takes the defaults.
+            seed: Of all noise in this world.
+            crash_folder: Where to write the last states if the physics diverges; None writes nothing.
+
+        Raises:
+            ScenarioError: Two things have the same name.
+            ModelError: A sensor's period is not a whole multiple of the physics step.
+        """
+        physics = physics or Physics()
+        spec = build_spec(scene, robots, physics)
+        return cls(
+            spec=spec, scene=scene, robots=robots, physics=physics, seed=seed, crash_folder=crash_folder
+        )
+
+    # -- time ------------------------------------------------------------------------------------------------
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated time since the start [ns]."""
+        return self.step_count * self.timestep_ns
+
+    def step(self, n: int = 1) -> None:
+        """Advance by `n` physics steps with constant commands.
+
+        Raises:
+            SimulationError: The physics diverged; names joint or body, time, and the file of the last states.
+        """
+        self._guard.remember()
+        mujoco.mj_step(self.model, self.data, n)
+        self.step_count += n
+        self._guard.check(self.crash_folder)
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def refresh_motion(self) -> None:
+        """Bring MuJoCo's body velocities and accelerations (cvel, cacc) to the present time, once a step."""
+        if self._motion_step == self.step_count:
+            return
+        self._motion_step = self.step_count
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_comVel(self.model, self.data)
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+
+    # -- truth -----------------------------------------------------------------------------------------------
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """The bodies that can move, in the order of `body_poses`: links as `<robot>/<link>`, and goods."""
+        return self._body_names
+
+    def body_poses(self) -> tuple[Array, Array]:
+        """Return xyz, shape (n, 3) [m], and quat_wxyz, shape (n, 4), of `body_names` in the world frame."""
+        return self.data.xpos[self._body_ids], self.data.xquat[self._body_ids]
+
+    def pose(self, body: str) -> Pose3:
+        """Return the true pose of a link `<robot>/<link>`, of goods or of a static in the world frame.
+
+        Raises:
+            ScenarioError: No such body.
+        """
+        index = self._index.get(body)
+        if index is not None:
+            return Pose3(self.data.xpos[index].copy(), self.data.xquat[index].copy())
+        if body in self._statics:
+            return self._statics[body]
+        raise ScenarioError(f"no body '{body}' in the world; {nearest(body, [*self._index, *self._statics])}")
+
+    def contacts(self) -> list[Contact]:
+        """Return what robots touch except for the floor and themselves, as of the last physics step."""
+        if self._contact_step != self.step_count:
+            self._contact_step = self.step_count
+            self._contacts = self._contact_reader.read(self.data)
+        return self._contacts
+
+    def shapes(self) -> list[BodyShape]:
+        """Return everything there is to draw except for the floor."""
+        return list(shapes(self.scene, self._placements))
+
+    def state_digest(self) -> bytes:
+        """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
+        data, digest = self.data, hashlib.sha256()
+        for part in (data.qpos, data.qvel, data.act, data.mocap_pos, data.mocap_quat):
+            digest.update(part.tobytes())
+        digest.update(self.time_ns.to_bytes(8, "little"))
+        return digest.digest()
+
+    def save_model(self, folder: Path) -> Path:
+        """Write the world as `world.xml` with its meshes in `assets/`, for any MuJoCo tool."""
+        folder.mkdir(parents=True, exist_ok=True)
+        spec = self._spec.copy()
+        for name, content in spec.assets.items():
+            asset = folder / "assets" / name
+            asset.parent.mkdir(parents=True, exist_ok=True)
+            asset.write_bytes(content if isinstance(content, bytes) else content.encode())
+        spec.meshdir = spec.texturedir = "assets"
+        file = folder / "world.xml"
+        file.write_text(spec.to_xml(), encoding="utf-8")
+        return file
+
+    # -- binding ---------------------------------------------------------------------------------------------
+
+    def _bind_bodies(self) -> None:
+        names = [self.model.body(i).name for i in range(self.model.nbody)]
+        ids = [i for i in range(1, self.model.nbody) if names[i]]
+        self._index = {names[i]: i for i in ids}
+        self._body_names = tuple(self._index)
+        self._body_ids = np.array(ids, dtype=np.intp)
+
+    def _geom_owners(self) -> tuple[list[str], list[int]]:
+        """Return for each geom the name of its body or static, and its robot (-1: none, -2: the floor)."""
+        model = self.model
+        owners = [model.body(body).name for body in model.geom_bodyid]
+        for static in self.scene.statics:
+            for index in range(len(static.shapes)):
+                owners[model.geom(static_geom(static.name, index)).id] = static.name
+        robot_of = {placement.name: i for i, placement in enumerate(self._placements)}
+        robots = [robot_of.get(owner.partition("/")[0], -1) if "/" in owner else -1 for owner in owners]
+        robots[model.geom(FLOOR).id] = -2
+        return owners, robots
+
+    def _bind_robot(self, placement: RobotPlacement) -> RobotHandle:
+        name, description = placement.name, placement.conversion.description
+        sensors = tuple(
+            create_sensor(spec, Mount(world=self, robot=name, link=spec.link, source=description.source))
+            for spec in description.sensors
+        )
+        hardware = Hardware(self.model, self.data, robot=name, description=description, seed=self.seed)
+        root = self.model.body(f"{name}/{description.root}")
+        return RobotHandle(
+            name=name,
+            description=description,
+            hardware=hardware,
+            sensors=sensors,
+            data=self.data,
+            mocap_id=int(root.mocapid[0]),
+        )
