@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import Any
 
-from twin.bridge import types
+from twin.bridge.action_types import GripperCommand
 from twin.bridge.actions import ActionServer, ServerGoal
 from twin.bridge.bus import Bus
+from twin.bridge.msgs import new
 from twin.manipulation.gripper import GripperConfig, GripperMonitor
 from twin.nodes.hardware import HardwareInterface
 
-ACTION = "control_msgs/action/GripperCommand"
-_Result = types.get(f"{ACTION}_Result")
 
 
 class GripperControllerNode:
@@ -34,7 +33,7 @@ class GripperControllerNode:
         self._joint = joint
         self._index = hardware.joint_names.index(joint)
         self._dt = period_ns * 1e-9
-        ActionServer(self.node, ACTION, "gripper_controller/gripper_cmd", self._execute)
+        ActionServer(self.node, GripperCommand, "gripper_controller/gripper_cmd", self._execute)
 
     def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
         target = float(goal.request.command.position)
@@ -50,7 +49,7 @@ class GripperControllerNode:
                 goal.canceled()
             elif state == "moving":
                 continue
-            return _Result(
+            return new(GripperCommand.Result, 
                 position=position,
                 effort=float(reading.effort[self._index]),
                 stalled=state == "stalled",

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any
 
-from twin.bridge import types
+from twin.bridge.action_types import FollowJointTrajectory
 from twin.bridge.actions import ActionServer, ServerGoal
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import ns
+from twin.bridge.msgs import new, ns
 from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
-ACTION = "control_msgs/action/FollowJointTrajectory"
-_Result = types.get(f"{ACTION}_Result")
 _SUCCESSFUL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -2, -5
 
 
@@ -36,14 +34,14 @@ class JointTrajectoryControllerNode:
         self._index = {joint: hardware.joint_names.index(joint) for joint in joints}
         self._tolerance = goal_tolerance
         self._patience_ns = int(goal_time_tolerance_s * 1e9)
-        ActionServer(self.node, ACTION, f"{name}/follow_joint_trajectory", self._execute)
+        ActionServer(self.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory", self._execute)
 
     def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
         unknown = [name for name in names if name not in self._index]
         if unknown or not goal.request.trajectory.points:
             goal.abort()
-            return _Result(
+            return new(FollowJointTrajectory.Result, 
                 error_code=_INVALID_JOINTS,
                 error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
             )
@@ -52,7 +50,7 @@ class JointTrajectoryControllerNode:
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
                 goal.canceled()
-                return _Result(error_code=_SUCCESSFUL, error_string="canceled")
+                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="canceled")
             self._command(names, trajectory.sample(elapsed))
             yield
         self._command(names, trajectory.positions[-1])
@@ -70,10 +68,10 @@ class JointTrajectoryControllerNode:
             }
             worst = max(errors, key=lambda name: abs(errors[name]))
             if abs(errors[worst]) <= self._tolerance:
-                return _Result(error_code=_SUCCESSFUL, error_string="")
+                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="")
             if self.node.now_ns > deadline:
                 goal.abort()
-                return _Result(
+                return new(FollowJointTrajectory.Result, 
                     error_code=_GOAL_TOLERANCE_VIOLATED,
                     error_string=f"'{worst}' is {errors[worst]:+.4f} away from its goal, "
                     f"{self._tolerance} is allowed",

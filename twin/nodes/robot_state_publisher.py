@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import JointState, String
-from twin.bridge.node import LATCHED
+from twin.bridge.qos import LATCHED
 from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster
 from twin.geometry import Pose3
 from twin.models.description import Joint, RobotDescription

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Bool, Header, Imu, LaserScan, Quaternion, Range, Vector3, stamp
-from twin.bridge.node import SENSOR_DATA
+from twin.bridge.qos import SENSOR_DATA
 from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 
 

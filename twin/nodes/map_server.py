@@ -1,0 +1,48 @@
+"""`/map_server`: serves an occupancy map on `map` (latched) and by `map_server/map`, as in Nav2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import MapMetaData, OccupancyGrid, header, stamp
+from twin.bridge.qos import LATCHED
+from twin.bridge.srvs import GetMap
+from twin.geometry import Array, Pose2
+from twin.navigation.occupancy_map import OccupancyMap
+from twin.nodes.messages import pose2, pose_msg
+
+
+def grid_msg(
+    data: Array | Any, resolution: float, origin: Pose2, frame: str, time_ns: int
+) -> OccupancyGrid:
+    """Return a grid, int8 of shape (height, width), as a message."""
+    height, width = data.shape
+    info = MapMetaData(
+        map_load_time=stamp(time_ns),
+        resolution=resolution,
+        width=width,
+        height=height,
+        origin=pose_msg(origin),
+    )
+    return OccupancyGrid(header=header(time_ns, frame), info=info, data=data.ravel())
+
+
+def occupancy_map(message: OccupancyGrid) -> OccupancyMap:
+    """Return a message as a map."""
+    info = message.info
+    return OccupancyMap(
+        data=message.data.reshape(info.height, info.width),
+        resolution=float(info.resolution),
+        origin=pose2(info.origin),
+    )
+
+
+class MapServerNode:
+    """Publishes the map once; late subscribers get it too."""
+
+    def __init__(self, bus: Bus, grid: OccupancyMap, *, frame: str = "map", namespace: str = "") -> None:
+        self.node = bus.create_node("map_server", namespace)
+        self.message = grid_msg(grid.data, grid.resolution, grid.origin, frame, self.node.now_ns)
+        self.node.create_service(GetMap, "map_server/map", lambda _: GetMap.Response(map=self.message))
+        self.node.create_publisher(OccupancyGrid, "map", LATCHED).publish(self.message)
