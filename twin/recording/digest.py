@@ -1,0 +1,37 @@
+"""One number that tells whether two runs were the same run."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+
+from twin.recording.sources import Sample
+
+_HEAD = struct.Struct("<qI")  # time [ns], payload length [bytes]
+
+
+class RunDigest:
+    """SHA-256 over every published sample, in order, and the final physics state.
+
+    Each sample adds its topic and type (each ended by a zero byte, which ROS names cannot contain), its time, the
+    length of its payload and the payload, so that no two different sequences of samples are hashed as the same bytes.
+    """
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+        self._names: dict[tuple[str, str], bytes] = {}
+
+    def on_sample(self, sample: Sample) -> None:
+        """Add one sample (a callback for `Bus.tap`)."""
+        key = (sample.topic, sample.msgtype)
+        names = self._names.get(key)
+        if names is None:
+            names = self._names[key] = f"{sample.topic}\0{sample.msgtype}\0".encode()
+        payload = sample.payload
+        self._hash.update(names + _HEAD.pack(sample.time_ns, len(payload)) + payload)
+
+    def finish(self, state: bytes) -> str:
+        """Return the digest as hexadecimal text; `state` is the final physics state. More samples may follow."""
+        whole = self._hash.copy()
+        whole.update(b"\0state\0" + state)
+        return whole.hexdigest()

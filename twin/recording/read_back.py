@@ -1,0 +1,166 @@
+"""Reads a recording: for tests and tools, with nothing but rerun's chunk reader and pyarrow.
+
+Works on the file of a killed run too, which has no footer, up to its last complete block.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from twin.errors import RecordingError
+
+MAGIC = (b"RRF2", b"RRIO")
+"""First bytes of a Rerun recording."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """All values of one component of one entity, in the order of time, then of writing."""
+
+    times_ns: NDArray[np.int64]
+    """Shape (n,); empty for a static component."""
+    values: list[Any]
+    """Length n (1 if static): the arrow values as Python objects, usually a list of instances."""
+
+    def numpy(self) -> NDArray[Any]:
+        """Return the values as one array, shape (n, instances, ...), where all rows have the same size."""
+        return np.array(self.values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """A recording in memory."""
+
+    application_id: str
+    recording_id: str
+    timelines: frozenset[str]
+    columns: dict[str, dict[str, Column]] = field(repr=False)
+    """By entity path and component, such as `Points3D:positions`."""
+
+    @property
+    def entities(self) -> tuple[str, ...]:
+        """Paths, sorted."""
+        return tuple(sorted(self.columns))
+
+    def column(self, entity: str, component: str) -> Column:
+        """Return one column.
+
+        Raises:
+            RecordingError: There is no such entity or component.
+        """
+        from twin.errors import nearest
+
+        if entity not in self.columns:
+            raise RecordingError(f"no entity {entity!r} in the recording; {nearest(entity, self.columns)}")
+        components = self.columns[entity]
+        if component not in components:
+            raise RecordingError(f"no component {component!r} at {entity}; {nearest(component, components)}")
+        return components[component]
+
+    def scalars(self, entity: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return times [ns], shape (n,), and the first number of each row, shape (n,)."""
+        column = self.column(entity, "Scalars:scalars")
+        return column.times_ns, np.array([row[0] for row in column.values], dtype=np.float64)
+
+
+def check_recording(path: Path) -> Path:
+    """Return `path` if it is the file of a recording.
+
+    Raises:
+        RecordingError: There is no such file, or it is something else.
+    """
+    try:
+        with path.open("rb") as file:
+            magic = file.read(4)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot read the recording: {error.strerror}; `twin run` writes one as .rrd") from error
+    if magic not in MAGIC:
+        raise RecordingError(f"{path}: not a Rerun recording; valid: an .rrd file as `twin run` writes it")
+    return path
+
+
+def read(path: Path) -> Recording:
+    """Read a recording.
+
+    Raises:
+        RecordingError: The file is missing, not a recording or empty.
+    """
+    import rerun.chunk as rc
+
+    reader = rc.RrdReader(check_recording(path))
+    stores = reader.recordings()
+    if not stores:
+        raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
+    store = stores[0]
+    timelines: set[str] = set()
+    rows: dict[tuple[str, str], list[tuple[int | None, Any]]] = {}
+    for chunk in reader.stream(store=store):
+        timelines.update(chunk.timeline_names)
+        for name, times, values in _components(chunk.to_record_batch()):
+            rows.setdefault((chunk.entity_path, name), []).extend(zip(times, values, strict=True))
+    columns: dict[str, dict[str, Column]] = {}
+    for (entity, name), pairs in sorted(rows.items()):
+        columns.setdefault(entity, {})[name] = _column(pairs)
+    return Recording(
+        application_id=store.application_id,
+        recording_id=store.recording_id,
+        timelines=frozenset(timelines),
+        columns=columns,
+    )
+
+
+def content_digest(path: Path) -> str:
+    """Return a SHA-256 of what a recording says, whatever its chunks, ids and bytes are.
+
+    Two runs of the same scenario have the same one. Left out: properties, which hold wall-clock times and versions.
+
+    Raises:
+        RecordingError: See `read`.
+    """
+    digest = hashlib.sha256()
+    recording = read(path)
+    for entity in recording.entities:
+        if entity.startswith("/__properties"):
+            continue
+        for component, column in sorted(recording.columns[entity].items()):
+            digest.update(f"{entity}\0{component}\0".encode())
+            digest.update(column.times_ns.tobytes())
+            digest.update(repr(column.values).encode())
+    return digest.hexdigest()
+
+
+def _components(batch: pa.RecordBatch) -> Iterator[tuple[str, list[int | None], list[Any]]]:
+    """Yield name, times and values of each component of a chunk; rows without a value are left out."""
+    index = next(
+        (i for i, item in enumerate(batch.schema) if _kind(item) == "index"),
+        None,
+    )
+    times = [None] * batch.num_rows if index is None else batch.column(index).cast(pa.int64()).to_pylist()
+    for i, item in enumerate(batch.schema):
+        if _kind(item) == "data":
+            values = batch.column(i).to_pylist()
+            kept = [(t, value) for t, value in zip(times, values, strict=True) if value is not None]
+            name = (item.metadata or {}).get(b"rerun:component", item.name.encode()).decode()
+            yield name, [t for t, _ in kept], [value for _, value in kept]
+
+
+def _kind(item: pa.Field) -> str:
+    return (item.metadata or {}).get(b"rerun:kind", b"").decode()
+
+
+def _column(pairs: list[tuple[int | None, Any]]) -> Column:
+    timed = [(t, value) for t, value in pairs if t is not None]
+    if not timed:
+        return Column(times_ns=np.zeros(0, dtype=np.int64), values=[pairs[-1][1]])
+    timed.sort(key=lambda pair: pair[0])
+    return Column(
+        times_ns=np.array([t for t, _ in timed], dtype=np.int64), values=[value for _, value in timed]
+    )

@@ -1,0 +1,203 @@
+"""Records a run as one Rerun file, at a cost that a run does not notice."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from twin.errors import RecordingError
+from twin.geometry import Pose3
+from twin.recording.frames import WORLD, Frames
+from twin.recording.sources import Sample, World
+
+if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays for it
+    import rerun as rr
+
+    from twin.recording.belief import Belief
+    from twin.recording.channels import Channel, Context
+    from twin.recording.columns import TransformColumns
+
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingConfig:
+    """What a recording keeps."""
+
+    poses_hz: float = 25.0
+    """Rate at which poses of bodies, trails and errors are sampled; only what moved is kept."""
+    block_s: float = 1.0
+    """Simulated time between two writes to the file [s]; a killed run loses at most this much."""
+    move_tolerance: float = 1e-4
+    """A body has moved when a coordinate [m] or a quaternion's component differs by more from what was kept."""
+    trail_step_m: float = 0.05
+    """Length of a segment of a trail [m]."""
+    max_particles: int = 500
+    """Of a particle cloud."""
+    joints: tuple[str, ...] | None = None
+    """Joints to plot; None: all but wheels and casters."""
+
+    def __post_init__(self) -> None:
+        problems = [
+            f"recording.{name} is {getattr(self, name)}; valid: a positive number"
+            for name in ("poses_hz", "block_s", "trail_step_m", "max_particles")
+            if not getattr(self, name) > 0
+        ]
+        if problems:
+            raise RecordingError("; ".join(problems))
+
+
+class RerunSink:
+    """Turns a world and the samples of its bus into a Rerun recording.
+
+    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes is a ghost with a
+    trail of its own. Rows wait in buffers and go to the file once a block. Order: construct, `bus.tap(sink.on_sample)`,
+    `declare(world)`, then `on_tick(world)` after every tick, `close(verdict)`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        config: RecordingConfig | None = None,
+        application_id: str = "twin",
+        recording_id: str = "run",
+    ) -> None:
+        """Prepare; the file is created by `declare`.
+
+        Args:
+            path: Of the `.rrd` file; its folder is created.
+            config: What to keep.
+            application_id: Under which the viewer stores changes to the layout.
+            recording_id: Fixed by the caller, so that two equal runs write equal recordings.
+        """
+        self._path = Path(path)
+        self._config = config or RecordingConfig()
+        self._ids = (application_id, recording_id)
+        self._world: World | None = None
+        self._early: list[Sample] = []
+        self._channels: dict[tuple[str, str], Channel | None] = {}
+        self._beliefs: dict[str, Belief] = {}
+        self._period_ns = round(_NS / self._config.poses_hz)
+        self._block_ns = round(_NS * self._config.block_s)
+        self._closed = False
+
+    def declare(self, world: World) -> None:
+        """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
+
+        Raises:
+            RecordingError: The file cannot be written.
+        """
+        os.environ.setdefault("RERUN_ANALYTICS", "0")
+        from twin.recording.blueprint import layout
+        from twin.recording.channels import Context
+        from twin.recording.columns import TransformColumns
+        from twin.recording.shapes import declare_shapes
+        from twin.recording.stream import declare_frames, open_recording
+
+        self._world = world
+        self._index = {name: i for i, name in enumerate(world.body_names)}
+        self._names = np.array(world.body_names, dtype=object)
+        shapes = world.shapes()
+        xyz, _ = world.body_poses()
+        self._frames = Frames(world.body_names)
+        self._recording: rr.RecordingStream = open_recording(self._path, *self._ids, layout(world, shapes))
+        self._poses: TransformColumns = TransformColumns("/tf")
+        self._context: Context = Context(
+            recording=self._recording,
+            frames=self._frames,
+            belief=self._belief,
+            max_particles=self._config.max_particles,
+            joints=self._config.joints,
+        )
+        declare_frames(self._recording, self._frames, shapes, world.body_names)
+        declare_shapes(self._recording, shapes)
+        self._last_xyz = np.full_like(xyz, np.inf)
+        self._last_quat = np.zeros((len(xyz), 4))
+        self._next_pose_ns = world.time_ns
+        self._next_block_ns = world.time_ns + self._block_ns
+        self.on_tick(world)
+        self._send()
+        early, self._early = self._early, []
+        for sample in early:
+            self.on_sample(sample)
+
+    def on_sample(self, sample: Sample) -> None:
+        """Keep what is shown of a message (a callback for `Bus.tap`)."""
+        if self._world is None:
+            self._early.append(sample)
+            return
+        key = (sample.topic, sample.msgtype)
+        if key not in self._channels:
+            from twin.recording.channels import open_channel
+
+            self._channels[key] = open_channel(self._context, sample.topic, sample.msgtype)
+        channel = self._channels[key]
+        if channel is not None and not self._closed:
+            channel.take(sample)
+
+    def on_tick(self, world: World) -> None:
+        """Sample the poses when they are due, and write the block when it is full."""
+        time_ns = world.time_ns
+        if time_ns >= self._next_pose_ns:
+            self._next_pose_ns += self._period_ns * (1 + (time_ns - self._next_pose_ns) // self._period_ns)
+            self._sample_poses(time_ns, world)
+        if time_ns >= self._next_block_ns:
+            self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
+            self._send()
+
+    def close(self, verdict: dict[str, Any] | None = None) -> None:
+        """Write what waits, the verdict (as `verdict.json` has it) and the footer; further samples are ignored."""
+        if self._world is None or self._closed:
+            return
+        from twin.recording.stream import log_verdict
+
+        self._closed = True
+        self._sample_poses(self._world.time_ns, self._world)
+        if verdict is not None:
+            log_verdict(self._recording, verdict)
+        self._send()
+        self._recording.disconnect()
+
+    def _sample_poses(self, time_ns: int, world: World) -> None:
+        xyz, quat = world.body_poses()
+        tolerance = self._config.move_tolerance
+        moved = (np.abs(xyz - self._last_xyz) > tolerance).any(axis=1)
+        moved |= (np.abs(quat - self._last_quat) > tolerance).any(axis=1)
+        rows = np.flatnonzero(moved)
+        if len(rows):
+            self._last_xyz[rows] = xyz[rows]
+            self._last_quat[rows] = quat[rows]
+            names = self._names[rows].tolist()
+            self._poses.append(time_ns, WORLD, names, xyz[rows], quat[rows][:, [1, 2, 3, 0]])
+
+    def _send(self) -> None:
+        self._poses.send(self._recording)
+        for channel in self._channels.values():
+            if channel is not None:
+                channel.send(self._recording)
+        self._recording.flush()
+
+    def _belief(self, namespace: str) -> Belief:
+        if namespace not in self._beliefs:
+            from twin.recording.belief import Belief
+
+            self._beliefs[namespace] = Belief(
+                self._recording,
+                self._frames,
+                namespace,
+                self._true_pose,
+                period_ns=self._period_ns,
+                trail_step_m=self._config.trail_step_m,
+            )
+        return self._beliefs[namespace]
+
+    def _true_pose(self, body: str) -> Pose3:
+        assert self._world is not None
+        xyz, quat = self._world.body_poses()
+        i = self._index[body]
+        return Pose3(xyz[i].copy(), quat[i].copy())
