@@ -23,14 +23,14 @@ def search(
 ) -> bool:
     """Expand from `start` until `goal` is closed (True) or nothing is left (False).
 
-    The length of an edge is the distance of the two centres [cells] times the mean of their factors, all >= 1, so
-    the octile distance never overestimates. A diagonal step needs both cells beside it to be passable.
+    The length of an edge is the distance of the two centres [cells] times the mean of their factors, all >= 1,
+    so the octile distance never overestimates. A diagonal step needs both cells beside it to be passable.
 
     Args:
         factor: Price of a metre in each cell, shape (h, w); inf where the robot cannot be.
         start: Flat index of the first cell.
         goal: Flat index of the last cell.
-        penned: Cells that may only be entered from such a cell, shape (h, w): the way out of an inscribed zone.
+        penned: Cells, shape (h, w), only entered from such a cell: the way out of an inscribed zone.
         g: Scratch, shape (h * w,), filled with inf: cost to come.
         parent: Scratch, shape (h * w,): the cell before.
         closed: Scratch, shape (h * w,), filled with False: cost to come is final.

@@ -42,7 +42,7 @@ class PlannerConfig:
 
 @dataclass(kw_only=True)
 class Planner:
-    """A* (Hart, Nilsson, Raphael 1968) with the octile heuristic; a diagonal never passes a blocked corner."""
+    """A* (Hart, Nilsson, Raphael 1968) with the octile heuristic; it never cuts a blocked corner."""
 
     config: PlannerConfig
 
@@ -78,9 +78,8 @@ class Planner:
         if not search(factor, first, last, penned, g, parent, closed):
             reached = candidates[closed[candidates]]
             if not reached.size:
-                raise NoValidPath(
-                    f"no path from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
-                )
+                route = f"({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
+                raise NoValidPath(f"no path from {route}")
             last = int(reached[0])
         cells = [last]
         while cells[-1] != first:

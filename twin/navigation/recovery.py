@@ -1,0 +1,180 @@
+"""Behaviours that get a robot out of trouble: spin, back up, drive on heading, wait (nav2_behaviors).
+
+Each is made for one execution; `update` is called once per control period until `done` or `failed_reason`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.costmap import Costmap
+from twin.navigation.costmap_kernels import steps_to_collision
+
+COLLISION_AHEAD = "collision_ahead"
+TIMEOUT = "timeout"
+
+
+class BehaviorStep(NamedTuple):
+    """The command of one period."""
+
+    v: float
+    """[m/s]"""
+    w: float
+    """[rad/s]"""
+    done: bool = False
+    failed_reason: str | None = None
+    """`COLLISION_AHEAD`, `TIMEOUT` or None."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BehaviorConfig:
+    """Parameters; names and defaults are those of nav2_behaviors."""
+
+    simulate_ahead_time: float = 2.0
+    """How far ahead collisions are looked for [s]."""
+    max_rotational_vel: float = 1.0
+    """[rad/s]"""
+    min_rotational_vel: float = 0.4
+    """[rad/s]"""
+    rotational_acc_lim: float = 3.2
+    """[rad/s²]"""
+    acceleration_limit: float = 2.5
+    """[m/s²]"""
+    deceleration_limit: float = 2.5
+    """As a magnitude [m/s²]."""
+    minimum_speed: float = 0.05
+    """[m/s]"""
+    footprint: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    """[m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
+
+
+@dataclass(kw_only=True)
+class _Behavior:
+    """Time and collision checks shared by the behaviours."""
+
+    config: BehaviorConfig = field(default_factory=BehaviorConfig)
+    time_allowance: float = 10.0
+    """[s]; 0 for none."""
+
+    def __post_init__(self) -> None:
+        self._footprint: Array = np.array(self.config.footprint, dtype=np.float64)
+        self._elapsed = 0.0
+        self._start: Pose2 | None = None
+        self._speed = 0.0
+
+    def _timed_out(self, dt: float) -> bool:
+        self._elapsed += dt
+        return 0.0 < self.time_allowance < self._elapsed
+
+    def _ramp(
+        self, remaining: float, accel: float, decel: float, least: float, most: float, dt: float
+    ) -> float:
+        """Return the speed after one period: limited by acceleration, by `most`, and by being able to stop."""
+        self._speed = min(self._speed + accel * dt, most, math.sqrt(2.0 * decel * max(remaining, 0.0)))
+        self._speed = max(self._speed, min(least, most))
+        return min(self._speed, remaining / dt) if dt > 0.0 else self._speed
+
+    def _collides(self, pose: Pose2, v: float, w: float, remaining: float, costmap: Costmap | None) -> bool:
+        """Return whether the motion, at most `remaining` [m or rad] more of it, hits something."""
+        speed = abs(v) if v else abs(w)
+        if costmap is None or speed == 0.0:
+            return False
+        time = min(self.config.simulate_ahead_time, remaining / speed)
+        size = costmap.resolution / 2.0 if v else math.radians(5.0)
+        steps = max(1, math.ceil(time * speed / size))
+        hit = steps_to_collision(
+            costmap.costs,
+            self._footprint,
+            *pose,
+            v,
+            w,
+            time / steps,
+            math.inf,
+            steps,
+            *costmap.origin,
+            costmap.resolution,
+        )
+        return hit > 0  # 0 is the present pose: a robot that touches something may still move away
+
+
+@dataclass(kw_only=True)
+class Spin(_Behavior):
+    """Turn in place."""
+
+    target_yaw: float = math.pi / 2.0
+    """Relative; more than a full turn is allowed [rad]."""
+
+    def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
+        """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
+        if self._start is None:
+            self._start, self._turned = pose, 0.0
+        else:
+            self._turned += wrap_angle(pose.yaw - self._last_yaw)
+        self._last_yaw = pose.yaw
+        direction = math.copysign(1.0, self.target_yaw)
+        remaining = abs(self.target_yaw) - direction * self._turned
+        if remaining <= 1e-3:
+            return BehaviorStep(0.0, 0.0, done=True)
+        if self._timed_out(dt):
+            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
+        config = self.config
+        accel = config.rotational_acc_lim
+        speed = self._ramp(remaining, accel, accel, config.min_rotational_vel, config.max_rotational_vel, dt)
+        w = direction * speed
+        if self._collides(pose, 0.0, w, remaining, costmap):
+            return BehaviorStep(0.0, 0.0, failed_reason=COLLISION_AHEAD)
+        return BehaviorStep(0.0, w)
+
+
+@dataclass(kw_only=True)
+class DriveOnHeading(_Behavior):
+    """Drive straight; backwards for a negative distance."""
+
+    target_distance: float = 0.15
+    """[m]"""
+    speed: float = 0.15
+    """[m/s], positive."""
+
+    def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
+        """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
+        if self._start is None:
+            self._start = pose
+        remaining = abs(self.target_distance) - self._start.distance(pose)
+        if remaining <= 1e-3:
+            return BehaviorStep(0.0, 0.0, done=True)
+        if self._timed_out(dt):
+            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
+        config = self.config
+        accel, decel = config.acceleration_limit, config.deceleration_limit
+        speed = self._ramp(remaining, accel, decel, config.minimum_speed, self.speed, dt)
+        v = math.copysign(speed, self.target_distance)
+        if self._collides(pose, v, 0.0, remaining, costmap):
+            return BehaviorStep(0.0, 0.0, failed_reason=COLLISION_AHEAD)
+        return BehaviorStep(v, 0.0)
+
+
+@dataclass(kw_only=True)
+class BackUp(DriveOnHeading):
+    """Drive straight back."""
+
+    target_distance: float = -0.15
+    """Negative [m]."""
+
+
+@dataclass(kw_only=True)
+class Wait(_Behavior):
+    """Stand still."""
+
+    duration: float = 1.0
+    """[s]"""
+
+    def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
+        """Return a zero command until the duration is over."""
+        del pose, costmap
+        self._elapsed += dt
+        return BehaviorStep(0.0, 0.0, done=self._elapsed >= self.duration - 1e-9)
