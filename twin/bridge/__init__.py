@@ -1,1 +1,1 @@
-
+"""The bus: Zenoh session, nodes, ROS 2 types and codecs, actions, tf."""
