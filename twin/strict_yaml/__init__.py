@@ -15,7 +15,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
 from twin.errors import TwinError
-from twin.strict_yaml.document import Document, Loc, apply_override, read
+from twin.strict_yaml.document import Document, apply_override, read
+from twin.strict_yaml.document import Loc as Loc
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults
 from twin.strict_yaml.explain import explain
@@ -56,11 +57,12 @@ def _without(data: Any, locs: Sequence[Loc]) -> Any:
 
 def _validate(schema: type[M], document: Document) -> M | None:
     """Validate, adding every fault to the document; a second pass finds faults behind the first ones."""
+    context = {"folder": document.file.parent}
     found: dict[tuple[Loc, str], None] = {}
     data = document.data
     for _ in range(2):
         try:
-            model = schema.model_validate_json(to_json(data), strict=True)
+            model = schema.model_validate_json(to_json(data), strict=True, context=context)
         except ValidationError as invalid:
             faults = [dict(fault) for fault in invalid.errors()]
         else:
@@ -86,7 +88,8 @@ def load(
 
     Args:
         path: The file.
-        schema: A pydantic model, best a `StrictModel`; its validators may raise `Faults`.
+        schema: A pydantic model, best a `StrictModel`; its validators may raise `Faults` and find the file's
+            folder as `info.context["folder"]`.
         error: What to raise.
         overrides: Dotted path to YAML text, e.g. `{"robots.0.pose.yaw": "90 deg"}`.
 

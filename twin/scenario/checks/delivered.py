@@ -1,0 +1,107 @@
+"""Check that a good lies where it was to be put, let go and at rest."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from twin.geometry import Pose3, matrix_from_quat_wxyz
+from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.observation import CheckContext, Observation, Zone
+from twin.strict_yaml import Metres, MetresPerSecond, Radians
+
+
+class DeliveredConfig(CheckConfig):
+    """A tote ends in a zone: centre inside, on its surface, upright, released, at rest."""
+
+    tote: str
+    """Name of the tote."""
+    zone: str
+    """Name of the arena's zone."""
+    upright: Annotated[Radians, Positive] = math.radians(5.0)
+    """Largest tilt against the vertical [rad]."""
+    tolerance: Annotated[Metres, NotNegative] = 0.0
+    """How far the centre of the footprint may lie outside of the zone's rectangle [m]."""
+    height_tolerance: Annotated[Metres, Positive] = 0.02
+    """How far the underside may be above or below the zone's surface [m]."""
+    rest_speed: Annotated[MetresPerSecond, Positive] = 0.01
+    """Speed below which it is at rest [m/s]."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        zone, bottom = context.zone(self.zone), context.good_bottom(self.tote)
+        return Delivered(f"{kind}({self.tote})", self, zone, bottom)
+
+
+class Delivered(Check):
+    """Judges each tick; the last one counts, and its time is the start of the last unbroken success."""
+
+    def __init__(self, name: str, config: DeliveredConfig, zone: Zone, bottom: float) -> None:
+        super().__init__(name)
+        self._config, self._zone, self._bottom = config, zone, bottom
+        self._previous: tuple[float, Pose3] | None = None
+        self._outside: float | None = None
+        self._reason = f"{config.tote} was never seen"
+        self._at_s: float | None = None
+        self._passed = False
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        tote = self._config.tote
+        pose = observation.goods.get(tote)
+        if pose is None:
+            return
+        self._outside = outside_distance(self._zone, pose)
+        held = observation.held.get(tote)
+        if held is not None:
+            self._reason = f"{tote} is still held by {held.robot}"
+        else:
+            self._reason = self._fault(observation.time_s, pose)
+        passed = not self._reason
+        if not passed or not self._passed:
+            self._at_s = observation.time_s
+        self._passed = passed
+        self._previous = (observation.time_s, pose)
+
+    def _fault(self, time_s: float, pose: Pose3) -> str:
+        config, zone = self._config, self._zone
+        if self._outside is not None and self._outside > config.tolerance:
+            return f"{config.tote} is {self._outside:.3f} m outside of {config.zone}"
+        above = float(pose.xyz[2]) - self._bottom - zone.height
+        tilt = math.acos(max(-1.0, min(1.0, float(matrix_from_quat_wxyz(pose.quat_wxyz)[2, 2]))))
+        if tilt > config.upright:
+            limit = math.degrees(config.upright)
+            return f"{config.tote} is tilted by {math.degrees(tilt):.1f} deg (limit {limit:.1f} deg)"
+        if abs(above) > config.height_tolerance:
+            side = "above" if above > 0.0 else "below"
+            return f"{config.tote} is {abs(above):.3f} m {side} the surface of {config.zone}"
+        speed = self._speed(time_s, pose)
+        if speed > config.rest_speed:
+            return f"{config.tote} still moves at {speed:.3f} m/s"
+        return ""
+
+    def _speed(self, time_s: float, pose: Pose3) -> float:
+        if self._previous is None or time_s <= self._previous[0]:
+            return 0.0
+        return math.dist(pose.xyz, self._previous[1].xyz) / (time_s - self._previous[0])
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; the value is the distance outside of the zone."""
+        return CheckResult(
+            name=self.name,
+            passed=self._passed,
+            value=self._outside,
+            limit=self._config.tolerance,
+            unit="m",
+            at_s=self._at_s,
+            reason=self._reason,
+        )
+
+
+def outside_distance(zone: Zone, pose: Pose3) -> float:
+    """Return how far the origin of `pose` is outside of the zone's rectangle [m]; 0 inside."""
+    local = zone.centre.inverse() @ pose.to_pose2()
+    dx = max(0.0, abs(local.x) - zone.size[0] / 2.0)
+    dy = max(0.0, abs(local.y) - zone.size[1] / 2.0)
+    return math.hypot(dx, dy)

@@ -1,0 +1,94 @@
+"""Checks on the mission: it succeeded, and in time."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.fields import Positive
+from twin.scenario.observation import CheckContext, Observation
+from twin.strict_yaml import Seconds
+
+
+class MissionSucceededConfig(CheckConfig):
+    """The mission ends, and says that it succeeded."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return MissionSucceeded(kind)
+
+
+class MissionSucceeded(Check):
+    """Keeps the first tick at which the mission is done."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._last: Observation | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        if self._last is None or not self._last.mission_done:
+            self._last = observation
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far."""
+        last = self._last
+        passed = last is not None and last.mission_done and last.mission_succeeded is True
+        reason = ""
+        if last is None:
+            reason = "the run made no step"
+        elif not last.mission_done:
+            reason = f"the mission was not done when the run ended, in state '{last.mission_state}'"
+        elif not passed:
+            reason = last.mission_reason or f"the mission failed in state '{last.mission_state}'"
+        at_s = None if last is None else last.time_s
+        return CheckResult(
+            name=self.name, passed=passed, value=passed, limit=True, unit="", at_s=at_s, reason=reason
+        )
+
+
+class TimeLimitConfig(CheckConfig):
+    """The mission is done in time."""
+
+    limit: Annotated[Seconds, Positive]
+    """Longest simulated time [s]."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return TimeLimit(kind, self)
+
+
+class TimeLimit(Check):
+    """Keeps the time at which the mission is done."""
+
+    def __init__(self, name: str, config: TimeLimitConfig) -> None:
+        super().__init__(name)
+        self._limit = config.limit
+        self._last: Observation | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        if self._last is None or not self._last.mission_done:
+            self._last = observation
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far."""
+        time_s = None if self._last is None else self._last.time_s
+        done = self._last is not None and self._last.mission_done
+        passed = done and time_s is not None and time_s <= self._limit
+        reason = ""
+        if time_s is None:
+            reason = "the run made no step"
+        elif not done:
+            reason = f"the mission was not done after {time_s:.1f} s"
+        elif not passed:
+            reason = f"the mission took {time_s:.1f} s"
+        return CheckResult(
+            name=self.name,
+            passed=passed,
+            value=time_s,
+            limit=self._limit,
+            unit="s",
+            at_s=time_s,
+            reason=reason,
+        )

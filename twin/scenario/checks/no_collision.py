@@ -1,0 +1,95 @@
+"""Check that robots touch nothing they are not meant to touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import Annotated
+
+from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.fields import NotNegative
+from twin.scenario.observation import CheckContext, ContactObservation, Observation
+from twin.strict_yaml import Newtons, StrictModel
+
+
+class AllowedContact(StrictModel):
+    """A contact that is no collision; `*` stands for any text."""
+
+    other: str
+    """What may be touched: `tote_*`."""
+    body: str = "*"
+    """Which link of the robot may touch it: `*finger*`."""
+
+    def matches(self, contact: ContactObservation) -> bool:
+        """Whether the contact is meant."""
+        return fnmatchcase(contact.other, self.other) and fnmatchcase(contact.body, self.body)
+
+
+class NoCollisionConfig(CheckConfig):
+    """No robot touches anything but the floor and what is allowed."""
+
+    robot: str | None = None
+    """Name of the robot; absent: all robots."""
+    max_force: Annotated[Newtons, NotNegative] = 0.0
+    """Normal force up to which a touch is no collision [N]."""
+    allowed: Sequence[AllowedContact] = ()
+    """Contacts that are no collision, however hard."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return NoCollision(kind if self.robot is None else f"{kind}({self.robot})", self)
+
+
+class NoCollision(Check):
+    """Keeps the first collision and the hardest one."""
+
+    def __init__(self, name: str, config: NoCollisionConfig) -> None:
+        super().__init__(name)
+        self._config = config
+        self._first: tuple[float, ContactObservation] | None = None
+        self._hardest: tuple[float, ContactObservation] | None = None
+        self._force = 0.0
+        self._allowed: dict[tuple[str, str], bool] = {}
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        self._at_s = observation.time_s
+        for contact in observation.contacts:
+            if self._config.robot not in (None, contact.robot) or self._is_allowed(contact):
+                continue
+            self._force = max(self._force, contact.force_N)
+            if contact.force_N <= self._config.max_force:
+                continue
+            if self._first is None:
+                self._first = (observation.time_s, contact)
+            if self._hardest is None or contact.force_N > self._hardest[1].force_N:
+                self._hardest = (observation.time_s, contact)
+
+    def _is_allowed(self, contact: ContactObservation) -> bool:
+        pair = (contact.body, contact.other)
+        if pair not in self._allowed:
+            self._allowed[pair] = any(rule.matches(contact) for rule in self._config.allowed)
+        return self._allowed[pair]
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; the value is the hardest contact that is not allowed."""
+        reason = "" if self._at_s is not None else "the run made no step"
+        if self._first is not None and self._hardest is not None:
+            reason = _sentence(*self._first)
+            if self._hardest != self._first:
+                reason += f"; hardest: {_sentence(*self._hardest)}"
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=self._force,
+            limit=self._config.max_force,
+            unit="N",
+            at_s=self._at_s if self._first is None else self._first[0],
+            reason=reason,
+        )
+
+
+def _sentence(time_s: float, contact: ContactObservation) -> str:
+    where = f"{contact.robot}/{contact.body}"
+    return f"{where} hit {contact.other} with {contact.force_N:.1f} N at {time_s:.2f} s"

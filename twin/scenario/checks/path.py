@@ -1,0 +1,147 @@
+"""Checks on where a robot truly went."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from twin.geometry import Pose2, wrap_angle
+from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.fields import Positive
+from twin.scenario.observation import CheckContext, Observation
+from twin.strict_yaml import Metres, Radians
+
+
+class FinalPoseConfig(RobotCheckConfig):
+    """The run ends with the robot at a pose."""
+
+    x: Metres
+    """Along x of `map` [m]."""
+    y: Metres
+    """Along y of `map` [m]."""
+    yaw: Radians | None = None
+    """Heading [rad]; absent: any."""
+    tolerance: Annotated[Metres, Positive] = 0.1
+    """Largest distance [m]."""
+    yaw_tolerance: Annotated[Radians, Positive] = math.radians(10.0)
+    """Largest heading error [rad]."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        goal = Pose2(self.x, self.y, 0.0 if self.yaw is None else self.yaw)
+        yaw_tolerance = None if self.yaw is None else self.yaw_tolerance
+        return EndsAt(self.label(kind), context.robot(self.robot), self.tolerance, yaw_tolerance, goal)
+
+
+class ClosedLoopConfig(RobotCheckConfig):
+    """The robot leaves its start by more than the tolerance and comes back to it."""
+
+    tolerance: Annotated[Metres, Positive]
+    """Largest distance of the end from the start [m]."""
+    yaw_tolerance: Annotated[Radians, Positive] | None = None
+    """Largest heading error [rad]; absent: any heading."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        robot = context.robot(self.robot)
+        return EndsAt(self.label(kind), robot, self.tolerance, self.yaw_tolerance, goal=None)
+
+
+class EndsAt(Check):
+    """Compares the last true pose with a goal, or with the first pose if `goal` is None."""
+
+    def __init__(
+        self, name: str, robot: str, tolerance: float, yaw_tolerance: float | None, goal: Pose2 | None
+    ) -> None:
+        super().__init__(name)
+        self._robot, self._tolerance, self._yaw_tolerance = robot, tolerance, yaw_tolerance
+        self._must_leave = goal is None
+        self._goal = goal
+        self._farthest = 0.0
+        self._end: Pose2 | None = None
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        self._end = observation.robots[self._robot].pose.to_pose2()
+        self._at_s = observation.time_s
+        if self._goal is None:
+            self._goal = self._end
+        self._farthest = max(self._farthest, self._end.distance(self._goal))
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; the value is the distance from the goal."""
+        distance: float | None = None
+        reason = "the run made no step"
+        if self._end is not None and self._goal is not None:
+            distance = self._end.distance(self._goal)
+            reason = self._fault(distance, abs(wrap_angle(self._end.yaw - self._goal.yaw)))
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=distance,
+            limit=self._tolerance,
+            unit="m",
+            at_s=self._at_s,
+            reason=reason,
+        )
+
+    def _fault(self, distance: float, turned: float) -> str:
+        where = "its start" if self._must_leave else "the goal"
+        if distance > self._tolerance:
+            return f"{self._robot} ends {distance:.3f} m from {where}"
+        if self._yaw_tolerance is not None and turned > self._yaw_tolerance:
+            limit = math.degrees(self._yaw_tolerance)
+            return f"{self._robot} ends turned by {math.degrees(turned):.1f} deg (limit {limit:.1f} deg)"
+        if self._must_leave and self._farthest <= self._tolerance:
+            return f"{self._robot} never left its start"
+        return ""
+
+
+class PathOnCircleConfig(RobotCheckConfig):
+    """The base stays on a circle the whole time."""
+
+    centre: tuple[Metres, Metres] = (0.0, 0.0)
+    """Its centre in `map` [m]."""
+    radius: Annotated[Metres, Positive]
+    """Its radius [m]."""
+    tolerance: Annotated[Metres, Positive]
+    """Largest distance from the circle [m]."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return PathOnCircle(self.label(kind), self, context.robot(self.robot))
+
+
+class PathOnCircle(Check):
+    """Keeps the largest distance from the circle."""
+
+    def __init__(self, name: str, config: PathOnCircleConfig, robot: str) -> None:
+        super().__init__(name)
+        self._config, self._robot = config, robot
+        self._worst: float | None = None
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        x, y, _ = observation.robots[self._robot].pose.xyz
+        centre = self._config.centre
+        off = abs(math.hypot(x - centre[0], y - centre[1]) - self._config.radius)
+        if self._worst is None or off > self._worst:
+            self._worst, self._at_s = off, observation.time_s
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far."""
+        reason = "the run made no step"
+        if self._worst is not None:
+            off = self._worst > self._config.tolerance
+            reason = f"{self._robot} was {self._worst:.3f} m off the circle" if off else ""
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=self._worst,
+            limit=self._config.tolerance,
+            unit="m",
+            at_s=self._at_s,
+            reason=reason,
+        )

@@ -1,0 +1,119 @@
+"""Checks on sums over a run: distance driven, energy used."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import model_validator
+
+from twin.geometry import Array
+from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.observation import CheckContext, Observation
+from twin.strict_yaml import Joules, Metres
+
+
+class DrivenDistanceConfig(RobotCheckConfig):
+    """The length of the true path lies between two bounds."""
+
+    min: Annotated[Metres, NotNegative] | None = None
+    """Shortest path [m]."""
+    max: Annotated[Metres, Positive] | None = None
+    """Longest path [m]."""
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> DrivenDistanceConfig:
+        if self.min is None and self.max is None:
+            raise ValueError("must have at least one of the keys min, max")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(f"min ({self.min:g} m) must not exceed max ({self.max:g} m)")
+        return self
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return DrivenDistance(self.label(kind), self, context.robot(self.robot))
+
+
+class DrivenDistance(Check):
+    """Adds up the steps of the base on the floor plane."""
+
+    def __init__(self, name: str, config: DrivenDistanceConfig, robot: str) -> None:
+        super().__init__(name)
+        self._config, self._robot = config, robot
+        self._distance = 0.0
+        self._previous: Array | None = None
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        xy = observation.robots[self._robot].pose.xyz[:2].copy()
+        if self._previous is not None:
+            self._distance += math.dist(xy, self._previous)
+        self._previous, self._at_s = xy, observation.time_s
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far."""
+        low, high = self._config.min, self._config.max
+        too_short = low is not None and self._distance < low
+        too_long = high is not None and self._distance > high
+        reason = "" if self._at_s is not None else "the run made no step"
+        if self._at_s is not None and (too_short or too_long):
+            reason = (
+                f"{self._robot} drove {self._distance:.2f} m, {'less' if too_short else 'more'} than allowed"
+            )
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=self._distance,
+            limit=low if too_short or high is None else high,
+            unit="m",
+            at_s=self._at_s,
+            reason=reason,
+        )
+
+
+class EnergyConfig(RobotCheckConfig):
+    """The actuators use no more than this."""
+
+    max: Annotated[Joules, Positive]
+    """Largest mechanical work; braking gives nothing back [J]."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return Energy(self.label(kind), self, context.robot(self.robot))
+
+
+class Energy(Check):
+    """Integrates positive power over time."""
+
+    def __init__(self, name: str, config: EnergyConfig, robot: str) -> None:
+        super().__init__(name)
+        self._config, self._robot = config, robot
+        self._energy = 0.0
+        self._previous_ns: int | None = None
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        if self._previous_ns is not None:
+            power = max(0.0, observation.robots[self._robot].power_W)
+            self._energy += power * (observation.time_ns - self._previous_ns) / 1e9
+        self._previous_ns = observation.time_ns
+        if self._energy <= self._config.max:
+            self._at_s = observation.time_s
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; a failure's time is the last one within the limit."""
+        reason = "" if self._previous_ns is not None else "the run made no step"
+        if self._energy > self._config.max:
+            reason = f"{self._robot} used {self._energy:.0f} J"
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=self._energy,
+            limit=self._config.max,
+            unit="J",
+            at_s=self._at_s,
+            reason=reason,
+        )

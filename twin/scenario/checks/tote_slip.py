@@ -1,0 +1,70 @@
+"""Check that a carried good does not slip in the gripper."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from twin.geometry import Array
+from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.fields import Positive
+from twin.scenario.observation import CheckContext, Observation
+from twin.strict_yaml import Metres
+
+
+class ToteSlipConfig(CheckConfig):
+    """While a tote is held, it stays where it was in the gripper when the grasp closed."""
+
+    max: Annotated[Metres, Positive]
+    """Largest displacement of the tote's origin in the gripper's frame [m]."""
+    tote: str | None = None
+    """Name of the tote; absent: every tote that is carried."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return ToteSlip(kind if self.tote is None else f"{kind}({self.tote})", self)
+
+
+class ToteSlip(Check):
+    """Compares with the pose at the first tick of each grasp."""
+
+    def __init__(self, name: str, config: ToteSlipConfig) -> None:
+        super().__init__(name)
+        self._config = config
+        self._grasps: dict[str, tuple[str, Array]] = {}
+        self._worst: float | None = None
+        self._at_s: float | None = None
+        self._reason = "no tote was carried" if config.tote is None else f"{config.tote} was never carried"
+
+    def observe(self, observation: Observation) -> None:
+        """Take one control tick."""
+        if self._at_s is None or self._worst is None:
+            self._at_s = observation.time_s
+        for tote in [tote for tote in self._grasps if tote not in observation.held]:
+            del self._grasps[tote]
+        for tote, held in observation.held.items():
+            if self._config.tote not in (None, tote):
+                continue
+            robot, start = self._grasps.setdefault(tote, (held.robot, held.T_gripper_good.xyz.copy()))
+            if robot != held.robot:  # handed over: another gripper, another grasp
+                self._grasps[tote] = (held.robot, held.T_gripper_good.xyz.copy())
+                continue
+            slip = math.dist(held.T_gripper_good.xyz, start)
+            if self._worst is None or slip > self._worst:
+                self._worst, self._at_s = slip, observation.time_s
+                passed = slip <= self._config.max
+                self._reason = (
+                    "" if passed else f"{tote} slipped {slip * 1e3:.1f} mm in {held.robot}'s gripper"
+                )
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; the value is the largest slip."""
+        return CheckResult(
+            name=self.name,
+            passed=self._worst is not None and self._worst <= self._config.max,
+            value=self._worst,
+            limit=self._config.max,
+            unit="m",
+            at_s=self._at_s,
+            reason=self._reason,
+        )

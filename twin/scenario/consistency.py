@@ -1,0 +1,133 @@
+"""Faults between the parts of a scenario that are each valid on their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from twin.errors import nearest
+from twin.scenario.checks.check import CheckConfig
+from twin.scenario.missions import Behaviors, Idle, PickAndPlace, R2D2StatePublisher, VelocityProfile
+from twin.strict_yaml import Fault, Loc
+
+if TYPE_CHECKING:
+    from twin.scenario.schema import Scenario
+
+
+def faults(scenario: Scenario) -> Iterator[Fault]:
+    """Yield everything that does not fit together."""
+    yield from _names(scenario)
+    yield from _periods(scenario)
+    yield from _arena(scenario)
+    yield from _mission(scenario)
+    yield from _checks(scenario)
+
+
+def nanoseconds(seconds: float) -> int:
+    """Return a time in whole nanoseconds."""
+    return round(seconds * 1e9)
+
+
+def _names(scenario: Scenario) -> Iterator[Fault]:
+    groups: tuple[tuple[Loc, list[str]], ...] = (
+        (("robots",), [robot.id for robot in scenario.robots]),
+        (("world", "obstacles"), [obstacle.name for obstacle in scenario.world.obstacles]),
+        (("world", "goods"), [good.name for good in scenario.world.goods]),
+    )
+    for loc, names in groups:
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                first = ".".join(map(str, (*loc, names.index(name))))
+                yield Fault((*loc, i, "name"), f"the name '{name}' is taken by {first}; names must differ")
+
+
+def _periods(scenario: Scenario) -> Iterator[Fault]:
+    timestep, control = scenario.physics.timestep, scenario.physics.control_period
+    if nanoseconds(control) % max(1, nanoseconds(timestep)):
+        text = f"the control period {_whole(control, 'physics steps', timestep)}"
+        yield Fault(("physics", "control_period"), text)
+        return
+    mission = scenario.mission
+    periods: list[tuple[Loc, str, float]] = [(("duration",), "the duration", scenario.duration)]
+    if scenario.recording.enabled:
+        period = 1.0 / scenario.recording.poses_hz
+        periods.append((("recording", "poses_hz"), "the period of the recorded poses", period))
+    if isinstance(mission, R2D2StatePublisher):
+        periods.append((("mission", "rate"), "the period of the publisher", 1.0 / mission.rate))
+    if isinstance(mission, VelocityProfile):
+        for i, step in enumerate(mission.steps):
+            periods.append((("mission", "steps", i, "duration"), "the duration of the step", step.duration))
+    for loc, what, period in periods:
+        if nanoseconds(period) % max(1, nanoseconds(control)):
+            yield Fault(loc, f"{what} {_whole(period, 'control periods', control)}")
+
+
+def _whole(period: float, units: str, unit: float) -> str:
+    return f"({period * 1e3:g} ms) must be a whole number of {units} ({unit * 1e3:g} ms)"
+
+
+def _arena(scenario: Scenario) -> Iterator[Fault]:
+    if scenario.world.arena is not None:
+        return
+    message = "needs an arena; name one as world.arena"
+    for i, robot in enumerate(scenario.robots):
+        if robot.start is not None:
+            yield Fault(("robots", i, "start"), f"the start '{robot.start}' {message}")
+        if (
+            robot.localisation is not None
+            and robot.localisation.type == "amcl"
+            and robot.localisation.map is None
+        ):
+            yield Fault(("robots", i, "localisation"), f"amcl without a map {message}, or a map")
+    for i, good in enumerate(scenario.world.goods):
+        yield Fault(("world", "goods", i), f"the good '{good.name}' {message}")
+    if isinstance(scenario.mission, PickAndPlace):
+        yield Fault(("mission",), f"pick_and_place {message}")
+    for i, entry in enumerate(scenario.checks):
+        if entry.delivered is not None:
+            yield Fault(("checks", i), f"delivered {message}")
+
+
+def _mission(scenario: Scenario) -> Iterator[Fault]:
+    mission = scenario.mission
+    if isinstance(mission, Idle):
+        return
+    robots = {robot.id: robot for robot in scenario.robots}
+    robot = robots.get(mission.robot)
+    if robot is None:
+        yield Fault(
+            ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"
+        )
+        return
+    at = ("robots", list(robots).index(mission.robot))
+    if isinstance(mission, R2D2StatePublisher) and robot.base != "kinematic":
+        yield Fault((*at, "base"), "the mission r2d2_state_publisher needs the base 'kinematic'")
+    if isinstance(mission, PickAndPlace) and robot.navigation is None:
+        yield Fault(at, f"the mission pick_and_place needs a navigation of robot '{robot.id}'")
+    if isinstance(mission, Behaviors) and robot.navigation is None:
+        for i, step in enumerate(mission.steps):
+            if step.navigate_to_pose is not None:
+                yield Fault(
+                    ("mission", "steps", i), f"navigate_to_pose needs a navigation of robot '{robot.id}'"
+                )
+
+
+def _checks(scenario: Scenario) -> Iterator[Fault]:
+    robots = [robot.id for robot in scenario.robots]
+    mission = scenario.mission
+    totes = [task.tote for task in mission.tasks] if isinstance(mission, PickAndPlace) else []
+    for i, entry in enumerate(scenario.checks):
+        config, loc = entry.config, ("checks", i, entry.kind)
+        assert isinstance(config, CheckConfig)
+        subjects = config.subjects()
+        robot = subjects.get("robot")
+        if robot is not None and robot not in robots:
+            yield Fault((*loc, "robot"), f"unknown robot '{robot}'; {nearest(robot, robots)}")
+        if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
+            names = ", ".join(robots)
+            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "time_limit"):
+            yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
+        tote = subjects.get("tote")
+        if entry.kind == "tote_slip" and tote is not None and tote not in totes:
+            yield Fault((*loc, "tote"), f"the mission carries no tote '{tote}'; {nearest(tote, totes)}")

@@ -1,0 +1,152 @@
+"""What the robots of a scenario are to do."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from twin.scenario.fields import NotNegative, OneOf, Positive
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
+
+
+class PickAndPlaceTask(StrictModel):
+    """Carry one tote to one zone."""
+
+    tote: str
+    """Name of the tote in the arena."""
+    to: str
+    """Name of the arena's zone to put it down in."""
+
+
+class PickAndPlace(StrictModel):
+    """Drive to the totes, grasp them, carry them to their zones, one after the other."""
+
+    type: Literal["pick_and_place"]
+    """`pick_and_place`"""
+    robot: str
+    """Name of the robot."""
+    tasks: Annotated[tuple[PickAndPlaceTask, ...], Field(min_length=1)]
+    """The totes to move, in this order."""
+
+
+class DriveOnHeading(StrictModel):
+    """Drive straight ahead (Nav2 `drive_on_heading`)."""
+
+    distance: Annotated[Metres, Positive]
+    """Distance along x of the robot [m]."""
+    speed: Annotated[MetresPerSecond, Positive] = 0.2
+    """Speed [m/s]."""
+
+
+class BackUp(StrictModel):
+    """Drive straight back (Nav2 `backup`)."""
+
+    distance: Annotated[Metres, Positive]
+    """Distance against x of the robot [m]."""
+    speed: Annotated[MetresPerSecond, Positive] = 0.1
+    """Speed [m/s]."""
+
+
+class Spin(StrictModel):
+    """Turn on the spot (Nav2 `spin`)."""
+
+    angle: Radians
+    """Angle to turn, counter-clockwise positive [rad]."""
+
+
+class Wait(StrictModel):
+    """Stand still (Nav2 `wait`)."""
+
+    duration: Annotated[Seconds, Positive]
+    """Time to stand [s]."""
+
+
+class NavigateToPose(StrictModel):
+    """Drive to a pose in `map` (Nav2 `navigate_to_pose`)."""
+
+    x: Metres
+    """Goal along x [m]."""
+    y: Metres
+    """Goal along y [m]."""
+    yaw: Radians = 0.0
+    """Goal heading [rad]."""
+
+
+class BehaviorStep(OneOf):
+    """One step: exactly one of these keys."""
+
+    drive_on_heading: DriveOnHeading | None = None
+    """Straight ahead."""
+    backup: BackUp | None = None
+    """Straight back."""
+    spin: Spin | None = None
+    """Turn on the spot."""
+    wait: Wait | None = None
+    """Stand still."""
+    navigate_to_pose: NavigateToPose | None = None
+    """Drive to a pose."""
+
+
+class Behaviors(StrictModel):
+    """Run Nav2 behaviours one after the other."""
+
+    type: Literal["behaviors"]
+    """`behaviors`"""
+    robot: str
+    """Name of the robot."""
+    steps: Annotated[tuple[BehaviorStep, ...], Field(min_length=1)]
+    """The behaviours, in this order."""
+    repeat: Annotated[int, Positive] = 1
+    """How often to run all steps."""
+
+
+class VelocityStep(StrictModel):
+    """A velocity command held for some time."""
+
+    duration: Annotated[Seconds, Positive]
+    """How long to send it [s]."""
+    linear: MetresPerSecond = 0.0
+    """Forward speed [m/s]."""
+    angular: RadiansPerSecond = 0.0
+    """Turn rate, counter-clockwise positive [rad/s]."""
+
+
+class VelocityProfile(StrictModel):
+    """Send velocity commands open loop on `cmd_vel`, then stop."""
+
+    type: Literal["velocity_profile"]
+    """`velocity_profile`"""
+    robot: str
+    """Name of the robot."""
+    steps: Annotated[tuple[VelocityStep, ...], Field(min_length=1)]
+    """The commands, in this order."""
+    repeat: Annotated[int, Positive] = 1
+    """How often to run all steps."""
+
+
+class R2D2StatePublisher(StrictModel):
+    """Move R2-D2 on a circle in `odom` while its joints sweep, as the URDF tutorial does."""
+
+    type: Literal["r2d2_state_publisher"]
+    """`r2d2_state_publisher`"""
+    robot: str
+    """Name of the robot."""
+    radius: Annotated[Metres, NotNegative] = 2.0
+    """Radius of the circle about the origin of `odom` [m]."""
+    rate: Annotated[Hertz, Positive] = 25.0
+    """Cycles per second [Hz]; a whole number of control periods each (the tutorial's 30 Hz is not)."""
+    degrees_per_cycle: Annotated[float, Positive] = 0.25
+    """Progress on the circle per cycle [deg]."""
+
+
+class Idle(StrictModel):
+    """Nobody does anything; the run lasts its whole duration."""
+
+    type: Literal["idle"]
+    """`idle`"""
+
+
+Mission = Annotated[
+    PickAndPlace | Behaviors | VelocityProfile | R2D2StatePublisher | Idle, Field(discriminator="type")
+]

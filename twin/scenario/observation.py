@@ -1,0 +1,121 @@
+"""What the checks see of one control tick: the simulator's truth beside what the robots believe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from twin.errors import ScenarioError, nearest
+from twin.geometry import Pose2, Pose3
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RobotObservation:
+    """One robot."""
+
+    pose: Pose3
+    """True `T_world_base`."""
+    estimate: Pose2 | None = None
+    """Believed pose of the base in `map`, now; None if nobody localises."""
+    odometry: Pose2 | None = None
+    """Believed pose of the base in `odom`; None without odometry."""
+    speed: float = 0.0
+    """True planar speed of the base [m/s]."""
+    power_W: float = 0.0
+    """Mechanical power of all actuators [W]."""
+    at_stop: tuple[str, ...] = ()
+    """Joints that lie at their limit."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Held:
+    """A good in a gripper."""
+
+    robot: str
+    """Who holds it."""
+    T_gripper_good: Pose3
+    """Its pose in the gripper, now."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ContactObservation:
+    """A robot touches something that is neither itself nor the floor."""
+
+    robot: str
+    """The robot."""
+    body: str
+    """Its link."""
+    other: str
+    """What it touches: an obstacle, a good, a wall, another robot."""
+    force_N: float
+    """Normal force [N]."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Observation:
+    """One control tick."""
+
+    time_ns: int
+    """Simulated time [ns]."""
+    robots: Mapping[str, RobotObservation] = field(default_factory=dict)
+    goods: Mapping[str, Pose3] = field(default_factory=dict)
+    """True `T_world_good`."""
+    held: Mapping[str, Held] = field(default_factory=dict)
+    """Only the goods that are in a gripper."""
+    contacts: Sequence[ContactObservation] = ()
+    mission_state: str = ""
+    mission_done: bool = False
+    mission_succeeded: bool | None = None
+    """None until the mission is done."""
+    mission_reason: str = ""
+    """Why it failed."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self.time_ns / 1e9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Zone:
+    """A rectangle on a level surface where goods are put down."""
+
+    centre: Pose2
+    """Its centre and direction in the world."""
+    size: tuple[float, float]
+    """Extent along its own x and y [m]."""
+    height: float = 0.0
+    """Height of the surface [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckContext:
+    """What checks need to know beforehand; the runtime fills it once."""
+
+    robots: tuple[str, ...] = ()
+    """Names of the robots, in the scenario's order."""
+    zones: Mapping[str, Zone] = field(default_factory=dict)
+    good_bottoms: Mapping[str, float] = field(default_factory=dict)
+    """Distance from each good's origin down to its underside [m]."""
+
+    def robot(self, name: str | None) -> str:
+        """Return the robot a check is about; without a name the only one."""
+        return self.robots[0] if name is None else name
+
+    def zone(self, name: str) -> Zone:
+        """Return a zone; raises ScenarioError naming the arena's zones."""
+        return _named("zone", name, self.zones)
+
+    def good_bottom(self, name: str) -> float:
+        """Return the distance from a good's origin to its underside [m]; raises ScenarioError likewise."""
+        return _named("tote", name, self.good_bottoms)
+
+
+def _named(what: str, name: str, valid: Mapping[str, T]) -> T:
+    if name not in valid:
+        message = f"a check names the {what} '{name}', which the arena lacks"
+        raise ScenarioError(f"{message}; {nearest(name, valid)}")
+    return valid[name]

@@ -1,0 +1,57 @@
+"""The robots of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import model_validator
+
+from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName
+from twin.scenario.navigation import Localisation, NavigationConfig
+from twin.strict_yaml import Fault, Faults, StrictModel
+
+
+class RobotConfig(StrictModel):
+    """One robot."""
+
+    model: NameOrPath
+    """Name in the catalogue (`twin robots`), or path of a URDF or xacro file."""
+    name: RosName | None = None
+    """Name of this robot; absent: the model's. Several robots live in `/<name>/`."""
+    args: Mapping[str, ArgumentText] = {}
+    """Xacro arguments."""
+    pose: PoseConfig | None = None
+    """Where it starts, in the world; absent: `start`, else the origin."""
+    start: str | None = None
+    """Name of one of the arena's poses to start from, instead of `pose`."""
+    base: Literal["free", "fixed", "kinematic"] = "free"
+    """`free`: moved by physics; `fixed`: bolted to the world; `kinematic`: moved by a publisher of poses."""
+    localisation: Localisation | None = None
+    """Who estimates its pose; absent: nobody."""
+    navigation: NavigationConfig | None = None
+    """Its navigation nodes; absent: none, `{}`: all defaults."""
+
+    @property
+    def id(self) -> str:
+        """The name in the world and on the bus."""
+        return self.name or self.model.rpartition("/")[2].partition(".")[0]
+
+    @property
+    def is_localised(self) -> bool:
+        """Whether something estimates the pose in `map`."""
+        return self.localisation is not None and self.localisation.type != "none"
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> RobotConfig:
+        faults = []
+        if self.pose is not None and self.start is not None:
+            faults.append(Fault(("start",), "give the robot either a pose or the name of a start, not both"))
+        if self.navigation is not None and not self.is_localised:
+            message = "navigation needs a localisation of type odometry or amcl"
+            faults.append(Fault(("navigation",), message))
+        if self.navigation is not None and self.base != "free":
+            faults.append(Fault(("base",), f"navigation needs the base 'free', not '{self.base}'"))
+        if faults:
+            raise Faults(faults)
+        return self

@@ -1,0 +1,72 @@
+"""A scenario: one YAML file that says what to simulate and when it passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from twin.errors import ScenarioError
+from twin.scenario import consistency
+from twin.scenario.checks import Check, CheckEntry
+from twin.scenario.fields import NotNegative, Positive, RosName
+from twin.scenario.missions import Idle, Mission
+from twin.scenario.observation import CheckContext
+from twin.scenario.robots import RobotConfig
+from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
+from twin.strict_yaml import Faults, Seconds, StrictModel
+from twin.strict_yaml import load as load_yaml
+
+
+class Scenario(StrictModel):
+    """What to simulate, and when it passes. Values are SI or carry a unit: `240`, `240 s`, `4 min`."""
+
+    name: RosName
+    """Name of the scenario; its runs are written to `runs/<name>/`."""
+    description: str = ""
+    """One sentence for people."""
+    seed: Annotated[int, NotNegative] = 0
+    """Seed of all noise."""
+    duration: Annotated[Seconds, Positive]
+    """Longest simulated time [s]; a run ends earlier when its mission is done."""
+    physics: PhysicsConfig = PhysicsConfig()
+    """Rates of the simulation."""
+    world: WorldConfig = WorldConfig()
+    """What surrounds the robots."""
+    robots: Annotated[tuple[RobotConfig, ...], Field(min_length=1)]
+    """The robots."""
+    mission: Mission = Idle(type="idle")
+    """What they are to do."""
+    checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
+    """What must hold for the run to pass."""
+    recording: RecordingConfig = RecordingConfig()
+    """What goes into the Rerun recording."""
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Scenario:
+        faults = tuple(consistency.faults(self))
+        if faults:
+            raise Faults(faults)
+        return self
+
+    def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
+        """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
+        return tuple(entry.build(context) for entry in self.checks)
+
+
+def load(path: Path, overrides: Mapping[str, str] = MappingProxyType({})) -> Scenario:
+    """Read a scenario file; `overrides` maps dotted paths to YAML text (`{"robots.0.pose.x": "2 m"}`).
+
+    Raises:
+        ScenarioError: With every problem of the file and of the overrides.
+    """
+    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON schema of scenario files, for editors (`# yaml-language-server: $schema=...`)."""
+    schema = Scenario.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -1,0 +1,98 @@
+"""The verdict of a run, and the files that carry it: `verdict.json` and `junit.xml`."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from twin.scenario.checks import CheckResult
+from twin.scenario.junit import junit_xml
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The outcome of one run."""
+
+    scenario: str
+    seed: int
+    checks: tuple[CheckResult, ...] = ()
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    """`sim_time_s`, `wall_time_s`, `cpu_time_s`, `real_time_factor` and what a mission adds."""
+    digest: str | None = None
+    """SHA-256 over every published sample and the final physics state; None if the run was not finished."""
+    deterministic: bool = True
+    """False if something outside of the process could change the run."""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    cpu: str = ""
+    """The class of CPU within which digests can be compared."""
+    error: str | None = None
+    """Why the run could not be made or finished."""
+
+    @property
+    def verdict(self) -> Literal["pass", "fail", "error"]:
+        """`pass` if every check holds; `error` if the run could not be made."""
+        if self.error is not None:
+            return "error"
+        return "pass" if self.checks and all(check.passed for check in self.checks) else "fail"
+
+    @property
+    def exit_code(self) -> int:
+        """0 for pass, 1 for fail, 2 for error."""
+        return {"pass": 0, "fail": 1, "error": 2}[self.verdict]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of `verdict.json`."""
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "verdict": self.verdict,
+            "error": self.error,
+            "checks": [asdict(check) for check in self.checks],
+            "metrics": dict(self.metrics),
+            "digest": self.digest,
+            "deterministic": self.deterministic,
+            "versions": dict(self.versions),
+            "cpu": self.cpu,
+        }
+
+    def to_json(self) -> str:
+        """Return `verdict.json`; numbers that are not finite become null, as JSON has none."""
+        return json.dumps(_finite(self.to_dict()), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def write(self, folder: Path) -> None:
+        """Write `verdict.json` and `junit.xml`; each file appears whole or not at all."""
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / "verdict.json", self.to_json().encode())
+        write_junit(folder / "junit.xml", [self])
+
+
+def write_junit(file: Path, verdicts: Sequence[Verdict]) -> None:
+    """Write one JUnit file over several runs, for CI."""
+    write_atomically(file, junit_xml([verdict.to_dict() for verdict in verdicts]))
+
+
+def write_atomically(file: Path, content: bytes) -> None:
+    """Write a file so that no reader ever sees a part of it."""
+    descriptor, temporary = tempfile.mkstemp(prefix=f".{file.name}.", dir=file.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(content)
+        os.chmod(temporary, 0o644)  # mkstemp's 0600 would lock out a CI server's other user
+        os.replace(temporary, file)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,65 @@
+"""The world of a scenario: an arena by name, and what is different from it in this run."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName
+from twin.strict_yaml import Hertz, Kilograms, Metres, Seconds, StrictModel
+
+Length = Annotated[Metres, Positive]
+
+
+class Obstacle(StrictModel):
+    """A box on the floor that no map shows."""
+
+    name: RosName
+    """Name of its body."""
+    pose: PoseConfig = PoseConfig()
+    """Where its footprint's centre stands, in the world."""
+    size: tuple[Length, Length, Length]
+    """Extent along its x, y and z [m]."""
+    mass: Annotated[Kilograms, Positive] | None = None
+    """Mass of a box that can be pushed [kg]; absent: it never moves."""
+    friction: Annotated[float, NotNegative] = 0.8
+    """Coulomb coefficient."""
+
+
+class GoodOverride(StrictModel):
+    """Properties of one of the arena's goods in this run; absent keys keep the arena's."""
+
+    name: str
+    """Name of the good in the arena."""
+    mass: Annotated[Kilograms, Positive] | None = None
+    """Mass [kg]."""
+    friction: Annotated[float, NotNegative] | None = None
+    """Coulomb coefficient: what a gripper can hold by."""
+
+
+class WorldConfig(StrictModel):
+    """What surrounds the robots."""
+
+    arena: NameOrPath | None = None
+    """Name of a shipped arena, or path of an arena file; absent: an empty floor."""
+    obstacles: tuple[Obstacle, ...] = ()
+    """Boxes added to the arena, on no map."""
+    goods: tuple[GoodOverride, ...] = ()
+    """Goods that differ from the arena's."""
+
+
+class PhysicsConfig(StrictModel):
+    """Rates of the simulation."""
+
+    timestep: Annotated[Seconds, Positive] = 0.002
+    """Physics step [s]."""
+    control_period: Annotated[Seconds, Positive] = 0.02
+    """Time between two runs of the controllers [s]; a whole number of physics steps."""
+
+
+class RecordingConfig(StrictModel):
+    """What goes into the Rerun recording."""
+
+    enabled: bool = True
+    """Whether to write one."""
+    poses_hz: Annotated[Hertz, Positive] = 25.0
+    """Rate of the poses [Hz]; its period is a whole number of control periods."""
