@@ -1,13 +1,13 @@
 """Messages to CDR bytes and back: rosbags' codec in general, packed structs for the hot types.
 
-A fast path gives the same bytes as the general one (tested); it reads little endian, the general one the rest.
+A fast path gives the same bytes as the general one (tested); the general one reads big endian.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import chain
 from struct import Struct, pack, unpack_from
 from typing import Any, Generic, TypeVar
@@ -53,7 +53,6 @@ class Codec(Generic[M]):
     """Raises on bytes that are not such a message; which exception is not specified."""
 
 
-@cache
 def codec(cls: type[M]) -> Codec[M]:
     """Return the codec of a message class; rosbags generates its code now, not in the loop."""
     msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
@@ -102,7 +101,7 @@ def _decode_clock(payload: bytes) -> Clock:
 
 @lru_cache(maxsize=4096)
 def _transform_struct(phase: int, frame_id: str, child_frame_id: str) -> tuple[Struct, bytes, bytes]:
-    """Return the layout of a TransformStamped that starts `phase` bytes (mod 8) into the payload, and texts."""
+    """Return the layout of a TransformStamped at `phase` bytes (mod 8) into the payload, and its texts."""
     frame, child = frame_id.encode() + b"\0", child_frame_id.encode() + b"\0"
     before = -phase % 4
     end = phase + before + 8 + 4 + len(frame)

@@ -1,7 +1,7 @@
 """Message classes by their ROS names: `Twist(linear=Vector3(...), ...)`.
 
-They are rosbags' dataclasses: every field is given, by name or position; `new(Twist)` fills what is left out with
-ROS's defaults. Sequences of numbers are numpy arrays of the field's type; in a received message they are read-only.
+They are rosbags' dataclasses: every field is given, by name or position; `new(Twist)` fills what is left out
+with ROS's defaults. Sequences of numbers are numpy arrays of the field's type, read-only when received.
 Services and actions are in `srvs` and `action_types`.
 """
 

@@ -19,7 +19,8 @@ FieldDefs = dict[str, tuple[list[Any], list[Any]]]
 # type_description_interfaces/msg/FieldType
 _IDS = {
     "int8": 2, "uint8": 3, "char": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8,
-    "uint64": 9,    "float32": 10, "float64": 11, "bool": 15, "byte": 16, "octet": 16, "string": 17, "wstring": 18,
+    "uint64": 9, "float32": 10, "float64": 11, "bool": 15, "byte": 16, "octet": 16,
+    "string": 17, "wstring": 18,
 }  # fmt: skip
 _NESTED, _BOUNDED_STRING, _BOUNDED_WSTRING = 1, 21, 22
 _ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 48, 96, 144

@@ -1,0 +1,151 @@
+"""The bus: one Zenoh session, its nodes, and the border to other processes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+
+from twin.bridge.clock import Clock
+from twin.bridge.external import ExternalQueue
+from twin.bridge.node import Node
+from twin.bridge.session import open_session
+from twin.bridge.topics import Sample
+from twin.errors import BridgeError
+
+_EXTERNAL_DEPTH = 10_000
+
+Tap = Callable[[Sample[Any]], None]
+
+
+class Bus:
+    """Nodes that exchange Zenoh samples, in the thread that opened the bus; deterministic within the process.
+
+    Callbacks run only in `spin`; what other processes send waits until `admit`. Use it as a context manager.
+    """
+
+    def __init__(self, session: zenoh.Session, clock: Clock, domain_id: int, networked: bool) -> None:
+        self.session = session
+        self.clock = clock
+        self.domain_id = domain_id
+        self.session_id = str(session.zid())
+        self.networked = networked
+        """Whether other processes may take part."""
+        self.external = ExternalQueue(_EXTERNAL_DEPTH)
+        self.taps: list[Tap] = []
+        self._nodes: list[Node] = []
+        self._ids = 0
+        self._thread = threading.get_ident()
+        self._closed = False
+
+    @classmethod
+    def open(
+        cls,
+        clock: Clock,
+        *,
+        listen: Sequence[str] = (),
+        connect: Sequence[str] = (),
+        domain_id: int = 0,
+        session: str = "",
+    ) -> Self:
+        """Open a bus.
+
+        Args:
+            clock: Simulated time; the caller advances it.
+            listen: Endpoints where other processes may connect, such as tcp/127.0.0.1:7447; none by default.
+            connect: Endpoints to connect to, such as a router's.
+            domain_id: ROS_DOMAIN_ID.
+            session: What the session's id, and with it every gid, depends on. Processes that meet need
+                different ones; empty: constant without listen and connect, else random.
+
+        Raises:
+            BridgeError: an endpoint cannot be used.
+        """
+        networked = bool(listen or connect)
+        name = session or ("" if networked else "twin")
+        return cls(open_session(name, listen, connect), clock, domain_id, networked)
+
+    def create_node(
+        self,
+        name: str,
+        namespace: str = "",
+        parameters: Mapping[str, Any] | None = None,
+        remappings: Mapping[str, str] | None = None,
+    ) -> Node:
+        """Add a node; nodes spin in the order of their creation.
+
+        Args:
+            name: Unique in its namespace.
+            namespace: '' or '/' for the root.
+            parameters: Values that go before the defaults that the node declares.
+            remappings: Topic, service and action names of the node -> names to use instead.
+
+        Raises:
+            BridgeError: an invalid name, or one that is taken.
+        """
+        node = Node(self, name, namespace, parameters or {}, remappings or {})
+        if any(node.fully_qualified_name == other.fully_qualified_name for other in self._nodes):
+            node.destroy()
+            raise BridgeError(f"there is a node {node.fully_qualified_name} already; node names are unique")
+        self._nodes.append(node)
+        return node
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """In the order of creation."""
+        return tuple(self._nodes)
+
+    @property
+    def refused(self) -> Mapping[str, int]:
+        """How much from outside was not delivered, by reason: overflow, attachment, payload, type hash."""
+        return self.external.refused
+
+    def admit(self) -> int:
+        """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
+        arrivals = self.external.drain()
+        for arrival in arrivals:
+            arrival.receiver.enqueue(arrival.data, True)
+        return len(arrivals)
+
+    def spin(self) -> None:
+        """Run every node once, in the order of creation."""
+        for node in self.nodes:
+            node.spin()
+
+    def tap(self, callback: Tap) -> None:
+        """Call back for every sample that this process publishes, while it publishes it."""
+        self.taps.append(callback)
+
+    def close(self) -> None:
+        """Destroy the nodes and leave the network. Harmless when repeated."""
+        if self._closed:
+            return
+        self._closed = True
+        for node in reversed(self.nodes):
+            node.destroy()
+        self.session.close()  # type: ignore[no-untyped-call]
+
+    def in_own_thread(self) -> bool:
+        """Whether the caller is the thread that opened the bus, not one of Zenoh's."""
+        return threading.get_ident() == self._thread
+
+    def next_id(self) -> int:
+        """Return a number for a node or endpoint, unique in the session."""
+        self._ids += 1
+        return self._ids - 1
+
+    def forget(self, node: Node) -> None:
+        """Spin a node no more."""
+        if node in self._nodes:
+            self._nodes.remove(node)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,190 @@
+"""Services and their clients, over Zenoh queryables with rmw_zenoh's keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import zenoh
+
+from twin.bridge.cdr import codec
+from twin.bridge.external import Arrival
+from twin.bridge.keys import Attachment, pack_attachment, parse_attachment
+from twin.bridge.qos import QoS
+from twin.bridge.session import direct
+from twin.bridge.topics import Endpoint
+from twin.bridge.types import ServiceType
+from twin.errors import BridgeError
+
+if TYPE_CHECKING:
+    from twin.bridge.node import Node
+
+_QOS = QoS(depth=10)
+_FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
+
+Respond = Callable[[Any], None]
+"""Sends the response; may be called in a later spin."""
+
+
+class Future:
+    """A response that may not have come yet; done in a spin of the client's node."""
+
+    def __init__(self, service: str) -> None:
+        self.done = False
+        self._service = service
+        self._response: Any = None
+        self._error: str | None = None
+        self._callbacks: list[Callable[[Future], None]] = []
+
+    @property
+    def error(self) -> str | None:
+        """Why there will be no response; None if there is one or it may still come."""
+        return self._error
+
+    @property
+    def result(self) -> Any:
+        """The response.
+
+        Raises:
+            BridgeError: nobody answered, or not yet.
+        """
+        if not self.done:
+            raise BridgeError(f"{self._service} has not answered yet; look at `done` first")
+        if self._error is not None:
+            raise BridgeError(self._error)
+        return self._response
+
+    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
+        """Call back when done, at once if it is."""
+        if self.done:
+            callback(self)
+        else:
+            self._callbacks.append(callback)
+
+    def finish(self, response: Any, error: str | None = None) -> None:
+        """Set the response, or why there is none; what comes later is ignored."""
+        if self.done:
+            return
+        self.done, self._response, self._error = True, response, error
+        for callback in self._callbacks:
+            callback(self)
+
+
+class Service(Endpoint):
+    """Answers requests in its node's spin."""
+
+    def __init__(
+        self, node: Node, srv_type: ServiceType, name: str, callback: Callable[[Any, Respond], None]
+    ) -> None:
+        super().__init__(node, "SS", name, srv_type.name, _QOS)
+        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._callback = callback
+        session = node.bus.session
+        self._declared.append(session.declare_queryable(self.key, direct(self._on_query), complete=True))
+
+    def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
+        """Put a request into the node's inbox."""
+        self.node.inbox.append([self, data, external])
+
+    def handle(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
+        """Decode and call back."""
+        query, source = data
+        payload = query.payload.to_bytes() if query.payload else b""
+        try:
+            request = self._requests.decode(payload)
+        except Exception as error:
+            query.drop()  # type: ignore[no-untyped-call]
+            if not external:
+                raise
+            self.node.bus.external.refuse("payload", self.name, f"not a {self._requests.msgtype}: {error}")
+            return
+
+        def respond(response: Any) -> None:
+            attachment = pack_attachment(source.sequence, self.node.bus.clock.now_ns, source.gid)
+            with query:
+                query.reply(self.key, self._responses.encode(response), attachment=attachment)
+
+        self._callback(request, respond)
+
+    def _on_query(self, query: zenoh.Query) -> None:
+        bus = self.node.bus
+        source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)
+        if source is None:
+            query.drop()  # type: ignore[no-untyped-call]
+            bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
+        elif bus.in_own_thread():
+            self.enqueue((query, source), False)
+        else:
+            bus.external.push(Arrival(source, self, (query, source)))
+
+
+class Client(Endpoint):
+    """Asks a service; the response arrives in the node's spin."""
+
+    def __init__(self, node: Node, srv_type: ServiceType, name: str) -> None:
+        super().__init__(node, "SC", name, srv_type.name, _QOS)
+        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._sequence = 0
+        self._querier = node.bus.session.declare_querier(
+            self.key,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_FOREVER_S,
+        )
+        self._declared.append(self._querier)
+
+    @property
+    def service_is_ready(self) -> bool:
+        """Whether somebody offers the service now."""
+        return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
+
+    def call_async(self, request: Any) -> Future:
+        """Send a request.
+
+        Raises:
+            TypeError: a request of another type.
+        """
+        if type(request) is not self._requests.cls:
+            raise TypeError(f"{self.name} takes {self._requests.msgtype}, not {type(request).__name__}")
+        self._sequence += 1
+        bus, future = self.node.bus, Future(self.name)
+        source = Attachment(self._sequence, bus.clock.now_ns, self.gid)
+
+        def deliver(data: Any) -> None:
+            if bus.in_own_thread():
+                self.enqueue(data, False)
+            else:
+                bus.external.push(Arrival(source, self, data))
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                deliver((future, reply.ok.payload.to_bytes()))
+
+        self._querier.get(
+            direct(on_reply, lambda: deliver((future, None))),
+            payload=self._requests.encode(request),
+            attachment=pack_attachment(*source),
+        )
+        return future
+
+    def enqueue(self, data: tuple[Future, bytes | None], external: bool) -> None:
+        """Put a response, or the end of the query, into the node's inbox."""
+        self.node.inbox.append([self, data, external])
+
+    def handle(self, data: tuple[Future, bytes | None], external: bool) -> None:
+        """Decode and finish the future; the end of a query matters only if no response came before."""
+        future, payload = data
+        if future.done:
+            return
+        if payload is None:
+            future.finish(None, f"nobody answered on the service {self.name}; is its node running?")
+            return
+        try:
+            response = self._responses.decode(payload)
+        except Exception as error:
+            if not external:
+                raise
+            self.node.bus.external.refuse("payload", self.name, f"not a {self._responses.msgtype}: {error}")
+            future.finish(None, f"the service {self.name} answered with something else than a response")
+            return
+        future.finish(response)
