@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -124,9 +125,6 @@ def _add_static(spec: mujoco.MjSpec, static: StaticBody, solref: list[float]) ->
         geom = _add_geom(spec.worldbody, shape, static.friction, solref)
         geom.name = static_geom(static.name, index)
         geom.set_frame(frame)
-        if not static.solid:
-            geom.contype = geom.conaffinity = 0
-            geom.group = GROUP_PAINT
 
 
 def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> None:
@@ -135,7 +133,7 @@ def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> Non
     )
     body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED
     body.add_freejoint(name=goods.name)
-    volumes = [volume(shape) for shape in goods.shapes]
+    volumes = [volume(shape) * shape.solid for shape in goods.shapes]
     for index, (shape, part) in enumerate(zip(goods.shapes, volumes, strict=True)):
         geom = _add_geom(body, shape, goods.friction, solref)
         geom.name = static_geom(goods.name, index)
@@ -144,6 +142,7 @@ def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> Non
 
 def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[float]) -> mujoco.MjsGeom:
     kind, size = _primitive(shape)
+    touch = int(shape.solid)
     return body.add_geom(
         type=kind,
         size=size,
@@ -152,7 +151,9 @@ def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[
         rgba=shape.rgba,
         friction=[friction, 0.005, 0.0001],
         solref=solref,
-        group=GROUP_SOLID,
+        contype=touch,
+        conaffinity=touch,
+        group=GROUP_SOLID if shape.solid else GROUP_PAINT,
     )
 
 
@@ -172,8 +173,8 @@ def volume(shape: Shape) -> float:
     """Return the volume of a shape [m³]."""
     geometry = shape.geometry
     if isinstance(geometry, Box):
-        return geometry.size[0] * geometry.size[1] * geometry.size[2]
-    disc = 3.141592653589793 * geometry.radius**2
+        return math.prod(geometry.size)
+    disc = math.pi * geometry.radius**2
     if isinstance(geometry, Cylinder):
         return disc * geometry.length
     ball = disc * geometry.radius * 4.0 / 3.0

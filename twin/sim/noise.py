@@ -12,7 +12,7 @@ _NORMAL, _UNIFORM = 0, 1
 
 
 class NoiseStream:
-    """A counter-based stream (Philox 4x64, Salmon et al. 2011): the key is seed and name, the counter is the tick.
+    """A counter-based stream (Philox 4x64, Salmon et al. 2011): key from seed and name, counter from tick.
 
     The numbers of a tick do not depend on how often, or whether, other ticks were drawn, nor on other
     streams: adding a sensor changes no other sensor's noise.
@@ -38,6 +38,6 @@ class NoiseStream:
         return self._generator.random(n)
 
     def _seek(self, tick: int, kind: int) -> None:
-        # The lowest word counts the blocks within a tick. A prepared state is 8x cheaper than a new generator.
+        # The lowest word counts blocks within a tick. A prepared state is 8x cheaper than a new generator.
         self._counter[:] = (0, tick, kind, 0)
         self._bits.state = self._start

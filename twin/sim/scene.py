@@ -17,6 +17,8 @@ class Shape:
     geometry: Box | Cylinder | Sphere | Capsule
     T_body_geometry: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
+    solid: bool = True
+    """False for paint: seen, but without mass, never touched and not hit by rays."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +30,6 @@ class StaticBody:
     shapes: tuple[Shape, ...]
     friction: float = 0.8
     """Coulomb coefficient."""
-    solid: bool = True
-    """False for paint on the floor: seen, but never touched nor hit by rays."""
 
 
 @dataclass(frozen=True, kw_only=True)

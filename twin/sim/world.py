@@ -190,11 +190,11 @@ class World:
         """Return for each geom the name of its body or static, and its robot (-1: none, -2: the floor)."""
         model = self.model
         owners = [model.body(body).name for body in model.geom_bodyid]
+        robot_of = {placement.name: i for i, placement in enumerate(self._placements)}
+        robots = [robot_of.get(body.partition("/")[0], -1) if "/" in body else -1 for body in owners]
         for static in self.scene.statics:
             for index in range(len(static.shapes)):
                 owners[model.geom(static_geom(static.name, index)).id] = static.name
-        robot_of = {placement.name: i for i, placement in enumerate(self._placements)}
-        robots = [robot_of.get(owner.partition("/")[0], -1) if "/" in owner else -1 for owner in owners]
         robots[model.geom(FLOOR).id] = -2
         return owners, robots
 

@@ -16,7 +16,7 @@ _BODY = mujoco.mjtObj.mjOBJ_XBODY
 
 @dataclass(frozen=True, kw_only=True)
 class ImuReading:
-    """One reading in the frame of the link; orientation is not measured (`orientation_covariance[0]` = -1)."""
+    """One reading in the frame of the link; orientation is not measured."""
 
     time_ns: int
     angular_velocity: Array

@@ -67,6 +67,6 @@ class Mount:
         valid = " or ".join(f"{1e9 / (n * step):.6g} Hz" for n in (below + 1, below))
         message = (
             f"sensor '{spec.name}' of robot '{self.robot}' samples every {period / 1e6:g} ms, not a whole "
-            f"multiple of the physics step of {step / 1e6:g} ms; valid near its rate of {spec.rate_hz:g} Hz: {valid}"
+            f"multiple of the physics step of {step / 1e6:g} ms; valid near {spec.rate_hz:g} Hz: {valid}"
         )
         raise ModelError(Problem(message, self.source, spec.line or None))

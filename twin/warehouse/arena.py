@@ -1,0 +1,192 @@
+"""An arena: a hall with racks, goods and zones, from YAML to a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TypeVar
+
+from twin import strict_yaml
+from twin.errors import ScenarioError, nearest
+from twin.geometry import Pose2
+from twin.sim.scene import Scene, StaticBody
+from twin.warehouse.arena_file import ArenaFile, TableEntry, slot_count
+from twin.warehouse.arena_scene import PALETTE, goods, structure
+from twin.warehouse.footprint import Rectangle
+from twin.warehouse.shelf import Shelf, Slot, Tote, Zone
+
+T = TypeVar("T")
+
+_ARENAS = Path(__file__).parent / "arenas"
+
+TOTE_JITTER = (0.015, 0.03)
+"""Largest error of a tote's placement along x and y [m] and in yaw [rad]."""
+
+
+def catalogue() -> Mapping[str, Path]:
+    """Return the arenas that come with twin, by name."""
+    return {path.stem: path for path in sorted(_ARENAS.glob("*.yaml"))}
+
+
+def load(name_or_path: str | Path) -> Arena:
+    """Read an arena.
+
+    Args:
+        name_or_path: A name of `catalogue()`, or a file.
+
+    Raises:
+        ScenarioError: With every problem of the file, each with its line.
+    """
+    known = catalogue()
+    path = known.get(str(name_or_path), Path(name_or_path))
+    if not path.is_file():
+        raise ScenarioError(
+            f"no arena '{name_or_path}': neither a file nor known; {nearest(str(name_or_path), known)}"
+        )
+    return Arena(strict_yaml.load(path, ArenaFile, error=ScenarioError))
+
+
+class Arena:
+    """A hall, its racks with slots, its named totes, its zones; all poses are in the map frame."""
+
+    def __init__(self, file: ArenaFile) -> None:
+        self.file = file
+        self.name = file.name
+        racks = {
+            name: Shelf(
+                name=name,
+                pose=Pose2(*rack.pose),
+                depth=rack.depth,
+                length=rack.length,
+                levels=rack.levels,
+                slot_spacing=rack.slot_spacing,
+                slots_per_level=slot_count(rack.length, rack.slot_spacing),
+            )
+            for name, rack in file.racks.items()
+        }
+        self.racks: Mapping[str, Shelf] = MappingProxyType(racks)
+        self.totes: Mapping[str, Tote] = MappingProxyType({name: self._tote(name) for name in file.totes})
+        self.zones: Mapping[str, Zone] = MappingProxyType({name: self._zone(name) for name in file.zones})
+        self.poses: Mapping[str, Pose2] = MappingProxyType({n: Pose2(*p) for n, p in file.poses.items()})
+
+    @property
+    def hall(self) -> Rectangle:
+        """The floor between the outer walls."""
+        return self.file.hall.rectangle
+
+    def tote(self, name: str) -> Tote:
+        """Return a named tote at its nominal pose.
+
+        Raises:
+            ScenarioError: No such tote.
+        """
+        return self._find("tote", name, self.totes)
+
+    def slot(self, name: str) -> Slot:
+        """Return a slot by its name `<rack or zone>/<level>/<index>`.
+
+        Raises:
+            ScenarioError: No such slot.
+        """
+        return self._find("slot", name, self._slots)
+
+    def zone(self, name: str) -> Zone:
+        """Return a zone.
+
+        Raises:
+            ScenarioError: No such zone.
+        """
+        return self._find("zone", name, self.zones)
+
+    def pose(self, name: str) -> Pose2:
+        """Return a named pose.
+
+        Raises:
+            ScenarioError: No such pose.
+        """
+        return self._find("pose", name, self.poses)
+
+    def scene(
+        self,
+        free_totes: Collection[str] = (),
+        *,
+        seed: int = 0,
+        obstacles: Sequence[StaticBody] = (),
+        tote_jitter: tuple[float, float] = TOTE_JITTER,
+    ) -> Scene:
+        """Return the arena as a scene.
+
+        Args:
+            free_totes: Named totes that a robot can grasp; the others are scenery of the same look.
+            seed: Of the totes' placement errors and of which other slots are filled.
+            obstacles: More things, unknown to the map.
+            tote_jitter: Largest placement error along x and y [m] and in yaw [rad]; every tote keeps its own.
+
+        Raises:
+            ScenarioError: A free tote is unknown.
+        """
+        for name in free_totes:
+            self.tote(name)
+        stock, free = goods(self, frozenset(free_totes), seed, tote_jitter)
+        x, y = self.file.hall.x, self.file.hall.y
+        return Scene(
+            name=self.name,
+            floor_size=(2.0 * max(map(abs, x)) + 4.0, 2.0 * max(map(abs, y)) + 4.0),
+            statics=(*self.structure, *stock, *obstacles),
+            goods=free,
+        )
+
+    @cached_property
+    def structure(self) -> tuple[StaticBody, ...]:
+        """Everything that is the same in each run: walls, racks, pallets, tables, paint; not the totes."""
+        return tuple(structure(self))
+
+    # -- from the file ---------------------------------------------------------------------------------------
+
+    def _tote(self, name: str) -> Tote:
+        entry, kind = self.file.totes[name], self.file.tote
+        slot = self.racks[entry.rack].slot(entry.level, entry.slot)
+        return Tote(
+            name=name,
+            slot=slot,
+            T_map_tote=slot.standing(kind.depth, kind.height, kind.inset),
+            size=(kind.depth, kind.width, kind.height),
+            mass=kind.mass,
+            friction=kind.friction,
+            rgba=PALETTE[entry.colour],
+        )
+
+    def _zone(self, name: str) -> Zone:
+        entry = self.file.zones[name]
+        pose = Pose2(*entry.pose)
+        return Zone(
+            name=name,
+            pose=pose,
+            area=Rectangle(pose, *entry.size),
+            rgba=PALETTE[entry.colour],
+            table=None if entry.table is None else _table(name, entry.table),
+        )
+
+    @cached_property
+    def _slots(self) -> dict[str, Slot]:
+        tables = [zone.table for zone in self.zones.values() if zone.table is not None]
+        return {slot.name: slot for shelf in (*self.racks.values(), *tables) for slot in shelf.slots()}
+
+    def _find(self, kind: str, name: str, known: Mapping[str, T]) -> T:
+        if name not in known:
+            raise ScenarioError(f"arena '{self.name}' has no {kind} '{name}'; {nearest(name, known)}")
+        return known[name]
+
+
+def _table(zone: str, entry: TableEntry) -> Shelf:
+    return Shelf(
+        name=zone,
+        pose=Pose2(*entry.pose),
+        depth=entry.depth,
+        length=entry.length,
+        levels=(entry.height,),
+        slot_spacing=entry.slot_spacing,
+        slots_per_level=slot_count(entry.length, entry.slot_spacing),
+    )

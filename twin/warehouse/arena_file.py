@@ -1,0 +1,299 @@
+"""The arena file: a hall, its racks, goods and zones as YAML, and everything that can be wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from twin.errors import nearest
+from twin.geometry import Pose2
+from twin.strict_yaml import Fault, Faults, Kilograms, Metres, Radians, StrictModel
+from twin.warehouse.footprint import Rectangle, overlap
+
+Length = Annotated[Metres, Field(gt=0.0)]
+Point = tuple[Metres, Metres]
+PoseList = tuple[Metres, Metres, Radians]
+Interval = tuple[Metres, Metres]
+Colour = Literal["red", "yellow", "green", "blue", "orange", "grey", "white", "wood"]
+
+
+class Hall(StrictModel):
+    """The outer walls; coordinates are those of their inner faces, in the map frame."""
+
+    x: Interval
+    y: Interval
+    wall_height: Length = 1.0
+    wall_thickness: Length = 0.2
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Hall:
+        for axis, (low, high) in (("x", self.x), ("y", self.y)):
+            if low >= high:
+                raise Faults(
+                    [Fault((axis,), f"hall.{axis} must go from low to high, not {low:g} to {high:g}")]
+                )
+        return self
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """The floor."""
+        centre = Pose2((self.x[0] + self.x[1]) / 2.0, (self.y[0] + self.y[1]) / 2.0, 0.0)
+        return Rectangle(centre, self.x[1] - self.x[0], self.y[1] - self.y[0])
+
+
+class PartitionEntry(StrictModel):
+    """A straight inner wall between two points."""
+
+    start: Point
+    end: Point
+    height: Length = 1.0
+    thickness: Length = 0.1
+
+
+class PillarEntry(StrictModel):
+    """A rectangular pillar."""
+
+    pose: PoseList
+    size: tuple[Length, Length] = (0.4, 0.4)
+    height: Length = 2.0
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """What it covers of the floor."""
+        return Rectangle(Pose2(*self.pose), *self.size)
+
+
+class RackEntry(StrictModel):
+    """A rack with goods on levels; x of its pose points out of its front.
+
+    From the floor to the lowest level it is solid, so a lidar near the floor sees its outline.
+    """
+
+    pose: PoseList
+    length: Length
+    """Along y of the pose."""
+    depth: Length
+    """Along x of the pose."""
+    levels: Annotated[tuple[Length, ...], Field(min_length=1)]
+    """Heights of the surfaces."""
+    slot_spacing: Length = 0.6
+    bay: Length = 3.0
+    """Distance of the uprights."""
+    headroom: Length = 0.35
+    """Height of the uprights above the highest surface."""
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """What it covers of the floor."""
+        return Rectangle(Pose2(*self.pose), self.depth, self.length)
+
+
+class PalletEntry(StrictModel):
+    """A EUR pallet (1.2 m × 0.8 m) with a load."""
+
+    pose: PoseList
+    load: Annotated[Metres, Field(ge=0.1)] = 0.7
+    """Height of the load above the deck; without one a lidar near the floor would not see the pallet."""
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """What it covers of the floor."""
+        return Rectangle(Pose2(*self.pose), 1.2, 0.8)
+
+
+class ObstacleEntry(StrictModel):
+    """A box that always stands there, and is on the map."""
+
+    pose: PoseList
+    size: tuple[Length, Length, Length]
+    colour: Colour = "grey"
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """What it covers of the floor."""
+        return Rectangle(Pose2(*self.pose), self.size[0], self.size[1])
+
+
+class ToteKind(StrictModel):
+    """What all totes have in common."""
+
+    depth: Length = 0.30
+    """Along the rack's depth."""
+    width: Length = 0.24
+    """Along the rack's length; the gripper closes on these two sides."""
+    height: Length = 0.18
+    mass: Annotated[Kilograms, Field(gt=0.0)] = 2.5
+    friction: Annotated[float, Field(gt=0.0)] = 0.6
+    inset: Annotated[Metres, Field(ge=0.0)] = 0.05
+    """From the front edge of the surface to the tote's front face."""
+
+
+class ToteEntry(StrictModel):
+    """A tote that a mission can name."""
+
+    rack: str
+    level: int
+    """0 is the lowest."""
+    slot: int
+    """0 is the leftmost, seen from the front."""
+    colour: Colour = "red"
+
+
+class Stock(StrictModel):
+    """Scenery totes in the other slots."""
+
+    fill: Annotated[float, Field(ge=0.0, le=1.0)] = 0.75
+    """Fraction of the other slots."""
+
+
+class TableEntry(StrictModel):
+    """A solid table onto which totes are set; x of its pose points to where a robot stands."""
+
+    pose: PoseList
+    length: Length = 1.6
+    """Along y of the pose."""
+    depth: Length = 0.6
+    """Along x of the pose."""
+    height: Length = 0.4
+    slot_spacing: Length = 0.5
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """What it covers of the floor."""
+        return Rectangle(Pose2(*self.pose), self.depth, self.length)
+
+
+class ZoneEntry(StrictModel):
+    """A rectangle painted on the floor."""
+
+    pose: PoseList
+    """Its centre, and how a robot should stand there."""
+    size: tuple[Length, Length]
+    """Along x and y of the pose."""
+    colour: Colour = "yellow"
+    table: TableEntry | None = None
+
+
+class ArenaFile(StrictModel):
+    """An arena, in metres and radians in the map frame; a pose is a list of x, y, yaw."""
+
+    name: str
+    hall: Hall
+    partitions: dict[str, PartitionEntry] = Field(default_factory=dict)
+    pillars: dict[str, PillarEntry] = Field(default_factory=dict)
+    racks: dict[str, RackEntry] = Field(default_factory=dict)
+    pallets: dict[str, PalletEntry] = Field(default_factory=dict)
+    obstacles: dict[str, ObstacleEntry] = Field(default_factory=dict)
+    tote: ToteKind = ToteKind()
+    totes: dict[str, ToteEntry] = Field(default_factory=dict)
+    stock: Stock | None = None
+    zones: dict[str, ZoneEntry] = Field(default_factory=dict)
+    poses: dict[str, PoseList] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ArenaFile:
+        faults = [*_names(self), *_racks(self), *_totes(self), *_places(self), *_overlaps(self)]
+        if faults:
+            raise Faults(faults)
+        return self
+
+
+def slot_count(length: float, spacing: float) -> int:
+    """Return how many slots of `spacing` fit into `length`."""
+    return int(length / spacing + 1e-9)
+
+
+_SECTIONS = ("partitions", "pillars", "racks", "pallets", "obstacles", "totes", "zones")
+
+
+def _names(arena: ArenaFile) -> Iterator[Fault]:
+    """Every thing needs its own name: the physics and the recording know things by name only."""
+    seen = {"floor": "every arena", "walls": "every arena"}
+    for section in _SECTIONS:
+        for name in getattr(arena, section):
+            if "/" in name or "#" in name:
+                yield Fault((section, name), f"the name '{name}' must not contain '/' or '#'")
+            if name in seen:
+                yield Fault(
+                    (section, name), f"the name '{name}' is already taken in {seen[name]}; choose another"
+                )
+            seen.setdefault(name, section)
+
+
+def _racks(arena: ArenaFile) -> Iterator[Fault]:
+    tote = arena.tote
+    for name, rack in arena.racks.items():
+        levels = rack.levels
+        if any(low >= high for low, high in pairwise(levels)):
+            yield Fault(("racks", name, "levels"), f"levels of rack '{name}' must rise, not {list(levels)}")
+        elif any(high - low < tote.height + 0.1 for low, high in pairwise(levels)):
+            text = f"levels of rack '{name}' must be {tote.height + 0.1:g} m apart or more to lift a tote out"
+            yield Fault(("racks", name, "levels"), text)
+        if tote.width > rack.slot_spacing:
+            text = f"a tote is {tote.width:g} m wide and a slot of rack '{name}' {rack.slot_spacing:g} m; "
+            yield Fault(
+                ("racks", name, "slot_spacing"), f"{text}slot_spacing must be at least {tote.width:g}"
+            )
+        if tote.inset + tote.depth > rack.depth:
+            text = (
+                f"a tote needs {tote.inset + tote.depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
+            )
+            yield Fault(("racks", name, "depth"), text)
+
+
+def _totes(arena: ArenaFile) -> Iterator[Fault]:
+    taken: dict[tuple[str, int, int], str] = {}
+    for name, tote in arena.totes.items():
+        rack = arena.racks.get(tote.rack)
+        if rack is None:
+            hint = nearest(tote.rack, arena.racks)
+            yield Fault(("totes", name, "rack"), f"tote '{name}': unknown rack '{tote.rack}'; {hint}")
+            continue
+        place = (tote.rack, tote.level, tote.slot)
+        counts = {"level": len(rack.levels), "slot": slot_count(rack.length, rack.slot_spacing)}
+        for key, index, count in zip(counts, place[1:], counts.values(), strict=True):
+            if not 0 <= index < count:
+                text = f"tote '{name}': rack '{tote.rack}' has no {key} {index}; valid: 0 to {count - 1}"
+                yield Fault(("totes", name, key), text)
+        if place in taken:
+            text = f"tote '{name}' stands where tote '{taken[place]}' is; choose another slot"
+            yield Fault(("totes", name, "slot"), text)
+        taken.setdefault(place, name)
+
+
+def _solids(arena: ArenaFile) -> Iterator[tuple[tuple[str, ...], str, Rectangle]]:
+    for section in ("pillars", "racks", "pallets", "obstacles"):
+        for name, entry in getattr(arena, section).items():
+            yield (section, name), f"{section[:-1]} '{name}'", entry.rectangle
+    for name, zone in arena.zones.items():
+        if zone.table is not None:
+            yield ("zones", name, "table"), f"table of zone '{name}'", zone.table.rectangle
+
+
+def _places(arena: ArenaFile) -> Iterator[Fault]:
+    """Everything is in the hall, and nobody is told to stand inside something."""
+    hall = arena.hall.rectangle
+    extent = f"x {arena.hall.x[0]:g} to {arena.hall.x[1]:g}, y {arena.hall.y[0]:g} to {arena.hall.y[1]:g}"
+    for loc, what, rectangle in _solids(arena):
+        if not hall.contains(rectangle.corners):
+            yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
+    stands: list[tuple[tuple[str, ...], str, PoseList]]
+    stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
+    stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]
+    for loc, what, pose in stands:
+        if not hall.contains([pose[:2]]):
+            yield Fault(loc, f"{what} is outside of the hall ({extent})")
+        for _, solid, rectangle in _solids(arena):
+            if rectangle.contains([pose[:2]]):
+                yield Fault(loc, f"{what} is inside {solid}; move one of them")
+
+
+def _overlaps(arena: ArenaFile) -> Iterator[Fault]:
+    solids = list(_solids(arena))
+    for index, (loc, what, rectangle) in enumerate(solids):
+        for _, other, before in solids[:index]:
+            if overlap(rectangle, before):
+                yield Fault((*loc, "pose"), f"{what} overlaps {other}; move one of them")

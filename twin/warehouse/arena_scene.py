@@ -1,0 +1,217 @@
+"""The shapes of an arena: walls, racks, pallets, tables, totes, paint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from twin.geometry import Pose2, Pose3
+from twin.models.description import Box
+from twin.sim.noise import NoiseStream
+from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
+from twin.warehouse.arena_file import PartitionEntry, RackEntry
+
+if TYPE_CHECKING:
+    from twin.warehouse.arena import Arena
+    from twin.warehouse.shelf import Zone
+
+PALETTE: MappingProxyType[str, Rgba] = MappingProxyType(
+    {
+        "red": (0.78, 0.16, 0.14, 1.0),
+        "yellow": (0.95, 0.76, 0.12, 1.0),
+        "green": (0.22, 0.62, 0.28, 1.0),
+        "blue": (0.13, 0.37, 0.66, 1.0),
+        "orange": (0.93, 0.46, 0.10, 1.0),
+        "grey": (0.55, 0.57, 0.60, 1.0),
+        "white": (0.93, 0.94, 0.95, 1.0),
+        "wood": (0.76, 0.60, 0.42, 1.0),
+    }
+)
+_WALL: Rgba = (0.86, 0.87, 0.88, 1.0)
+_PARTITION: Rgba = (0.72, 0.80, 0.84, 1.0)
+_PLINTH: Rgba = (0.30, 0.33, 0.37, 1.0)
+_BOARD: Rgba = (0.80, 0.81, 0.80, 1.0)
+_CARDBOARD: Rgba = (0.72, 0.56, 0.38, 1.0)
+_STOCK: tuple[Rgba, ...] = (
+    (0.40, 0.50, 0.60, 1.0),
+    (0.47, 0.55, 0.62, 1.0),
+    (0.70, 0.55, 0.38, 1.0),
+    (0.63, 0.64, 0.63, 1.0),
+)
+_BOARD_THICKNESS = 0.03
+_UPRIGHT = 0.05
+_PAINT = 0.002
+"""Paint stands proud of what it is on by this much, or a renderer could not tell which is in front [m]."""
+_STRIPE = 0.06
+_DECK = 0.144
+"""Height of a EUR pallet [m]."""
+
+
+def structure(arena: Arena) -> Iterator[StaticBody]:
+    """Yield all that is not a tote."""
+    file = arena.file
+    yield _walls(arena)
+    for name, partition in file.partitions.items():
+        yield _partition(name, partition)
+    for name, pillar in file.pillars.items():
+        yield _block(name, Pose2(*pillar.pose), (*pillar.size, pillar.height), PALETTE["white"])
+    for name, rack in file.racks.items():
+        yield _rack(name, rack)
+    for name, pallet in file.pallets.items():
+        shapes = (
+            box((1.2, 0.8, _DECK), (0.0, 0.0, _DECK / 2.0), PALETTE["wood"]),
+            box((1.1, 0.74, pallet.load), (0.0, 0.0, _DECK + pallet.load / 2.0), _CARDBOARD),
+            box((1.1 + 2 * _PAINT, 0.08, pallet.load + _PAINT), (0.0, 0.0, _DECK + pallet.load / 2.0),
+                (0.62, 0.47, 0.31, 1.0), solid=False),
+        )  # fmt: skip
+        yield StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*pallet.pose)), shapes=shapes)
+    for name, obstacle in file.obstacles.items():
+        yield _block(name, Pose2(*obstacle.pose), obstacle.size, PALETTE[obstacle.colour])
+    for zone in arena.zones.values():
+        yield from _zone(zone)
+
+
+def goods(
+    arena: Arena, free: Collection[str], seed: int, jitter: tuple[float, float]
+) -> tuple[list[StaticBody], tuple[FreeBody, ...]]:
+    """Return stock and named totes that cannot be grasped, and those that can."""
+    statics: list[StaticBody] = []
+    frees: list[FreeBody] = []
+    for tote in arena.totes.values():
+        pose = tote.T_map_tote @ _placement_error(seed, tote.name, jitter)
+        shapes = _tote_shapes(tote.size, tote.rgba)
+        if tote.name in free:
+            frees.append(
+                FreeBody(
+                    name=tote.name, T_world_body=pose, shapes=shapes, mass=tote.mass, friction=tote.friction
+                )
+            )
+        else:
+            statics.append(StaticBody(name=tote.name, T_world_body=pose, shapes=shapes))
+    return [*statics, *_stock(arena, seed, jitter)], tuple(frees)
+
+
+def _stock(arena: Arena, seed: int, jitter: tuple[float, float]) -> Iterator[StaticBody]:
+    file, kind = arena.file, arena.file.tote
+    taken = {tote.slot.name for tote in arena.totes.values()}
+    for rack in arena.racks.values():
+        for slot in rack.slots():
+            chance, colour = NoiseStream(seed, f"stock/{slot.name}").uniform(0, 2)
+            if file.stock is None or slot.name in taken or chance >= file.stock.fill:
+                continue
+            pose = slot.standing(kind.depth, kind.height, kind.inset)
+            yield StaticBody(
+                name=f"stock/{slot.name}",
+                T_world_body=pose @ _placement_error(seed, slot.name, jitter),
+                shapes=_tote_shapes((kind.depth, kind.width, kind.height), _STOCK[int(colour * len(_STOCK))]),
+            )
+
+
+def _placement_error(seed: int, name: str, jitter: tuple[float, float]) -> Pose3:
+    """Return a tote's own error; it does not depend on other totes, nor on whether this one is free."""
+    x, y, yaw = NoiseStream(seed, f"placement/{name}").uniform(0, 3) * 2.0 - 1.0
+    return Pose3.from_pose2(Pose2(x * jitter[0], y * jitter[0], yaw * jitter[1]))
+
+
+def box(
+    size: tuple[float, float, float], xyz: tuple[float, float, float], rgba: Rgba, *, solid: bool = True
+) -> Shape:
+    """Return a box with its centre at `xyz` of its body [m]."""
+    return Shape(geometry=Box(size=size), T_body_geometry=Pose3.from_xyz_rpy(xyz), rgba=rgba, solid=solid)
+
+
+def _block(name: str, pose: Pose2, size: tuple[float, float, float], rgba: Rgba) -> StaticBody:
+    return StaticBody(
+        name=name, T_world_body=Pose3.from_pose2(pose), shapes=(box(size, (0.0, 0.0, size[2] / 2.0), rgba),)
+    )
+
+
+def _walls(arena: Arena) -> StaticBody:
+    hall = arena.file.hall
+    (x0, x1), (y0, y1), t, h = hall.x, hall.y, hall.wall_thickness, hall.wall_height
+    cx, cy, z = (x0 + x1) / 2.0, (y0 + y1) / 2.0, h / 2.0
+    along_x, along_y = (x1 - x0 + 2.0 * t, t, h), (t, y1 - y0, h)
+    shapes = (
+        box(along_x, (cx, y0 - t / 2.0, z), _WALL),
+        box(along_x, (cx, y1 + t / 2.0, z), _WALL),
+        box(along_y, (x0 - t / 2.0, cy, z), _WALL),
+        box(along_y, (x1 + t / 2.0, cy, z), _WALL),
+    )
+    return StaticBody(name="walls", T_world_body=Pose3.from_xyz_rpy(), shapes=shapes)
+
+
+def _partition(name: str, entry: PartitionEntry) -> StaticBody:
+    (x0, y0), (x1, y1) = entry.start, entry.end
+    pose = Pose2((x0 + x1) / 2.0, (y0 + y1) / 2.0, math.atan2(y1 - y0, x1 - x0))
+    size = (math.hypot(x1 - x0, y1 - y0), entry.thickness, entry.height)
+    return _block(name, pose, size, _PARTITION)
+
+
+def _rack(name: str, rack: RackEntry) -> StaticBody:
+    """Plinth up to the lowest level, a board for each other level, uprights, painted beams."""
+    depth, length = rack.depth, rack.length
+    lowest, top = rack.levels[0], rack.levels[-1] + rack.headroom
+    shapes = [box((depth, length, lowest), (0.0, 0.0, lowest / 2.0), _PLINTH)]
+    for level in rack.levels[1:]:
+        z = level - _BOARD_THICKNESS / 2.0
+        shapes.append(box((depth, length, _BOARD_THICKNESS), (0.0, 0.0, z), _BOARD))
+    for level in rack.levels:
+        beam = (depth + 2.0 * _PAINT, length - 2.0 * _UPRIGHT, 0.055)
+        shapes.append(box(beam, (0.0, 0.0, level - 0.0275 - _PAINT), PALETTE["orange"], solid=False))
+    bays = max(1, round(length / rack.bay))
+    edge = (length - _UPRIGHT) / 2.0
+    for y in np.linspace(-edge, edge, bays + 1):
+        # Front and back; the end ones stand within the rack's length.
+        shapes += [
+            box(
+                (_UPRIGHT, _UPRIGHT, top),
+                (side * (depth - _UPRIGHT) / 2.0, float(y), top / 2.0),
+                PALETTE["blue"],
+            )
+            for side in (-1.0, 1.0)
+        ]
+    return StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*rack.pose)), shapes=tuple(shapes))
+
+
+def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, ...]:
+    """One solid box, because a grasp needs nothing else; a dark opening, a rim and a label are paint."""
+    depth, width, height = size
+    light, dark = _mixed(rgba, 1.0, 0.35), _mixed(rgba, 0.0, 0.55)
+    p = 2.0 * _PAINT
+    return (
+        box(size, (0.0, 0.0, 0.0), rgba),
+        box((depth + p, width + p, 0.022), (0.0, 0.0, height / 2.0 - 0.011), light, solid=False),
+        box((depth - 0.03, width - 0.03, p), (0.0, 0.0, height / 2.0), dark, solid=False),
+        box((p, 0.10, 0.06), (depth / 2.0, 0.0, -0.015), PALETTE["white"], solid=False),
+    )
+
+
+def _mixed(rgba: Rgba, grey: float, part: float) -> Rgba:
+    r, g, b, a = rgba
+    return r + (grey - r) * part, g + (grey - g) * part, b + (grey - b) * part, a
+
+
+def _zone(zone: Zone) -> Iterator[StaticBody]:
+    x, y, s = zone.area.size_x, zone.area.size_y, _STRIPE
+    rgba = zone.rgba
+    stripes = (
+        box((x, s, _PAINT), (0.0, (s - y) / 2.0, _PAINT / 2.0), rgba, solid=False),
+        box((x, s, _PAINT), (0.0, (y - s) / 2.0, _PAINT / 2.0), rgba, solid=False),
+        box((s, y - 2.0 * s, _PAINT), ((s - x) / 2.0, 0.0, _PAINT / 2.0), rgba, solid=False),
+        box((s, y - 2.0 * s, _PAINT), ((x - s) / 2.0, 0.0, _PAINT / 2.0), rgba, solid=False),
+    )
+    yield StaticBody(
+        name=f"{zone.name}_marking", T_world_body=Pose3.from_pose2(zone.area.centre), shapes=stripes
+    )
+    if zone.table is not None:
+        table, height = zone.table, zone.table.levels[0]
+        shapes = (
+            box((table.depth, table.length, height), (0.0, 0.0, height / 2.0), PALETTE["grey"]),
+            box((table.depth + 2.0 * _PAINT, table.length + 2.0 * _PAINT, 0.05),
+                (0.0, 0.0, height - 0.025 - _PAINT), rgba, solid=False),
+        )  # fmt: skip
+        yield StaticBody(name=f"{zone.name}_table", T_world_body=Pose3.from_pose2(table.pose), shapes=shapes)
