@@ -23,7 +23,7 @@ def search(
 ) -> bool:
     """Expand from `start` until `goal` is closed (True) or nothing is left (False).
 
-    The length of an edge is the distance of the two centres [cells] times the mean of their factors, all >= 1,
+    An edge is as long as the distance of the two centres [cells] times the mean of their factors, all >= 1,
     so the octile distance never overestimates. A diagonal step needs both cells beside it to be passable.
 
     Args:

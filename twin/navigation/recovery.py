@@ -64,6 +64,8 @@ class _Behavior:
     def __post_init__(self) -> None:
         self._footprint: Array = np.array(self.config.footprint, dtype=np.float64)
         self._elapsed = 0.0
+        self._turned = 0.0
+        self._last_yaw = 0.0
         self._start: Pose2 | None = None
         self._speed = 0.0
 
@@ -74,7 +76,7 @@ class _Behavior:
     def _ramp(
         self, remaining: float, accel: float, decel: float, least: float, most: float, dt: float
     ) -> float:
-        """Return the speed after one period: limited by acceleration, by `most`, and by being able to stop."""
+        """Return the next speed: limited by acceleration, by `most`, and by being able to stop."""
         self._speed = min(self._speed + accel * dt, most, math.sqrt(2.0 * decel * max(remaining, 0.0)))
         self._speed = max(self._speed, min(least, most))
         return min(self._speed, remaining / dt) if dt > 0.0 else self._speed
@@ -112,9 +114,8 @@ class Spin(_Behavior):
     def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
         """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
         if self._start is None:
-            self._start, self._turned = pose, 0.0
-        else:
-            self._turned += wrap_angle(pose.yaw - self._last_yaw)
+            self._start, self._last_yaw = pose, pose.yaw
+        self._turned += wrap_angle(pose.yaw - self._last_yaw)
         self._last_yaw = pose.yaw
         direction = math.copysign(1.0, self.target_yaw)
         remaining = abs(self.target_yaw) - direction * self._turned

@@ -99,16 +99,24 @@ class RegulatedPurePursuit:
         self.desired_linear_vel = maximum if limit is None else min(limit, maximum)
 
     def compute_velocity(
-        self, pose: Pose2, velocity: tuple[float, float], path: Array, costmap: Costmap | None, dt: float
+        self,
+        pose: Pose2,
+        velocity: tuple[float, float],
+        path: Array,
+        costmap: Costmap | None,
+        dt: float,
+        *,
+        costmap_pose: Pose2 | None = None,
     ) -> tuple[float, float]:
         """Return the command (v [m/s], w [rad/s]).
 
         Args:
-            pose: Of the base, in the frame of path and costmap.
+            pose: Of the base, in the path's frame.
             velocity: The present (v, w).
             path: Shape (n, 3): x, y, yaw.
             costmap: For slowing down near obstacles and for collision checks; None switches both off.
             dt: Control period [s].
+            costmap_pose: Of the base in the costmap's frame; None where that is the path's frame too.
 
         Raises:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
@@ -127,10 +135,10 @@ class RegulatedPurePursuit:
             v, w = 0.0, self._rotate(bearing, velocity[1], dt)
         else:
             curvature = 2.0 * y / distance**2 if distance**2 > 0.001 else 0.0
-            v = self._regulate(curvature, pose, local, costmap)
+            v = self._regulate(curvature, costmap_pose or pose, local, costmap)
             w = v * curvature
         if costmap is not None and config.use_collision_detection:
-            self._check(pose, v, w, distance, costmap)
+            self._check(costmap_pose or pose, v, w, distance, costmap)
         return v, w
 
     def _accept(self, path: Array) -> None:
