@@ -1,1 +1,7 @@
+"""From a `RobotDescription` to a MuJoCo model, with a ledger of what became of every element."""
 
+from twin.convert.bodies import Base
+from twin.convert.conversion import Conversion, LedgerEntry, Outcome
+from twin.convert.convert import convert
+
+__all__ = ["Base", "Conversion", "LedgerEntry", "Outcome", "convert"]

@@ -1,0 +1,61 @@
+"""Which links may touch each other, and how high the robot stands."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import mujoco
+import numpy as np
+
+from twin.convert.bodies import rigid_groups
+from twin.convert.geoms import GROUP_COLLISION
+from twin.models.description import RobotDescription
+
+_TYPE = mujoco.mjtGeom
+
+
+def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
+    """Exclude contacts between rigid groups that a joint connects.
+
+    MuJoCo has such a filter itself, but not towards a group that is welded to the world.
+    """
+    heads = rigid_groups(description)
+    solid: dict[str, list[str]] = {head: [] for head in heads.values()}
+    for name, link in description.links.items():
+        if link.collisions:
+            solid[heads[name]].append(name)
+    for joint in description.joints.values():
+        if joint.type == "fixed":
+            continue
+        for parent, child in product(solid[heads[joint.parent]], solid[heads[joint.child]]):
+            spec.add_exclude(name=f"{parent}~{child}", bodyname1=parent, bodyname2=child)
+
+
+def spawn_height(model: mujoco.MjModel) -> float:
+    """Return how far the lowest collision point, all joints at zero, lies below the root link [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    lowest = [
+        data.geom_xpos[geom, 2] - _reach_down(model, geom, data.geom_xmat[geom].reshape(3, 3)[2])
+        for geom in range(model.ngeom)
+        if model.geom_group[geom] == GROUP_COLLISION
+    ]
+    return -float(min(lowest)) if lowest else 0.0
+
+
+def _reach_down(model: mujoco.MjModel, geom: int, down: np.ndarray) -> float:
+    """Return how far a shape reaches along `down`, a unit vector in its frame (either sign) [m]."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if kind == _TYPE.mjGEOM_BOX:
+        return float(np.abs(down) @ size)
+    if kind == _TYPE.mjGEOM_ELLIPSOID:
+        return float(np.linalg.norm(down * size))
+    if kind == _TYPE.mjGEOM_CYLINDER:
+        return float(np.hypot(down[0], down[1]) * size[0] + abs(down[2]) * size[1])
+    if kind == _TYPE.mjGEOM_CAPSULE:
+        return float(size[0] + abs(down[2]) * size[1])
+    if kind == _TYPE.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        return float(np.max(model.mesh_vert[start : start + count] @ -down))
+    return float(size[0])

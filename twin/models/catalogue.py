@@ -1,0 +1,38 @@
+"""The robots that ship with twin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from twin.errors import ModelError, nearest
+
+ROBOTS = Path(__file__).parent / "robots"
+"""A ROS package (`$(find twin_robots)`) with one folder per robot."""
+
+
+def catalogue() -> Mapping[str, Path]:
+    """Return the file of every robot that ships with twin, by name, in alphabetical order."""
+    return {path.parent.name: path for path in sorted(ROBOTS.glob("*/*.urdf.xacro")) if _is_robot(path)}
+
+
+def resolve(name_or_path: str | Path) -> Path:
+    """Return the model file that `name_or_path` means: a file, or a name of the catalogue.
+
+    Raises:
+        ModelError: Neither such a file nor such a robot exists.
+    """
+    text = str(name_or_path)
+    path = Path(text)
+    if path.is_file():
+        return path
+    robots = catalogue()
+    if text in robots:
+        return robots[text]
+    if isinstance(name_or_path, Path) or path.suffix in (".urdf", ".xacro", ".xml") or len(path.parts) > 1:
+        raise ModelError(f"no such model file: {text}")
+    raise ModelError(f"unknown robot '{text}': {nearest(text, robots)}, or the path of a URDF or xacro file")
+
+
+def _is_robot(path: Path) -> bool:
+    return path.name == f"{path.parent.name}.urdf.xacro"

@@ -1,0 +1,172 @@
+"""Reading XML elements strictly, collecting every problem instead of stopping at the first."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+from lxml import etree
+
+from twin.errors import ModelError, Problem
+
+Element = Any
+"""An lxml element; the library ships no types."""
+
+MAX_BYTES = 32 * 1024 * 1024
+
+
+@dataclass
+class Report:
+    """The problems of one file, in the order they were found."""
+
+    source: Path
+    with_lines: bool = True
+    """False for text that xacro wrote: its lines are not the user's."""
+    problems: list[Problem] = field(default_factory=list)
+
+    def add(self, element: Element | None, message: str) -> None:
+        """Note a problem of `element`."""
+        self.problems.append(Problem(message, self.source, self.line(element) or None))
+
+    def line(self, element: Element | None) -> int:
+        """Return the 1-based line of an element in the user's file, 0 where that is unknown."""
+        if element is None or not self.with_lines:
+            return 0
+        return int(element.sourceline or 0)
+
+    def raise_if_any(self) -> None:
+        """Raise ModelError with all problems found so far."""
+        if self.problems:
+            raise ModelError(self.problems)
+
+    def numbers(
+        self, element: Element, name: str, count: int, default: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        """Return `count` finite numbers; a wrong attribute is noted and becomes the default or zeros."""
+        fallback = default if default is not None else (0.0,) * count
+        text = element.get(name)
+        if text is None:
+            if default is None:
+                self.add(element, f"{describe(element)} has no {name}=; {_count(count)} needed")
+            return fallback
+        try:
+            values = tuple(float(word) for word in text.split())
+        except ValueError:
+            self.add(element, f"{describe(element)}: {name}='{text}' is not {_count(count)}")
+            return fallback
+        if len(values) != count:
+            self.add(element, f"{describe(element)}: {name}='{text}' has {len(values)} numbers, not {count}")
+            return fallback
+        if not all(map(math.isfinite, values)):
+            self.add(element, f"{describe(element)}: {name}='{text}' is not finite")
+            return fallback
+        return values
+
+    def number(self, element: Element, name: str, default: float | None = None) -> float:
+        """Return one finite number of an attribute."""
+        return self.numbers(element, name, 1, None if default is None else (default,))[0]
+
+    def optional_number(self, element: Element, name: str) -> float | None:
+        """Return one finite number of an attribute, or None without it."""
+        return None if element.get(name) is None else self.number(element, name, 0.0)
+
+    def child_number(self, element: Element, *names: str) -> float | None:
+        """Return the number in the first child of one of these names or paths, or None."""
+        child = first(element, *names)
+        if child is None:
+            return None
+        text = (child.text or "").strip()
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isfinite(value):
+            return value
+        self.add(child, f"{describe(element)}: <{child.tag}>{text}</{child.tag}> is not a finite number")
+        return None
+
+    def required(self, element: Element, name: str) -> str:
+        """Return a non-empty attribute; its absence is noted."""
+        text = (element.get(name) or "").strip()
+        if not text:
+            self.add(element, f"{describe(element)} has no {name}=")
+        return text
+
+
+def parse(text: bytes, report: Report) -> Element:
+    """Return the root element of a URDF text.
+
+    Raises:
+        ModelError: Not well-formed, too large, or with a DOCTYPE (entities can read files and exhaust memory,
+            and no robot needs them).
+    """
+    if len(text) > MAX_BYTES:
+        report.add(None, f"the file has {len(text)} bytes; at most {MAX_BYTES} are read")
+        report.raise_if_any()
+    _refuse_doctype(text, report)
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        line = error.lineno if report.with_lines else None
+        raise ModelError(Problem(f"not well-formed XML: {error.msg}", report.source, line)) from None
+    if root.tag != "robot":
+        report.add(root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>")
+        report.raise_if_any()
+    return root
+
+
+def first(element: Element, *names: str) -> Element | None:
+    """Return the first child found under one of these names or paths, tried in order."""
+    for name in names:
+        child = element.find(name)
+        if child is not None:
+            return child
+    return None
+
+
+def text_of(element: Element, *names: str) -> str | None:
+    """Return the stripped text of the first child of one of these names; None if absent or empty."""
+    child = first(element, *names)
+    return None if child is None else ((child.text or "").strip() or None)
+
+
+def describe(element: Element) -> str:
+    """Return how to call an element in a message: the tag, with the named element that it belongs to."""
+    name = element.get("name")
+    if name:
+        return f"{element.tag} '{name}'"
+    for parent in element.iterancestors():
+        if parent.tag in ("link", "joint", "gazebo", "sensor") and (
+            parent.get("name") or parent.get("reference")
+        ):
+            return f"<{element.tag}> of {parent.tag} '{parent.get('name') or parent.get('reference')}'"
+    return f"<{element.tag}>"
+
+
+def _refuse_doctype(text: bytes, report: Report) -> None:
+    # expat, not lxml: libxml2 expands internal entities inside attributes even with resolve_entities=False.
+    parser = expat.ParserCreate()
+
+    def refuse(*_: object) -> None:
+        line = parser.CurrentLineNumber if report.with_lines else None
+        raise ModelError(
+            Problem("the file has a DOCTYPE; remove it, a robot needs none", report.source, line)
+        )
+
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        line = error.lineno if report.with_lines else None
+        message = expat.ErrorString(error.code)
+        raise ModelError(Problem(f"not well-formed XML: {message}", report.source, line)) from None
+
+
+def _count(count: int) -> str:
+    return "a number" if count == 1 else f"{count} numbers"

@@ -1,0 +1,187 @@
+"""`<joint>` elements as data, and the checks that make them a tree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import get_args
+
+from twin.errors import nearest
+from twin.models.description import Joint, JointType, Limit, Link, Mimic
+from twin.models.document import Element, Report, describe
+from twin.models.links import read_origin
+
+JOINT_TYPES: tuple[str, ...] = get_args(JointType)
+BOUNDED = ("revolute", "prismatic")
+
+
+def read_joint(element: Element, report: Report) -> Joint:
+    """Return a `<joint>`; faults are noted in the report."""
+    name = report.required(element, "name")
+    kind = element.get("type", "")
+    if kind not in JOINT_TYPES:
+        report.add(element, f"joint '{name}' has type '{kind}'; {nearest(kind, JOINT_TYPES)}")
+        kind = "fixed"
+    dynamics = element.find("dynamics")
+    return Joint(
+        name=name,
+        type=kind,
+        parent=_link_of(element, "parent", report),
+        child=_link_of(element, "child", report),
+        T_parent_joint=read_origin(element, report),
+        axis=_read_axis(element, kind, report),
+        limit=_read_limit(element, kind, report),
+        damping=0.0 if dynamics is None else report.number(dynamics, "damping", 0.0),
+        friction=0.0 if dynamics is None else report.number(dynamics, "friction", 0.0),
+        mimic=_read_mimic(element, report),
+        line=report.line(element),
+    )
+
+
+def _link_of(element: Element, role: str, report: Report) -> str:
+    child = element.find(role)
+    if child is None:
+        report.add(element, f"{describe(element)} has no <{role} link='...'/>")
+        return ""
+    return report.required(child, "link")
+
+
+def _read_axis(element: Element, kind: str, report: Report) -> tuple[float, float, float]:
+    axis = element.find("axis")
+    if axis is None:
+        return (1.0, 0.0, 0.0)
+    known = len(report.problems)
+    x, y, z = report.numbers(axis, "xyz", 3)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-9:
+        if kind not in ("fixed", "floating") and len(report.problems) == known:
+            report.add(axis, f"{describe(element)} has a zero axis; give a direction such as xyz='0 0 1'")
+        return (1.0, 0.0, 0.0)
+    return (x / length, y / length, z / length)
+
+
+def _read_limit(element: Element, kind: str, report: Report) -> Limit:
+    limit = element.find("limit")
+    if limit is None:
+        if kind in BOUNDED:
+            needed = "<limit lower='' upper='' effort='' velocity=''/>"
+            report.add(element, f"{describe(element)} is {kind} and has no {needed}")
+        return Limit()
+    effort, velocity = report.optional_number(limit, "effort"), report.optional_number(limit, "velocity")
+    for what, value in (("effort", effort), ("velocity", velocity)):
+        if value is not None and value < 0.0:
+            report.add(limit, f"{describe(element)}: {what} limit {value:g} is negative")
+    if kind not in BOUNDED:
+        return Limit(effort=effort, velocity=velocity)
+    lower, upper = report.number(limit, "lower", 0.0), report.number(limit, "upper", 0.0)
+    if lower > upper:
+        report.add(limit, f"{describe(element)}: lower limit {lower:g} is above the upper limit {upper:g}")
+        lower, upper = upper, lower
+    return Limit(lower=lower, upper=upper, effort=effort, velocity=velocity)
+
+
+def _read_mimic(element: Element, report: Report) -> Mimic | None:
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    return Mimic(
+        joint=report.required(mimic, "joint"),
+        multiplier=report.number(mimic, "multiplier", 1.0),
+        offset=report.number(mimic, "offset", 0.0),
+    )
+
+
+def unique(
+    kind: str, items: Iterable[tuple[Element, Link | Joint]], report: Report
+) -> dict[str, Link | Joint]:
+    """Return the items by name in file order, noting names used twice."""
+    found: dict[str, Link | Joint] = {}
+    for element, item in items:
+        if not item.name:
+            continue
+        if item.name in found:
+            earlier = found[item.name].line
+            where = f" (first at line {earlier})" if earlier else ""
+            report.add(element, f"{kind} '{item.name}' is defined twice{where}; names are unique")
+            continue
+        found[item.name] = item
+    return found
+
+
+def check_tree(
+    links: Mapping[str, Link], joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report
+) -> str:
+    """Return the root link, noting everything that keeps links and joints from being one tree.
+
+    Args:
+        links: By name.
+        joints: By name.
+        elements: XML element of each joint, for messages.
+        report: Where problems go.
+    """
+    parent_joint: dict[str, Joint] = {}
+    for joint in joints.values():
+        element = elements[joint.name]
+        for role, name in (("parent", joint.parent), ("child", joint.child)):
+            if name and name not in links:
+                missing = f"{role} link '{name}' of joint '{joint.name}' does not exist"
+                report.add(element, f"{missing}; {nearest(name, links)}")
+        if joint.child in parent_joint:
+            other = parent_joint[joint.child].name
+            both = f"joints '{other}' and '{joint.name}'"
+            report.add(element, f"link '{joint.child}' has two parents: {both}; a robot is a tree")
+        parent_joint.setdefault(joint.child, joint)
+    _check_mimics(joints, elements, report)
+    roots = [name for name in links if name not in parent_joint]
+    if not links:
+        report.add(None, "the robot has no links")
+    elif not roots:
+        report.add(
+            None, f"the joints form a cycle through all links: {_cycle(next(iter(links)), parent_joint)}"
+        )
+    elif len(roots) > 1:
+        report.add(
+            None, f"the robot has {len(roots)} root links ({', '.join(roots)}); connect all but one by joints"
+        )
+    else:
+        _check_reachable(links, parent_joint, report)
+    return roots[0] if roots else ""
+
+
+def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint], report: Report) -> None:
+    safe: set[str] = set()
+    for name in links:
+        path: list[str] = []
+        link = name
+        while link in parent_joint and link not in safe and link not in path:
+            path.append(link)
+            link = parent_joint[link].parent
+        if link in path:
+            report.add(None, f"the joints form a cycle: {_cycle(link, parent_joint)}")
+            return
+        safe.update(path)
+
+
+def _cycle(link: str, parent_joint: Mapping[str, Joint]) -> str:
+    path = [link]
+    while (link := parent_joint[link].parent) not in path and link in parent_joint:
+        path.append(link)
+    path = [*path[path.index(link) if link in path else 0 :], link]
+    return " -> ".join(reversed(path))
+
+
+def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report) -> None:
+    for joint in joints.values():
+        seen = [joint.name]
+        leader = joint.mimic
+        while leader is not None:
+            if leader.joint not in joints:
+                missing = f"joint '{joint.name}' mimics '{leader.joint}', which does not exist"
+                report.add(elements[joint.name], f"{missing}; {nearest(leader.joint, joints)}")
+                break
+            if leader.joint in seen:
+                loop = " -> ".join([*seen, leader.joint])
+                report.add(elements[joint.name], f"joint '{joint.name}' mimics itself: {loop}")
+                break
+            seen.append(leader.joint)
+            leader = joints[leader.joint].mimic

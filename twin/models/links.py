@@ -1,0 +1,226 @@
+"""`<link>` and `<material>` elements as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import nearest
+from twin.geometry import Array, Pose3
+from twin.models.description import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Geometry,
+    Inertial,
+    Link,
+    Mesh,
+    Sphere,
+    Surface,
+    Visual,
+)
+from twin.models.document import Element, Report, describe
+
+Rgba = tuple[float, float, float, float]
+
+DEFAULT_RGBA: Rgba = (0.7, 0.7, 0.7, 1.0)
+GEOMETRIES = ("box", "cylinder", "sphere", "capsule", "mesh")
+INERTIA_TOLERANCE = 1e-3
+"""Slack of A + B >= C, relative to the trace: files print inertias with few digits."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkContext:
+    """What the links of one file share."""
+
+    report: Report
+    packages: Mapping[str, Path]
+    materials: Mapping[str, Rgba]
+    surfaces: Mapping[str, Surface]
+
+
+def read_materials(root: Element, report: Report) -> dict[str, Rgba]:
+    """Return the colours of all named materials, wherever in the file they are defined."""
+    materials: dict[str, Rgba] = {}
+    for element in root.iter("material"):
+        color = element.find("color")
+        if color is None or not element.get("name"):
+            continue
+        materials.setdefault(element.get("name"), _rgba(color, report))
+    return materials
+
+
+def read_link(element: Element, context: LinkContext) -> Link:
+    """Return a `<link>`; faults are noted in the report."""
+    report = context.report
+    name = report.required(element, "name")
+    inertials = element.findall("inertial")
+    if len(inertials) > 1:
+        report.add(inertials[1], f"link '{name}' has {len(inertials)} <inertial>; one is allowed")
+    return Link(
+        name=name,
+        inertial=_read_inertial(inertials[0], name, report) if inertials else None,
+        visuals=tuple(_read_visual(child, context) for child in element.findall("visual")),
+        collisions=tuple(
+            Collision(
+                T_link_geometry=read_origin(child, report),
+                geometry=_read_geometry(child, context),
+                name=child.get("name", ""),
+                line=report.line(child),
+            )
+            for child in element.findall("collision")
+        ),
+        surface=context.surfaces.get(name, Surface()),
+        line=report.line(element),
+    )
+
+
+def read_origin(element: Element, report: Report) -> Pose3:
+    """Return the `<origin>` of an element; without one, the identity."""
+    origin = element.find("origin")
+    if origin is None:
+        return Pose3.from_xyz_rpy()
+    zero = (0.0, 0.0, 0.0)
+    return Pose3.from_xyz_rpy(
+        report.numbers(origin, "xyz", 3, zero),
+        report.numbers(origin, "rpy", 3, zero),
+    )
+
+
+def _read_inertial(element: Element, link: str, report: Report) -> Inertial | None:
+    mass_element, inertia_element = element.find("mass"), element.find("inertia")
+    if mass_element is None or inertia_element is None:
+        report.add(element, f"<inertial> of link '{link}' needs <mass value=''/> and <inertia ixx='' .../>")
+        return None
+    mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
+    if mass <= 0.0:
+        report.add(mass_element, f"link '{link}' has mass {mass:g} kg; a mass is positive")
+        return None
+    inertia = _read_inertia(inertia_element, report)
+    fault = inertia_fault(inertia)
+    if fault:
+        report.add(inertia_element, f"link '{link}' has an impossible inertia: {fault}")
+    return Inertial(
+        T_link_com=read_origin(element, report), mass=mass, inertia=inertia, line=report.line(element)
+    )
+
+
+def _read_inertia(element: Element, report: Report) -> Array:
+    xx, yy, zz = (report.number(element, name) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (report.number(element, name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def inertia_fault(inertia: Array) -> str | None:
+    """Return why no rigid body has this inertia matrix, shape (3, 3) [kg m²], or None if one can."""
+    principal = np.linalg.eigvalsh(inertia)
+    shown = ", ".join(f"{value:.4g}" for value in principal)
+    if principal[0] <= 0.0:
+        return f"its principal moments {shown} kg m² are not all positive"
+    if principal[0] + principal[1] < principal[2] * (1.0 - INERTIA_TOLERANCE):
+        return f"of its principal moments {shown} kg m² the largest exceeds the sum of the others"
+    return None
+
+
+def _read_visual(element: Element, context: LinkContext) -> Visual:
+    return Visual(
+        T_link_geometry=read_origin(element, context.report),
+        geometry=_read_geometry(element, context),
+        rgba=_read_material(element, context),
+        name=element.get("name", ""),
+        line=context.report.line(element),
+    )
+
+
+def _read_material(element: Element, context: LinkContext) -> Rgba:
+    material = element.find("material")
+    if material is None:
+        return DEFAULT_RGBA
+    color = material.find("color")
+    if color is not None:
+        return _rgba(color, context.report)
+    name = material.get("name", "")
+    if name in context.materials:
+        return context.materials[name]
+    if material.find("texture") is None:
+        valid = nearest(name, context.materials) if context.materials else "the file defines none"
+        context.report.add(material, f"material '{name}' of {describe(element)} is not defined; {valid}")
+    return DEFAULT_RGBA
+
+
+def _rgba(color: Element, report: Report) -> Rgba:
+    r, g, b, a = report.numbers(color, "rgba", 4, DEFAULT_RGBA)
+    return (r, g, b, a)
+
+
+def _read_geometry(element: Element, context: LinkContext) -> Geometry:
+    report = context.report
+    placeholder = Sphere(radius=1.0)
+    geometry = element.find("geometry")
+    if geometry is None or len(geometry) != 1:
+        report.add(
+            element, f"{describe(element)} needs one <geometry> with one shape: {', '.join(GEOMETRIES)}"
+        )
+        return placeholder
+    shape = geometry[0]
+    if shape.tag == "mesh":
+        return _read_mesh(shape, context) or placeholder
+    if shape.tag not in GEOMETRIES:
+        report.add(
+            shape, f"unknown geometry <{shape.tag}> in {describe(element)}; {nearest(shape.tag, GEOMETRIES)}"
+        )
+        return placeholder
+    known = len(report.problems)
+    read = _read_primitive(shape, report)
+    if len(report.problems) == known and min(_dimensions(read)) <= 0.0:
+        report.add(shape, f"{describe(shape)} has a dimension that is not positive")
+    return read
+
+
+def _read_primitive(shape: Element, report: Report) -> Box | Cylinder | Sphere | Capsule:
+    if shape.tag == "box":
+        x, y, z = report.numbers(shape, "size", 3)
+        return Box(size=(x, y, z))
+    if shape.tag == "sphere":
+        return Sphere(radius=report.number(shape, "radius"))
+    radius, length = report.number(shape, "radius"), report.number(shape, "length")
+    if shape.tag == "cylinder":
+        return Cylinder(radius=radius, length=length)
+    return Capsule(radius=radius, length=length)
+
+
+def _dimensions(geometry: Box | Cylinder | Sphere | Capsule) -> tuple[float, ...]:
+    if isinstance(geometry, Box):
+        return geometry.size
+    if isinstance(geometry, Sphere):
+        return (geometry.radius,)
+    return (geometry.radius, geometry.length)
+
+
+def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
+    report = context.report
+    reference = report.required(shape, "filename")
+    if not reference:
+        return None
+    x, y, z = report.numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
+    path = _mesh_path(reference, context)
+    if path is None or not path.is_file():
+        hint = (
+            "" if path is not None else f"; known packages: {', '.join(sorted(context.packages)) or 'none'}"
+        )
+        report.add(shape, f"mesh '{reference}' of {describe(shape)} does not exist{hint}")
+        return None
+    return Mesh(path=path, scale=(x, y, z))
+
+
+def _mesh_path(reference: str, context: LinkContext) -> Path | None:
+    for scheme in ("package://", "model://"):
+        if reference.startswith(scheme):
+            package, _, inside = reference.removeprefix(scheme).partition("/")
+            folder = context.packages.get(package)
+            return None if folder is None else folder / inside
+    return context.report.source.parent / reference.removeprefix("file://")

@@ -1,0 +1,113 @@
+"""From a URDF or xacro file, or a robot's name, to a `RobotDescription`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from twin.errors import Problem
+from twin.models.catalogue import resolve
+from twin.models.description import Joint, Link, RobotDescription, Surface
+from twin.models.document import Element, Report, parse
+from twin.models.expand import expand, known_packages
+from twin.models.gazebo import read_commands, read_drive, read_surfaces
+from twin.models.joints import check_tree, read_joint, unique
+from twin.models.links import LinkContext, read_link, read_materials
+from twin.models.sensors import read_sensors
+
+NO_ARGS: Mapping[str, str] = MappingProxyType({})
+NO_PACKAGES: Mapping[str, Path] = MappingProxyType({})
+
+
+def load(
+    name_or_path: str | Path,
+    *,
+    args: Mapping[str, str] = NO_ARGS,
+    packages: Mapping[str, Path] = NO_PACKAGES,
+) -> RobotDescription:
+    """Return a robot as data.
+
+    Args:
+        name_or_path: A robot of `catalogue()`, or the path of a URDF or xacro file.
+        args: Values of `<xacro:arg>`, as `name:=value` on a ROS command line.
+        packages: Folders of ROS packages that `$(find name)` and `package://name/` may name.
+
+    Raises:
+        ModelError: With every fault of the file, each with its line where that is the user's.
+    """
+    source = resolve(name_or_path)
+    found = known_packages(source, packages)
+    raw = source.read_bytes()
+    if source.suffix == ".xacro" or b"http://www.ros.org/wiki/xacro" in raw:
+        parse(raw, Report(source))
+        urdf = expand(source, args=args, packages=found)
+        return parse_urdf(urdf, source, packages=found, lines_are_users=False)
+    return parse_urdf(raw, source, packages=found)
+
+
+def parse_urdf(
+    urdf: str | bytes,
+    source: Path,
+    *,
+    packages: Mapping[str, Path] = NO_PACKAGES,
+    lines_are_users: bool = True,
+) -> RobotDescription:
+    """Return the description in a URDF text.
+
+    Args:
+        urdf: The text, without xacro.
+        source: The file it came from: named in messages, and meshes are relative to it.
+        packages: Folders that `package://name/` may name.
+        lines_are_users: False if the lines of `urdf` are not those of `source`.
+
+    Raises:
+        ModelError: With every fault of the text.
+    """
+    raw = urdf.encode() if isinstance(urdf, str) else urdf
+    report = Report(source, lines_are_users)
+    root = parse(raw, report)
+    surfaces = read_surfaces(root, report)
+    links = _read_links(root, surfaces, packages, report)
+    joints, elements = _read_joints(root, report)
+    root_link = check_tree(links, joints, elements, report)
+    description = RobotDescription(
+        name=report.required(root, "name"),
+        source=source,
+        urdf=raw.decode(errors="replace"),
+        links=links,
+        joints=joints,
+        root=root_link,
+        drive=read_drive(root, joints, report),
+        commands=read_commands(root, joints, report),
+        sensors=read_sensors(root, links, report),
+    )
+    _sort(report)
+    report.raise_if_any()
+    return description
+
+
+def _read_links(
+    root: Element, surfaces: Mapping[str, Surface], packages: Mapping[str, Path], report: Report
+) -> dict[str, Link]:
+    context = LinkContext(
+        report=report, packages=packages, materials=read_materials(root, report), surfaces=surfaces
+    )
+    items = [(element, read_link(element, context)) for element in root.findall("link")]
+    links = unique("link", items, report)
+    return {name: link for name, link in links.items() if isinstance(link, Link)}
+
+
+def _read_joints(root: Element, report: Report) -> tuple[dict[str, Joint], dict[str, Element]]:
+    items = [(element, read_joint(element, report)) for element in root.findall("joint")]
+    joints = unique("joint", items, report)
+    elements: dict[str, Element] = {}
+    for element, joint in items:
+        elements.setdefault(joint.name, element)
+    return {name: joint for name, joint in joints.items() if isinstance(joint, Joint)}, elements
+
+
+def _sort(report: Report) -> None:
+    """Put problems in the order of the file, each once (a material may be used by many visuals)."""
+    distinct: dict[Problem, None] = dict.fromkeys(report.problems)
+    report.problems = sorted(distinct, key=lambda problem: problem.line or 0)
