@@ -1,0 +1,50 @@
+"""The table of commands. Command modules import the heavy libraries only inside their functions."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from twin.cli import batch, play, robots, run, schema
+from twin.cli.console import print_error
+from twin.errors import TwinError
+
+app = typer.Typer(
+    name="twin",
+    help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts.",
+    epilog="Example: [bold]twin run scenarios/warehouse.yaml[/bold]",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+_COMMANDS = (
+    ("run", run.run, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
+    ("test", batch.run_batch, "twin test scenarios --junit results.xml"),
+    ("play", play.play, "twin play runs/warehouse/20261121-101500"),
+    ("schema", schema.schema, "twin schema -o scenario.schema.json"),
+    ("robots", robots.robots, "twin robots"),
+)
+
+for _name, _function, _example in _COMMANDS:
+    app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in ("run", "play"))(
+        _function
+    )
+
+
+@app.callback()
+def _root() -> None:
+    """Keep `twin` a group of commands."""
+
+
+def run_app() -> None:
+    """Run the command line and exit: 0 pass, 1 a check failed, 2 a user's mistake, 130 interrupted."""
+    try:
+        app()
+    except TwinError as fault:
+        print_error(fault)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)

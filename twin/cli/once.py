@@ -1,0 +1,52 @@
+"""Run one scenario in this process."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from twin.cli.console import print_error, stdout
+from twin.cli.folders import run_folder
+from twin.cli.options import RunOptions
+from twin.cli.progress import run_progress
+from twin.errors import TwinError
+
+
+def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
+    """Run, write the verdict, print it, and return the exit code."""
+    from twin import runtime
+    from twin.scenario import schema
+    from twin.scenario.verdict import Verdict
+
+    name, seed, folder = options.scenario.stem, 0, out
+    try:
+        scenario = schema.load(options.scenario, options.overrides)
+        name, seed = scenario.name, scenario.seed
+        folder = run_folder(name) if out is None else out
+        folder.mkdir(parents=True, exist_ok=True)
+        with run_progress(name) as progress:
+            verdict = runtime.run(
+                scenario,
+                out=folder,
+                record=options.record,
+                pace=options.pace,
+                listen=options.listen,
+                save_model=options.save_model,
+                progress=progress,
+            )
+    except TwinError as fault:
+        print_error(fault)
+        verdict = Verdict(scenario=name, seed=seed, error=str(fault))
+        if folder is not None:
+            verdict.write(folder)
+        if as_json:
+            sys.stdout.write(verdict.to_json())
+        return verdict.exit_code
+    verdict.write(folder)
+    if as_json:
+        sys.stdout.write(verdict.to_json())
+    else:
+        from twin.cli.verdict_table import verdict_report
+
+        stdout().print(verdict_report(verdict.to_dict(), folder))
+    return verdict.exit_code

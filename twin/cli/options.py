@@ -1,0 +1,53 @@
+"""The options of a run, from the command line and back to one for a child process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from twin.errors import ScenarioError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What `twin run` was asked for."""
+
+    scenario: Path
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    pace: float | None = None
+    """Simulated seconds per second; None: as fast as possible."""
+    listen: tuple[str, ...] = ()
+    record: bool = True
+    save_model: Path | None = None
+
+    def arguments(self, out: Path) -> list[str]:
+        """Return the arguments of a `twin` that does the same and prints JSON."""
+        words = ["run", str(self.scenario), "--json", "--out", str(out)]
+        words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
+        words += [] if self.pace is None else ["--pace", repr(self.pace)]
+        words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
+        words += [] if self.record else ["--no-record"]
+        return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
+
+
+def parse_overrides(sets: Sequence[str], seed: int | None) -> dict[str, str]:
+    """Split `KEY=VALUE` words; raises ScenarioError for one without `=`."""
+    wrong = [word for word in sets if "=" not in word.lstrip("=")]
+    if wrong:
+        raise ScenarioError(f"--set {wrong[0]}: must be KEY=VALUE, such as --set robots.0.pose.x=1.5")
+    overrides = dict(word.split("=", 1) for word in sets)
+    return overrides if seed is None else {**overrides, "seed": str(seed)}
+
+
+def parse_pace(text: str) -> float | None:
+    """Return simulated seconds per second, None for `max`; raises ScenarioError."""
+    if text == "max":
+        return None
+    try:
+        pace = float(text)
+    except ValueError:
+        pace = 0.0
+    if not 0.0 < pace < float("inf"):
+        raise ScenarioError(f"--pace {text}: must be max or a number greater than 0, such as 1 for real time")
+    return pace

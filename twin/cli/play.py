@@ -1,0 +1,38 @@
+"""`twin play`: look at a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twin.errors import RecordingError
+
+
+def play(
+    recording: Annotated[
+        Path, typer.Argument(help="A recording (*.rrd), or the folder of a run.", show_default=False)
+    ],
+) -> None:
+    """Open a recording in the Rerun viewer."""
+    import subprocess
+    import sys
+
+    file = find_recording(recording)
+    raise typer.Exit(subprocess.run([sys.executable, "-m", "rerun", str(file)], check=False).returncode)
+
+
+def find_recording(path: Path) -> Path:
+    """Return the recording that a path means; raises RecordingError."""
+    if path.is_dir():
+        found = sorted(path.glob("*.rrd"))
+        if len(found) != 1:
+            names = ", ".join(file.name for file in found) or "none"
+            raise RecordingError(f"{path}: the folder must hold one recording (*.rrd), it holds {names}")
+        return found[0]
+    if not path.exists():
+        raise RecordingError(f"{path}: no such recording; `twin run` writes it to runs/<scenario>/<time>/")
+    if path.suffix != ".rrd":
+        raise RecordingError(f"{path}: not a Rerun recording; valid: *.rrd")
+    return path

@@ -1,0 +1,57 @@
+"""`twin run`: one scenario to its verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twin.cli.options import RunOptions, parse_overrides, parse_pace
+
+
+def run(
+    scenario: Annotated[Path, typer.Argument(help="The scenario file.", show_default=False)],
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None,
+    repeat: Annotated[int, typer.Option(min=1, help="Run this often, each time in a fresh process.")] = 1,
+    expect_one_hash: Annotated[
+        bool, typer.Option("--expect-one-hash", help="Fail if the repeated runs differ in a single bit.")
+    ] = False,
+    pace: Annotated[str, typer.Option(help="Simulated seconds per second: a number, or max.")] = "max",
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no Rerun recording.")] = False,
+    save_model: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print verdict.json instead of the table.")] = False,
+) -> None:
+    """Run a scenario to its verdict.
+
+    Exit code 0: every check holds; 1: one fails; 2: the run could not be made.
+    """
+    options = RunOptions(
+        scenario=scenario,
+        overrides=parse_overrides(sets or [], seed),
+        pace=parse_pace(pace),
+        listen=tuple(listen or ()),
+        record=not no_record,
+        save_model=save_model,
+    )
+    if repeat == 1 and not expect_one_hash:
+        from twin.cli.once import run_once
+
+        raise typer.Exit(run_once(options, out, as_json=json))
+    from twin.cli.repeat import run_repeatedly
+
+    runs = max(2, repeat)  # one run has nothing to be compared with
+    raise typer.Exit(run_repeatedly(options, runs, out, as_json=json, expect_one_hash=expect_one_hash))

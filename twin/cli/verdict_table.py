@@ -1,0 +1,103 @@
+"""A verdict as a table for people; works on the content of `verdict.json`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+_STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta"}
+
+
+def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
+    """Return the table of the checks of one run, then the verdict, then what was written."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
+    table.add_column("")
+    table.add_column("check", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("limit", justify="right", no_wrap=True)
+    table.add_column("at", justify="right", no_wrap=True)
+    table.add_column("why", style="red", overflow="fold")
+    for check in verdict["checks"]:
+        mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
+        value, limit = (_quantity(check[key], check["unit"]) for key in ("value", "limit"))
+        at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
+        table.add_row(mark, Text(check["name"]), value, limit, at, Text(check["reason"]))
+    lines: list[Table | Text] = [table] if verdict["checks"] else []
+    lines.append(_summary(verdict))
+    if folder is not None:
+        lines.append(Text(f"written to {folder}", style="dim"))
+    return Group(*lines)
+
+
+def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
+    """Return one line per run, and the reasons of those that did not pass."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None)
+    for name in ("", "scenario", "seed", "simulated", "wall", "digest"):
+        table.add_column(
+            name, no_wrap=True, justify="right" if name in ("seed", "simulated", "wall") else "left"
+        )
+    table.add_column("why", style="red", overflow="fold")
+    for verdict in verdicts:
+        metrics = verdict["metrics"]
+        table.add_row(
+            Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]]),
+            Text(verdict["scenario"]),
+            str(verdict["seed"]),
+            _seconds(metrics.get("sim_time_s")),
+            _seconds(metrics.get("wall_time_s")),
+            (verdict["digest"] or "")[:12],
+            Text("\n".join(_reasons(verdict))),
+        )
+    passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
+    style = _STYLE["pass" if passed == len(verdicts) else "fail"]
+    return Group(table, Text(f"{passed} of {len(verdicts)} passed", style=style))
+
+
+def _reasons(verdict: Mapping[str, Any]) -> list[str]:
+    if verdict["error"] is not None:
+        return [str(verdict["error"])]
+    return [f"{check['name']}: {check['reason']}" for check in verdict["checks"] if not check["passed"]]
+
+
+def _summary(verdict: Mapping[str, Any]) -> Text:
+    from rich.text import Text
+
+    metrics = verdict["metrics"]
+    parts = [f"{metrics['sim_time_s']:.1f} s simulated"] if "sim_time_s" in metrics else []
+    if "wall_time_s" in metrics:
+        parts.append(f"in {metrics['wall_time_s']:.1f} s")
+    if "real_time_factor" in metrics:
+        parts.append(f"({metrics['real_time_factor']:.1f}x real time)")
+    text = Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]])
+    text.append("  " + " ".join(parts), style="not bold default")
+    if verdict["digest"] is not None:
+        text.append(f"  digest {verdict['digest'][:12]}", style="not bold dim default")
+    if not verdict["deterministic"]:
+        text.append("  not deterministic", style="not bold yellow")
+    return text
+
+
+def _quantity(value: float | bool | None, unit: str) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g} {unit}".rstrip()
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.1f} s"
