@@ -138,7 +138,7 @@ class ActionServer:
         """Publish feedback of a goal."""
         self._feedback.publish(self._type.FeedbackMessage(_uuid(handle.goal_id), feedback))
 
-    def preempt(self) -> None:
+    def close(self) -> None:
         """End the current goal, if there is one, as aborted; its generator is closed where it waits."""
         if self._current is not None:
             handle, execution = self._current
@@ -151,7 +151,7 @@ class ActionServer:
         now_ns = self._node.now_ns
         accepted = goal_id not in self._handles and bool(self._goal_callback(request.goal))
         if accepted:
-            self.preempt()
+            self.close()
             handle = GoalHandle(self, goal_id, request.goal, now_ns)
             self._handles[goal_id] = handle
             self._current = (handle, self._execute(handle))
@@ -159,7 +159,7 @@ class ActionServer:
         return self._type.SendGoal.Response(accepted, stamp(now_ns))
 
     def _on_cancel(self, request: Any) -> Any:
-        """Choose as action_msgs/srv/CancelGoal says: by id, by time of acceptance, or all if both are zero."""
+        """Choose as action_msgs/srv/CancelGoal says: by id, by time of acceptance, all if both are zero."""
         wanted = bytes(request.goal_info.goal_id.uuid)
         until_ns = ns(request.goal_info.stamp)
         everything = not any(wanted) and until_ns == 0

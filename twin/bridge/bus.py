@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import zenoh
 
+from twin.bridge import names
 from twin.bridge.clock import Clock
 from twin.bridge.external import ExternalQueue
 from twin.bridge.node import Node
@@ -86,10 +87,10 @@ class Bus:
         Raises:
             BridgeError: an invalid name, or one that is taken.
         """
+        full_name = names.expand(names.node_name(name), names.namespace(namespace), name)
+        if any(node.fully_qualified_name == full_name for node in self._nodes):
+            raise BridgeError(f"there is a node {full_name} already; node names are unique")
         node = Node(self, name, namespace, parameters or {}, remappings or {})
-        if any(node.fully_qualified_name == other.fully_qualified_name for other in self._nodes):
-            node.destroy()
-            raise BridgeError(f"there is a node {node.fully_qualified_name} already; node names are unique")
         self._nodes.append(node)
         return node
 

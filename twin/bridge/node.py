@@ -28,6 +28,9 @@ class Execution(Protocol):
     def step(self) -> None:
         """Go on to the next yield."""
 
+    def close(self) -> None:
+        """End where it waits; the bus still works."""
+
 
 class Timer:
     """Calls back at multiples of a period of simulated time; several missed ones are one call."""
@@ -214,6 +217,8 @@ class Node:
 
     def destroy(self) -> None:
         """Leave the bus. Harmless when repeated."""
+        for execution in self._executions:
+            execution.close()
         for endpoint in reversed(self._endpoints):
             endpoint.destroy()
         self._endpoints.clear()
