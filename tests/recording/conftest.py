@@ -1,4 +1,4 @@
-"""A synthetic run: a robot of boxes circles in a hall with racks, and every topic that a recording shows is published.
+"""A synthetic run: a robot of boxes circles in a hall with racks, and every topic that is shown.
 
 Stand-ins for `World` and `Sample`, so that the recording is tested alone.
 """
@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 os.environ["RERUN_ANALYTICS"] = "0"
 os.environ["RERUN_STRICT"] = "1"
 
-from twin.geometry import Pose2, Pose3, quat_wxyz_from_yaw
+from twin.geometry import Pose2, Pose3
 from twin.models.description import Box, Capsule, Cylinder, Sphere
 from twin.recording.sink import RecordingConfig, RerunSink
 
@@ -87,7 +87,12 @@ def box(body: str, size: tuple[float, float, float], at: Any = (0, 0, 0), **more
 
 
 RACKS = [(x, y) for y in (-3.5, 0.0, 3.5) for x in (-6.0, -1.5, 3.0)]
-BLUE, ORANGE, WOOD, WALL = (0.16, 0.3, 0.6, 1.0), (0.9, 0.45, 0.1, 1.0), (0.72, 0.53, 0.33, 1.0), (0.8, 0.8, 0.78, 1.0)
+BLUE, ORANGE, WOOD, WALL = (
+    (0.16, 0.3, 0.6, 1.0),
+    (0.9, 0.45, 0.1, 1.0),
+    (0.72, 0.53, 0.33, 1.0),
+    (0.8, 0.8, 0.78, 1.0),
+)
 
 
 def hall() -> list[FakeShape]:
@@ -101,10 +106,10 @@ def hall() -> list[FakeShape]:
     for i, (x, y) in enumerate(RACKS):
         for z in (0.4, 1.1, 1.8):
             shapes.append(box(f"rack_{i}", (2.6, 0.8, 0.05), (x, y, z), rgba=ORANGE, static=True))
-            for k in (-0.8, 0.0, 0.8):
-                shapes.append(
-                    box(f"rack_{i}", (0.5, 0.5, 0.4), (x + k, y, z + 0.225), rgba=WOOD, static=True)
-                )
+            shapes += [
+                box(f"rack_{i}", (0.5, 0.5, 0.4), (x + k, y, z + 0.225), rgba=WOOD, static=True)
+                for k in (-0.8, 0.0, 0.8)
+            ]
         for dx, dy in ((-1.3, -0.4), (-1.3, 0.4), (1.3, -0.4), (1.3, 0.4)):
             shapes.append(box(f"rack_{i}", (0.06, 0.06, 2.0), (x + dx, y + dy, 1.0), rgba=BLUE, static=True))
     return shapes
@@ -168,6 +173,8 @@ class FakeWorld:
         return 0.15 * (1 - math.cos(self.time_ns / NS))
 
     def pose(self, body: str) -> Pose3:
+        if body not in self.body_names:
+            return Pose3.from_xyz_rpy()
         xyz, quat = self.body_poses()
         i = self.body_names.index(body)
         return Pose3(xyz[i], quat[i])
@@ -213,7 +220,9 @@ def occupancy(inflate: int = 0) -> np.ndarray:
 class FakeRun:
     """Publishes what a run publishes, at its rates; the order of a tick is that of the runtime."""
 
-    def __init__(self, *, duration_s: float = 3.0, namespace: str = "", world: FakeWorld | None = None) -> None:
+    def __init__(
+        self, *, duration_s: float = 3.0, namespace: str = "", world: FakeWorld | None = None
+    ) -> None:
         self.world = world or FakeWorld()
         self.duration_s = duration_s
         self.samples: list[FakeSample] = []
@@ -276,7 +285,10 @@ class FakeRun:
                 twist=msg("geometry_msgs/TwistWithCovariance", twist=twist(v, w), covariance=covariance),
             ),
         )
-        transforms = [self._tf("odom", "base_footprint", T_odom_base), self._tf("base_link", "lift", Pose2(0, 0, 0))]
+        transforms = [
+            self._tf("odom", "base_footprint", T_odom_base),
+            self._tf("base_link", "lift", Pose2(0, 0, 0)),
+        ]
         if tick % 5 == 0 and tick >= 25:
             wobble = Pose2(0.15 * math.sin(t), 0.1 * math.cos(1.3 * t), 0.03)
             transforms.insert(0, self._tf("map", "odom", self.world.base @ wobble @ T_odom_base.inverse()))
@@ -299,8 +311,12 @@ class FakeRun:
         base = self.world.base @ Pose2(0.3, 0.0, 0.0)
         angles = np.linspace(-math.pi, math.pi, BEAMS, endpoint=False) + base.yaw
         with np.errstate(divide="ignore"):
-            x = np.where(np.cos(angles) > 0, HALL[0] / 2 - base.x, HALL[0] / 2 + base.x) / np.abs(np.cos(angles))
-            y = np.where(np.sin(angles) > 0, HALL[1] / 2 - base.y, HALL[1] / 2 + base.y) / np.abs(np.sin(angles))
+            x = np.where(np.cos(angles) > 0, HALL[0] / 2 - base.x, HALL[0] / 2 + base.x) / np.abs(
+                np.cos(angles)
+            )
+            y = np.where(np.sin(angles) > 0, HALL[1] / 2 - base.y, HALL[1] / 2 + base.y) / np.abs(
+                np.sin(angles)
+            )
         ranges = np.minimum(x, y).astype(np.float32)
         ranges[ranges > 12.0] = np.inf
         return msg(
@@ -387,7 +403,14 @@ VERDICT = {
     "verdict": "pass",
     "checks": [
         {"name": "no_collision", "passed": True, "value": 0, "limit": 0, "unit": "", "at_s": None},
-        {"name": "localisation_error", "passed": False, "value": 0.31, "limit": 0.25, "unit": "m", "at_s": 2.4},
+        {
+            "name": "localisation_error",
+            "passed": False,
+            "value": 0.31,
+            "limit": 0.25,
+            "unit": "m",
+            "at_s": 2.4,
+        },
     ],
     "metrics": {"sim_time_s": 3.0, "wall_time_s": 1.0, "distance_m": 2.4},
     "digest": "00ff",

@@ -1,8 +1,8 @@
 """What the robot believes about its pose, beside where it truly is.
 
-`map` -> `odom` comes from localisation, `odom` -> `base_footprint` from odometry (REP-105). Before the first localisation,
-and in runs without one, `odom` is anchored where the robot truly was at the first odometry, so that odometry is
-drawn in the right place and its drift can be seen.
+`map` -> `odom` comes from localisation, `odom` -> `base_footprint` from odometry (REP-105). Before the first
+localisation, and in runs without one, `odom` is anchored where the robot truly was at the first odometry, so
+that odometry is drawn in the right place and its drift can be seen.
 """
 
 from __future__ import annotations
@@ -71,17 +71,21 @@ class Belief:
         for trail, colour in zip(self._trails.values(), colours, strict=True):
             recording.log(
                 trail.entity,
-                rr.LineStrips3D.from_fields(colors=[colour], radii=[0.02]),
+                rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.0)),
                 rr.CoordinateFrame("world"),
                 static=True,
             )
         self._error_xy = ScalarColumns(f"/localisation/{robot}/position_error")
         self._error_yaw = ScalarColumns(f"/localisation/{robot}/yaw_error")
         recording.log(
-            self._error_xy.entity, rr.SeriesLines(names=["position error [m]"], colors=[ESTIMATE_COLOUR]), static=True
+            self._error_xy.entity,
+            rr.SeriesLines(names=["position error [m]"], colors=[ESTIMATE_COLOUR]),
+            static=True,
         )
         recording.log(
-            self._error_yaw.entity, rr.SeriesLines(names=["yaw error [rad]"], colors=[ODOMETRY_COLOUR]), static=True
+            self._error_yaw.entity,
+            rr.SeriesLines(names=["yaw error [rad]"], colors=[ODOMETRY_COLOUR]),
+            static=True,
         )
 
     def on_transform(self, time_ns: int, parent: str, child: str, T_parent_child: Pose3) -> None:
@@ -147,5 +151,7 @@ class Belief:
             f"/estimate/{self._frames.robot(self._namespace)}",
             rr.CoordinateFrame(frame),
             rr.LineStrips3D([ring], colors=[ESTIMATE_COLOUR], radii=[0.015]),
-            rr.Arrows3D(vectors=[nose], origins=[(0.0, 0.0, TRAIL_HEIGHT)], colors=[ESTIMATE_COLOUR], radii=[0.03]),
+            rr.Arrows3D(
+                vectors=[nose], origins=[(0.0, 0.0, TRAIL_HEIGHT)], colors=[ESTIMATE_COLOUR], radii=[0.03]
+            ),
         )

@@ -15,7 +15,7 @@ from twin.recording.frames import WORLD, Frames
 from twin.recording.sources import BodyShape, World
 
 _RASTERS = ("map", "global_costmap/costmap", "local_costmap/costmap")
-_FIELD_OF_VIEW = 0.9
+_FIELD_OF_VIEW = 1.2
 """Vertical angle of Rerun's eye [rad], a bit less than it is."""
 
 
@@ -36,13 +36,12 @@ def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
         row_shares=[5, 2],
     )
     right = rrb.Vertical(
-        _from_above(robots, low, high),
-        rrb.StateTimelineView(name="Mission", origin="/", contents=_mission(robots)),
         rrb.Tabs(
-            rrb.TextLogView(name="Log", origin="/log"),
-            rrb.TextDocumentView(name="Verdict", origin="/verdict"),
+            _from_above(robots, low, high), *(_close_up(robot, _base(world, robot)) for robot in robots)
         ),
-        row_shares=[5, 1.2, 2.4],
+        rrb.StateTimelineView(name="Mission", origin="/", contents=_mission(robots)),
+        rrb.Horizontal(_log(), rrb.TextDocumentView(name="Verdict", origin="/verdict"), column_shares=[3, 2]),
+        row_shares=[5, 1.1, 3],
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[3, 2]),
@@ -56,13 +55,7 @@ def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
 
 def extent(world: World, shapes: Sequence[BodyShape]) -> tuple[Array, Array]:
     """Return the corners (x, y) [m] of a rectangle that holds the centres of all shapes."""
-    xyz, quat = world.body_poses()
-    index = {name: i for i, name in enumerate(world.body_names)}
-    points = []
-    for shape in shapes:
-        i = index.get(shape.body)
-        offset = shape.T_body_geometry.xyz
-        points.append(offset if i is None else xyz[i] + offset)
+    points = [world.pose(shape.body).apply(shape.T_body_geometry.xyz) for shape in shapes]
     if not points:
         return np.array((-5.0, -5.0)), np.array((5.0, 5.0))
     corners = np.array(points)[:, :2]
@@ -78,12 +71,12 @@ def _simulation(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3D
         origin="/",
         contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters(robots, "-")],
         overrides=_whole_trails(robots),
-        background=rrb.Background(kind="GradientDark"),
+        background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110)),
         spatial_information=rrb.SpatialInformation(target_frame=WORLD),
         eye_controls=rrb.EyeControls3D(
             kind="Orbital",
-            position=(centre[0] - 0.15 * size, centre[1] - 0.75 * size, 0.55 * size),
+            position=(centre[0] - 0.1 * size, centre[1] - 0.68 * size, 0.5 * size),
             look_target=(centre[0], centre[1], 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),
@@ -97,7 +90,12 @@ def _from_above(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3D
     return rrb.Spatial3DView(
         name="Map",
         origin="/",
-        contents=["+ /ros/**", "+ /estimate/**", "+ /trails/**", *(f"+ /world/{robot}/**" for robot in robots)],
+        contents=[
+            "+ /ros/**",
+            "+ /estimate/**",
+            "+ /trails/**",
+            *(f"+ /world/{robot}/**" for robot in robots),
+        ],
         overrides=_whole_trails(robots),
         background=rrb.Background(kind="SolidColor", color=(60, 66, 70)),
         line_grid=rrb.LineGrid3D(visible=False),
@@ -108,6 +106,34 @@ def _from_above(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3D
             look_target=(centre[0], centre[1], 0.0),
             eye_up=(0.0, 1.0, 0.0),
         ),
+    )
+
+
+def _base(world: World, robot: str) -> str:
+    """Return the body that a robot's close-up view travels with."""
+    links = [name for name in world.body_names if name.startswith(f"{robot}/")]
+    return f"{robot}/base_link" if f"{robot}/base_link" in links or not links else links[0]
+
+
+def _close_up(robot: str, base: str) -> rrb.Spatial3DView:
+    """Return a view that travels with a robot, in the frame of its base."""
+    return rrb.Spatial3DView(
+        name=robot,
+        origin="/",
+        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters([robot], "-")],
+        overrides=_whole_trails([robot]),
+        background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
+        line_grid=rrb.LineGrid3D(visible=False),
+        spatial_information=rrb.SpatialInformation(target_frame=base),
+        eye_controls=rrb.EyeControls3D(
+            kind="Orbital", position=(-1.8, 1.6, 1.4), look_target=(0.2, 0.0, 0.3), eye_up=(0.0, 0.0, 1.0)
+        ),
+    )
+
+
+def _log() -> rrb.TextLogView:
+    return rrb.TextLogView(
+        name="Log", origin="/log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
     )
 
 

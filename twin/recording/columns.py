@@ -1,7 +1,7 @@
 """Buffers that collect rows during a block of simulated time and send each entity with one call.
 
-Rerun's cost is per call (70 µs for a `log`, about 200 µs for a `send_columns`), not per row; so every entity is sent once a
-block. Importing this module imports rerun (0.6 s): only a run that records does.
+Rerun's cost is per call (70 µs for a `log`, about 200 µs for a `send_columns`), not per row; so every entity
+is sent once a block. Importing this module imports rerun (0.6 s): only a run that records does.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
+import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 from numpy.typing import NDArray
 
@@ -72,8 +72,8 @@ class TransformColumns(Columns):
         columns = rr.Transform3D.columns(
             translation=np.concatenate(self._xyz, dtype=np.float32),
             quaternion=np.concatenate(self._quat_xyzw, dtype=np.float32),
-            parent_frame=pa.array(self._parents, pa.string()),  # type: ignore[arg-type]
-            child_frame=pa.array(self._children, pa.string()),  # type: ignore[arg-type]
+            parent_frame=pa.array(self._parents, pa.string()),
+            child_frame=pa.array(self._children, pa.string()),
         )
         for rows in (self._parents, self._children, self._xyz, self._quat_xyzw):
             rows.clear()

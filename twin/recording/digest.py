@@ -13,8 +13,8 @@ _HEAD = struct.Struct("<qI")  # time [ns], payload length [bytes]
 class RunDigest:
     """SHA-256 over every published sample, in order, and the final physics state.
 
-    Each sample adds its topic and type (each ended by a zero byte, which ROS names cannot contain), its time, the
-    length of its payload and the payload, so that no two different sequences of samples are hashed as the same bytes.
+    Each sample adds its topic and type (each ended by a zero byte, which ROS names cannot contain), its time,
+    the length of its payload and the payload: two different sequences of samples are never the same bytes.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class RunDigest:
         self._hash.update(names + _HEAD.pack(sample.time_ns, len(payload)) + payload)
 
     def finish(self, state: bytes) -> str:
-        """Return the digest as hexadecimal text; `state` is the final physics state. More samples may follow."""
+        """Return the digest as hexadecimal text; `state` is the final physics state."""
         whole = self._hash.copy()
         whole.update(b"\0state\0" + state)
         return whole.hexdigest()

@@ -1,8 +1,8 @@
 """Which frame a message is drawn in: the true body of the simulator, or a frame of the robot's own belief.
 
-The truth lives in `world` with one frame per body (`robot/base_link`). What the robot believes (`map` -> `odom` ->
-`base_footprint`, REP-105) keeps its ROS names; with several robots they start with the namespace (`/r1/odom`),
-so that they differ from the bodies (`r1/base_footprint`).
+The truth lives in `world` with one frame per body (`robot/base_link`). What the robot believes (`map` ->
+`odom` -> `base_footprint`, REP-105) keeps its ROS names; with several robots they start with the namespace
+(`/r1/odom`), so that they differ from the bodies (`r1/base_footprint`).
 """
 
 from __future__ import annotations

@@ -12,13 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
+import pyarrow as pa  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from twin.errors import RecordingError
+from twin.errors import RecordingError, nearest
 
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""
+
+_Part = tuple[NDArray[np.int64] | None, pa.Array]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,11 +29,16 @@ class Column:
 
     times_ns: NDArray[np.int64]
     """Shape (n,); empty for a static component."""
-    values: list[Any]
-    """Length n (1 if static): the arrow values as Python objects, usually a list of instances."""
+    array: pa.Array
+    """Length n (1 if static), a list of instances per row."""
+
+    @property
+    def values(self) -> list[Any]:
+        """The rows as Python objects."""
+        return self.array.to_pylist()
 
     def numpy(self) -> NDArray[Any]:
-        """Return the values as one array, shape (n, instances, ...), where all rows have the same size."""
+        """Return the values as one array, shape (n, instances, ...), if all rows have the same size."""
         return np.array(self.values)
 
 
@@ -56,8 +63,6 @@ class Recording:
         Raises:
             RecordingError: There is no such entity or component.
         """
-        from twin.errors import nearest
-
         if entity not in self.columns:
             raise RecordingError(f"no entity {entity!r} in the recording; {nearest(entity, self.columns)}")
         components = self.columns[entity]
@@ -81,7 +86,9 @@ def check_recording(path: Path) -> Path:
         with path.open("rb") as file:
             magic = file.read(4)
     except OSError as error:
-        raise RecordingError(f"{path}: cannot read the recording: {error.strerror}; `twin run` writes one as .rrd") from error
+        raise RecordingError(
+            f"{path}: cannot read the recording: {error.strerror}; `twin run` writes one as .rrd"
+        ) from error
     if magic not in MAGIC:
         raise RecordingError(f"{path}: not a Rerun recording; valid: an .rrd file as `twin run` writes it")
     return path
@@ -101,14 +108,14 @@ def read(path: Path) -> Recording:
         raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
     store = stores[0]
     timelines: set[str] = set()
-    rows: dict[tuple[str, str], list[tuple[int | None, Any]]] = {}
+    parts: dict[tuple[str, str], list[_Part]] = {}
     for chunk in reader.stream(store=store):
         timelines.update(chunk.timeline_names)
-        for name, times, values in _components(chunk.to_record_batch()):
-            rows.setdefault((chunk.entity_path, name), []).extend(zip(times, values, strict=True))
+        for name, times, array in _components(chunk.to_record_batch()):
+            parts.setdefault((chunk.entity_path, name), []).append((times, array))
     columns: dict[str, dict[str, Column]] = {}
-    for (entity, name), pairs in sorted(rows.items()):
-        columns.setdefault(entity, {})[name] = _column(pairs)
+    for (entity, name), pieces in sorted(parts.items()):
+        columns.setdefault(entity, {})[name] = _column(pieces)
     return Recording(
         application_id=store.application_id,
         recording_id=store.recording_id,
@@ -120,7 +127,7 @@ def read(path: Path) -> Recording:
 def content_digest(path: Path) -> str:
     """Return a SHA-256 of what a recording says, whatever its chunks, ids and bytes are.
 
-    Two runs of the same scenario have the same one. Left out: properties, which hold wall-clock times and versions.
+    Two runs of the same scenario have the same one. Left out: properties, which hold wall-clock times.
 
     Raises:
         RecordingError: See `read`.
@@ -133,34 +140,46 @@ def content_digest(path: Path) -> str:
         for component, column in sorted(recording.columns[entity].items()):
             digest.update(f"{entity}\0{component}\0".encode())
             digest.update(column.times_ns.tobytes())
-            digest.update(repr(column.values).encode())
+            _hash_array(digest, column.array)
     return digest.hexdigest()
 
 
-def _components(batch: pa.RecordBatch) -> Iterator[tuple[str, list[int | None], list[Any]]]:
-    """Yield name, times and values of each component of a chunk; rows without a value are left out."""
-    index = next(
-        (i for i, item in enumerate(batch.schema) if _kind(item) == "index"),
-        None,
-    )
-    times = [None] * batch.num_rows if index is None else batch.column(index).cast(pa.int64()).to_pylist()
+def _components(batch: pa.RecordBatch) -> Iterator[tuple[str, NDArray[np.int64] | None, pa.Array]]:
+    """Yield name, times (None if static) and values of each component of a chunk, without empty rows."""
+    index = next((i for i, item in enumerate(batch.schema) if _kind(item) == "index"), None)
+    times = None if index is None else batch.column(index).cast(pa.int64()).to_numpy()
     for i, item in enumerate(batch.schema):
         if _kind(item) == "data":
-            values = batch.column(i).to_pylist()
-            kept = [(t, value) for t, value in zip(times, values, strict=True) if value is not None]
+            array = batch.column(i)
+            valid = array.is_valid().to_numpy(zero_copy_only=False)
             name = (item.metadata or {}).get(b"rerun:component", item.name.encode()).decode()
-            yield name, [t for t, _ in kept], [value for _, value in kept]
+            yield name, None if times is None else times[valid], array.drop_null()
 
 
 def _kind(item: pa.Field) -> str:
     return (item.metadata or {}).get(b"rerun:kind", b"").decode()
 
 
-def _column(pairs: list[tuple[int | None, Any]]) -> Column:
-    timed = [(t, value) for t, value in pairs if t is not None]
+def _column(parts: list[_Part]) -> Column:
+    timed = [(times, array) for times, array in parts if times is not None]
     if not timed:
-        return Column(times_ns=np.zeros(0, dtype=np.int64), values=[pairs[-1][1]])
-    timed.sort(key=lambda pair: pair[0])
-    return Column(
-        times_ns=np.array([t for t, _ in timed], dtype=np.int64), values=[value for _, value in timed]
-    )
+        return Column(times_ns=np.zeros(0, dtype=np.int64), array=parts[-1][1][-1:])
+    times = np.concatenate([times for times, _ in timed])
+    order = np.argsort(times, kind="stable")
+    array = pa.concat_arrays([array for _, array in timed])
+    return Column(times_ns=times[order], array=array.take(pa.array(order)))
+
+
+def _hash_array(digest: hashlib._Hash, array: pa.Array) -> None:
+    """Add an array's values, with the lengths of its lists, whatever buffers hold them."""
+    kind = array.type
+    digest.update(f"{len(array)}:".encode())
+    if pa.types.is_list(kind) or pa.types.is_large_list(kind):
+        digest.update(array.value_lengths().to_numpy(zero_copy_only=False).tobytes())
+        _hash_array(digest, array.flatten())
+    elif pa.types.is_fixed_size_list(kind):
+        _hash_array(digest, array.flatten())
+    elif (pa.types.is_integer(kind) or pa.types.is_floating(kind)) and array.null_count == 0:
+        digest.update(np.ascontiguousarray(array.to_numpy(zero_copy_only=False)).tobytes())
+    else:
+        digest.update(repr(array.to_pylist()).encode())

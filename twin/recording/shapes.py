@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import rerun as rr
 
-from twin.geometry import Pose3, xyzw_from_wxyz
+from twin.geometry import Array, Pose3, xyzw_from_wxyz
 from twin.models.description import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
+from twin.recording.frames import WORLD
 from twin.recording.sources import BodyShape
 
 DRAWABLE_MESHES = frozenset({".stl", ".obj", ".dae", ".glb", ".gltf"})
 """Mesh formats that the Rerun viewer reads."""
+
+FLOOR_COLOUR = (96, 100, 106, 255)
+FLOOR_MARGIN = 0.5
+"""Around the outermost shapes [m]."""
 
 FillMode = Literal["solid", "majorwireframe"]
 Rgba8 = tuple[int, int, int, int]
@@ -29,22 +34,45 @@ class Solid:
 
 
 def body_entity(body: str, static: bool) -> str:
-    """Return the entity of a body: `/world/arena/<body>`, `/world/<robot>/<link>` or `/world/goods/<body>`."""
+    """Return the entity of a body, in `/world/arena`, `/world/<robot>` or `/world/goods`."""
     if static:
         return f"/world/arena/{body}"
     return f"/world/{body}" if "/" in body else f"/world/goods/{body}"
 
 
-def declare_shapes(recording: rr.RecordingStream, shapes: Iterable[BodyShape]) -> None:
-    """Log every shape once, solid, attached to the frame that carries its body's name."""
+def declare_shapes(
+    recording: rr.RecordingStream, shapes: Iterable[BodyShape], pose_of: Callable[[str], Pose3]
+) -> None:
+    """Log every shape once, solid: scenery in `world`, the rest in the frame that carries its body's name.
+
+    Args:
+        recording: Where to.
+        shapes: Any order.
+        pose_of: Returns the pose of a static body in `world`.
+    """
     by_body: dict[tuple[str, bool], list[BodyShape]] = {}
     for shape in shapes:
         by_body.setdefault((shape.body, shape.static), []).append(shape)
     for (body, static), group in by_body.items():
         entity = body_entity(body, static)
-        drawn = [Solid(shape.geometry, shape.T_body_geometry, rgba8(shape.rgba)) for shape in group]
-        recording.log(entity, rr.CoordinateFrame(body), *primitives(drawn, "solid"), static=True)
-        _declare_meshes(recording, entity, body, group)
+        T_frame_body = pose_of(body) if static else Pose3.from_xyz_rpy()
+        drawn = [Solid(s.geometry, T_frame_body @ s.T_body_geometry, rgba8(s.rgba)) for s in group]
+        frame = rr.CoordinateFrame(WORLD if static else body)
+        recording.log(entity, frame, *primitives(drawn, "solid"), static=True)
+        for i, solid in enumerate(drawn):
+            _declare_mesh(recording, f"{entity}/mesh_{i}", frame, solid)
+
+
+def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
+    """Log a floor under everything between two corners (x, y) [m], its surface a little below z = 0."""
+    size = (*(high - low + 2.0 * FLOOR_MARGIN), 0.02)
+    centre = (*((low + high) / 2.0), -0.05)
+    recording.log(
+        "/world/floor",
+        rr.CoordinateFrame(WORLD),
+        rr.Boxes3D(sizes=[size], centers=[centre], colors=[FLOOR_COLOUR], fill_mode="solid"),
+        static=True,
+    )
 
 
 def rgba8(rgba: Sequence[float]) -> Rgba8:
@@ -59,7 +87,9 @@ def primitives(solids: Sequence[Solid], fill_mode: FillMode) -> list[rr.AsCompon
     boxes = [(s, s.geometry) for s in solids if isinstance(s.geometry, Box)]
     if boxes:
         sizes = [box.size for _, box in boxes]
-        found.append(rr.Boxes3D(sizes=sizes, centers=[s.pose.xyz for s, _ in boxes], **_look(boxes, fill_mode)))
+        found.append(
+            rr.Boxes3D(sizes=sizes, centers=[s.pose.xyz for s, _ in boxes], **_look(boxes, fill_mode))
+        )
     cylinders = [(s, s.geometry) for s in solids if isinstance(s.geometry, Cylinder)]
     if cylinders:
         found.append(
@@ -98,23 +128,21 @@ def _look(solids: Sequence[tuple[Solid, object]], fill_mode: FillMode) -> dict[s
     }
 
 
-def _declare_meshes(
-    recording: rr.RecordingStream, entity: str, frame: str, shapes: Sequence[BodyShape]
+def _declare_mesh(
+    recording: rr.RecordingStream, entity: str, frame: rr.CoordinateFrame, solid: Solid
 ) -> None:
-    """Log mesh files, one entity each, since an entity holds one asset."""
-    for i, shape in enumerate(shapes):
-        mesh = shape.geometry
-        if not isinstance(mesh, Mesh) or mesh.path.suffix.lower() not in DRAWABLE_MESHES:
-            continue
-        pose = shape.T_body_geometry
-        recording.log(
-            f"{entity}/mesh_{i}",
-            rr.CoordinateFrame(frame),
-            rr.Asset3D(path=mesh.path, albedo_factor=rgba8(shape.rgba)),
-            rr.InstancePoses3D(
-                translations=[pose.xyz],
-                quaternions=[rr.Quaternion(xyzw=xyzw_from_wxyz(pose.quat_wxyz))],
-                scales=[mesh.scale],
-            ),
-            static=True,
-        )
+    """Log a mesh file; it needs an entity of its own, since an entity holds one asset."""
+    mesh = solid.geometry
+    if not isinstance(mesh, Mesh) or mesh.path.suffix.lower() not in DRAWABLE_MESHES:
+        return
+    recording.log(
+        entity,
+        frame,
+        rr.Asset3D(path=mesh.path, albedo_factor=solid.colour),
+        rr.InstancePoses3D(
+            translations=[solid.pose.xyz],
+            quaternions=[rr.Quaternion(xyzw=xyzw_from_wxyz(solid.pose.quat_wxyz))],
+            scales=[mesh.scale],
+        ),
+        static=True,
+    )

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from twin.errors import RecordingError
-from twin.geometry import Pose3
 from twin.recording.frames import WORLD, Frames
 from twin.recording.sources import Sample, World
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays f
     import rerun as rr
 
     from twin.recording.belief import Belief
-    from twin.recording.channels import Channel, Context
+    from twin.recording.channel import Channel, Context
     from twin.recording.columns import TransformColumns
 
 _NS = 1_000_000_000
@@ -33,7 +32,7 @@ class RecordingConfig:
     block_s: float = 1.0
     """Simulated time between two writes to the file [s]; a killed run loses at most this much."""
     move_tolerance: float = 1e-4
-    """A body has moved when a coordinate [m] or a quaternion's component differs by more from what was kept."""
+    """A body has moved when a coordinate [m] or quaternion component differs by more from what was kept."""
     trail_step_m: float = 0.05
     """Length of a segment of a trail [m]."""
     max_particles: int = 500
@@ -54,9 +53,9 @@ class RecordingConfig:
 class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
-    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes is a ghost with a
-    trail of its own. Rows wait in buffers and go to the file once a block. Order: construct, `bus.tap(sink.on_sample)`,
-    `declare(world)`, then `on_tick(world)` after every tick, `close(verdict)`.
+    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes is
+    a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order: construct,
+    `bus.tap(sink.on_sample)`, `declare(world)`, then `on_tick(world)` after every tick, `close(verdict)`.
     """
 
     def __init__(
@@ -93,14 +92,13 @@ class RerunSink:
             RecordingError: The file cannot be written.
         """
         os.environ.setdefault("RERUN_ANALYTICS", "0")
-        from twin.recording.blueprint import layout
-        from twin.recording.channels import Context
+        from twin.recording.blueprint import extent, layout
+        from twin.recording.channel import Context
         from twin.recording.columns import TransformColumns
-        from twin.recording.shapes import declare_shapes
+        from twin.recording.shapes import declare_floor, declare_shapes
         from twin.recording.stream import declare_frames, open_recording
 
         self._world = world
-        self._index = {name: i for i, name in enumerate(world.body_names)}
         self._names = np.array(world.body_names, dtype=object)
         shapes = world.shapes()
         xyz, _ = world.body_poses()
@@ -114,8 +112,9 @@ class RerunSink:
             max_particles=self._config.max_particles,
             joints=self._config.joints,
         )
-        declare_frames(self._recording, self._frames, shapes, world.body_names)
-        declare_shapes(self._recording, shapes)
+        declare_frames(self._recording, self._frames)
+        declare_floor(self._recording, *extent(world, shapes))
+        declare_shapes(self._recording, shapes, world.pose)
         self._last_xyz = np.full_like(xyz, np.inf)
         self._last_quat = np.zeros((len(xyz), 4))
         self._next_pose_ns = world.time_ns
@@ -151,7 +150,7 @@ class RerunSink:
             self._send()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
-        """Write what waits, the verdict (as `verdict.json` has it) and the footer; further samples are ignored."""
+        """Write what waits, the verdict (as in `verdict.json`) and the footer; what comes later is ignored."""
         if self._world is None or self._closed:
             return
         from twin.recording.stream import log_verdict
@@ -183,6 +182,7 @@ class RerunSink:
         self._recording.flush()
 
     def _belief(self, namespace: str) -> Belief:
+        assert self._world is not None
         if namespace not in self._beliefs:
             from twin.recording.belief import Belief
 
@@ -190,14 +190,8 @@ class RerunSink:
                 self._recording,
                 self._frames,
                 namespace,
-                self._true_pose,
+                self._world.pose,
                 period_ns=self._period_ns,
                 trail_step_m=self._config.trail_step_m,
             )
         return self._beliefs[namespace]
-
-    def _true_pose(self, body: str) -> Pose3:
-        assert self._world is not None
-        xyz, quat = self._world.body_poses()
-        i = self._index[body]
-        return Pose3(xyz[i].copy(), quat[i].copy())

@@ -72,4 +72,7 @@ class World(Protocol):
         """Every shape to draw."""
 
     def body_poses(self) -> tuple[Array, Array]:
-        """Return positions (n, 3) [m] and quaternions (w, x, y, z) (n, 4) of all bodies in `world`."""
+        """Return xyz (n, 3) [m] and quat_wxyz (n, 4) in `world` of the bodies that can move."""
+
+    def pose(self, body: str) -> Pose3:
+        """Return the pose of any body, static ones too, in `world`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,9 @@ import rerun.blueprint as rrb
 
 from twin.errors import RecordingError
 from twin.recording.frames import WORLD, Frames
-from twin.recording.sources import BodyShape
 
 WALL_CLOCK_METRICS = frozenset({"wall_time_s", "cpu_time_s", "real_time_factor"})
-"""Differ between two equal runs: kept as a property, but not in the document, so that contents can be compared."""
+"""Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
 
 
 def open_recording(
@@ -23,7 +22,7 @@ def open_recording(
 ) -> rr.RecordingStream:
     """Return a stream into a new file.
 
-    Nothing in it depends on the wall clock: no `log_time`, no start time, and chunks end only when the sink flushes.
+    Nothing in it depends on the wall clock: no `log_time`, no start time, and chunks end when the sink flushes.
 
     Raises:
         RecordingError: The file cannot be written.
@@ -32,7 +31,9 @@ def open_recording(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.open("wb").close()
     except OSError as error:
-        raise RecordingError(f"{path}: cannot write the recording: {error.strerror}; choose another folder") from error
+        raise RecordingError(
+            f"{path}: cannot write the recording: {error.strerror}; choose another folder"
+        ) from error
     recording = rr.RecordingStream(
         application_id,
         recording_id=recording_id,
@@ -46,31 +47,24 @@ def open_recording(
     return recording
 
 
-def declare_frames(
-    recording: rr.RecordingStream, frames: Frames, shapes: Iterable[BodyShape], body_names: tuple[str, ...]
-) -> None:
-    """Log the frames that never move: maps, and static bodies that the world gives no pose for (they are at its origin)."""
+def declare_frames(recording: rr.RecordingStream, frames: Frames) -> None:
+    """Log which way is up, and that every robot's map is where the world is."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    namespaces = ("",) if len(frames.robots) < 2 else ("", *frames.robots)
-    children = [frames.belief(namespace, "map") for namespace in namespaces]
-    known = set(body_names)
-    children += list(dict.fromkeys(shape.body for shape in shapes if shape.body not in known))
-    for child in children:
-        if child != WORLD:
-            recording.log(
-                f"/tf_static/{child.strip('/')}",
-                rr.Transform3D(translation=(0.0, 0.0, 0.0), parent_frame=WORLD, child_frame=child),
-                static=True,
-            )
+    for namespace in ("",) if len(frames.robots) < 2 else ("", *frames.robots):
+        child = frames.belief(namespace, "map")
+        recording.log(
+            f"/tf_static/{child.strip('/')}",
+            rr.Transform3D(translation=(0.0, 0.0, 0.0), parent_frame=WORLD, child_frame=child),
+            static=True,
+        )
 
 
 def log_verdict(recording: rr.RecordingStream, verdict: Mapping[str, Any]) -> None:
     """Log a verdict as properties of the recording and as a document to read."""
     plain = {key: str(verdict[key]) for key in ("scenario", "seed", "verdict", "digest") if key in verdict}
-    recording.send_property("verdict", rr.AnyValues(**plain, json=json.dumps(verdict, sort_keys=True, default=str)))
-    recording.log(
-        "/verdict", rr.TextDocument(verdict_text(verdict), media_type="text/markdown"), static=True
-    )
+    whole = json.dumps(verdict, sort_keys=True, default=str)
+    recording.send_property("verdict", rr.AnyValues(drop_untyped_nones=True, **plain, json=whole))
+    recording.log("/verdict", rr.TextDocument(verdict_text(verdict), media_type="text/markdown"), static=True)
 
 
 def verdict_text(verdict: Mapping[str, Any]) -> str:

@@ -1,0 +1,151 @@
+"""Messages that are plotted or listed over time: velocities, joints, transforms, states, log."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from twin.geometry import Pose3
+from twin.recording.channel import Context, set_time
+from twin.recording.columns import LogColumns, ScalarColumns, StateColumns
+from twin.recording.frames import BELIEF_FRAMES
+from twin.recording.sources import Sample
+
+COMMANDED_COLOUR = (255, 150, 40, 255)
+MEASURED_COLOUR = (80, 160, 255, 255)
+LOG_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "CRITICAL"}
+"""rcl_interfaces/msg/Log to Rerun."""
+
+
+class VelocityChannel:
+    """Forward and turning velocity, commanded (geometry_msgs/Twist) or measured (nav_msgs/Odometry)."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        del topic
+        robot = context.frames.robot(namespace)
+        self._robot = f"/velocity/{robot}"
+        self._recording = context.recording
+        self._linear: ScalarColumns | None = None
+        self._angular: ScalarColumns | None = None
+
+    def take(self, sample: Sample) -> None:
+        """Keep linear.x [m/s] and angular.z [rad/s]."""
+        measured = sample.msgtype == "nav_msgs/msg/Odometry"
+        stamped = measured or sample.msgtype == "geometry_msgs/msg/TwistStamped"
+        twist = sample.message.twist if stamped else sample.message
+        twist = twist.twist if measured else twist
+        if self._linear is None or self._angular is None:
+            kind = "measured" if measured else "commanded"
+            self._linear = ScalarColumns(f"{self._robot}/linear/{kind}")
+            self._angular = ScalarColumns(f"{self._robot}/angular/{kind}")
+            look = rr.SeriesLines(names=[kind], colors=[MEASURED_COLOUR if measured else COMMANDED_COLOUR])
+            self._recording.log(self._linear.entity, look, static=True)
+            self._recording.log(self._angular.entity, look, static=True)
+        self._linear.append(sample.time_ns, twist.linear.x)
+        self._angular.append(sample.time_ns, twist.angular.z)
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        if self._linear is not None and self._angular is not None:
+            self._linear.send(recording)
+            self._angular.send(recording)
+
+
+class JointChannel:
+    """sensor_msgs/JointState: positions of the joints that are worth a plot."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        del topic
+        self._recording = context.recording
+        self._entity = f"/joints/{context.frames.robot(namespace)}"
+        self._wanted = context.joints
+        self._columns: dict[str, ScalarColumns] = {}
+        self._plans: dict[tuple[str, ...], list[tuple[int, ScalarColumns]]] = {}
+
+    def take(self, sample: Sample) -> None:
+        """Keep positions [m] or [rad]; a driving wheel's angle grows without end and is left out."""
+        state = sample.message
+        names = tuple(state.name)
+        plan = self._plans.get(names)
+        if plan is None:
+            plan = self._plans[names] = [
+                (i, self._column(name)) for i, name in enumerate(names) if self._shown(name)
+            ]
+        for i, column in plan:
+            column.append(sample.time_ns, state.position[i])
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        for column in self._columns.values():
+            column.send(recording)
+
+    def _shown(self, name: str) -> bool:
+        if self._wanted is not None:
+            return name in self._wanted
+        return "wheel" not in name and "caster" not in name
+
+    def _column(self, name: str) -> ScalarColumns:
+        if name not in self._columns:
+            self._columns[name] = ScalarColumns(f"{self._entity}/{name}")
+            self._recording.log(self._columns[name].entity, rr.SeriesLines(names=[name]), static=True)
+        return self._columns[name]
+
+
+class TransformChannel:
+    """tf2_msgs/TFMessage: where the robot believes to be. Its links are drawn where they truly are."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        del topic
+        self._recording = context.recording
+        self._belief = context.belief(namespace)
+
+    def take(self, sample: Sample) -> None:
+        """Keep transforms whose parent is `map` or `odom`."""
+        for stamped in sample.message.transforms:
+            parent = stamped.header.frame_id
+            if parent.rsplit("/", 1)[-1] in BELIEF_FRAMES:
+                t, q = stamped.transform.translation, stamped.transform.rotation
+                pose = Pose3(np.array((t.x, t.y, t.z)), np.array((q.w, q.x, q.y, q.z)))
+                set_time(self._recording, sample.time_ns)
+                self._belief.on_transform(sample.time_ns, parent, stamped.child_frame_id, pose)
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        self._belief.send(recording)
+
+
+class StateChannel:
+    """std_msgs/String as a state on a time line; repeated states are left out."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        del context, namespace
+        self._states = StateColumns(topic)
+        self._last: str | None = None
+
+    def take(self, sample: Sample) -> None:
+        """Keep a change of state."""
+        state = sample.message.data
+        if state != self._last:
+            self._last = state
+            self._states.append(sample.time_ns, state)
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        self._states.send(recording)
+
+
+class LogChannel:
+    """rcl_interfaces/Log as text with a level."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        del context, namespace, topic
+        self._lines = LogColumns("/log")
+
+    def take(self, sample: Sample) -> None:
+        """Keep a line as `[node] text`."""
+        log = sample.message
+        self._lines.append(sample.time_ns, f"[{log.name}] {log.msg}", LOG_LEVELS.get(log.level, "INFO"))
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        self._lines.send(recording)
