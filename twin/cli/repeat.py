@@ -47,8 +47,7 @@ def _report(verdicts: list[dict[str, Any]], digests: list[str]) -> None:
         console.print(Text(f"one digest: {digests[0]}", style="green"))
     else:
         console.print(Text(f"{len(digests)} different digests:", style="red"))
+        found = [verdict["digest"] or "none" for verdict in verdicts]
         for digest in digests:
-            numbers = [
-                str(i) for i, verdict in enumerate(verdicts, 1) if (verdict["digest"] or "none") == digest
-            ]
+            numbers = [str(number) for number, other in enumerate(found, 1) if other == digest]
             console.print(f"  {digest}  run {', '.join(numbers)}")

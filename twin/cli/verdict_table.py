@@ -46,10 +46,10 @@ def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
     from rich.text import Text
 
     table = Table(box=None)
-    for name in ("", "scenario", "seed", "simulated", "wall", "digest"):
-        table.add_column(
-            name, no_wrap=True, justify="right" if name in ("seed", "simulated", "wall") else "left"
-        )
+    for name in ("", "scenario"):
+        table.add_column(name, no_wrap=True)
+    for name in ("seed", "simulated", "wall", "digest"):
+        table.add_column(name, no_wrap=True, justify="right")
     table.add_column("why", style="red", overflow="fold")
     for verdict in verdicts:
         metrics = verdict["metrics"]

@@ -70,7 +70,7 @@ def _validate(schema: type[M], document: Document) -> M | None:
                 return model
             break
         bad = {loc for loc, _ in found}
-        explained = [item for fault in faults for item in explain(schema, document.data, fault)]
+        explained = [item for fault in faults for item in explain(schema, data, fault)]
         found |= {(loc, text): None for loc, text in explained if loc not in bad}
         data = _without(document.data, [loc for loc, _ in found])
     document.problems += [document.problem(loc, text) for loc, text in found]

@@ -174,5 +174,5 @@ def within(loc: Loc) -> str:
 
 def shown(value: object) -> str:
     """Return a value as a message shows it: short."""
-    text = repr(value) if not isinstance(value, dict | list) else to_json(value).decode()
+    text = repr(value) if isinstance(value, str) else to_json(value).decode()
     return text if len(text) <= 60 else text[:57] + "..."

@@ -43,6 +43,8 @@ _WORDS = MappingProxyType(
         "tuple_type": "must be a list",
         "dict_type": "must be a mapping (key: value)",
         "model_type": "must be a mapping (key: value)",
+        "too_short": "must have at least {min_length} items",
+        "too_long": "must have at most {max_length} items",
         "greater_than": "must be greater than {gt}",
         "greater_than_equal": "must be at least {ge}",
         "less_than": "must be less than {lt}",
@@ -97,6 +99,8 @@ def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Ite
     if kind == "extra_forbidden":
         hint = nearest(str(loc[-1]), _valid_keys(schema, loc[:-1]))
         yield at, f"unknown key '{loc[-1]}'{within(at[:-1])}; {hint}"
+    elif kind == "missing" and isinstance(loc[-1], int):
+        yield at, f"{name}: must have at least {loc[-1] + 1} items"
     elif kind == "missing":
         yield (*at, loc[-1]), f"missing key '{loc[-1]}'{within(at)}"
     elif kind == "union_tag_not_found":
