@@ -1,7 +1,7 @@
 """`/bt_navigator`: the `navigate_to_pose` action, run by a behaviour tree as in Nav2.
 
-The tree is Nav2's `navigate_to_pose_w_replanning_and_recovery`, with its variant that keeps the path while it is
-valid (`navigate_w_replanning_only_if_path_becomes_invalid`): a new plan costs time, an unchanged one tells nothing.
+The tree is Nav2's `navigate_to_pose_w_replanning_and_recovery` in its variant that keeps the path while it is
+valid (`navigate_w_replanning_only_if_path_becomes_invalid`): planning anew costs time and tells nothing new.
 """
 
 from __future__ import annotations
@@ -14,15 +14,21 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from twin.bridge.action_types import BackUp, ComputePathToPose, FollowPath, NavigateToPose, Spin, Wait
-from twin.bridge.actions import ActionClient, ActionServer, ServerGoal
+from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Path, Point, PoseStamped, duration, new
 from twin.bridge.srvs import ClearEntireCostmap, IsPathValid
-from twin.nodes.bt.control import Fallback, PipelineSequence, RateController, RecoveryNode, RoundRobin, sequence
+from twin.nodes.bt.control import (
+    Fallback,
+    PipelineSequence,
+    RateController,
+    RecoveryNode,
+    RoundRobin,
+    sequence,
+)
 from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
 from twin.nodes.messages import pose2, pose_stamped
 from twin.nodes.robot_pose import RobotPose
-
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +71,12 @@ class BtNavigatorNode:
         self._spin = ActionClient(node, Spin, "spin")
         self._backup = ActionClient(node, BackUp, "backup")
         self._wait = ActionClient(node, Wait, "wait")
-        self._clear_global = node.create_client(ClearEntireCostmap, "global_costmap/clear_entirely_global_costmap")
-        self._clear_local = node.create_client(ClearEntireCostmap, "local_costmap/clear_entirely_local_costmap")
+        self._clear_global = node.create_client(
+            ClearEntireCostmap, "global_costmap/clear_entirely_global_costmap"
+        )
+        self._clear_local = node.create_client(
+            ClearEntireCostmap, "local_costmap/clear_entirely_local_costmap"
+        )
         self._is_path_valid = node.create_client(IsPathValid, "is_path_valid")
         self._server = ActionServer(node, NavigateToPose, "navigate_to_pose", self._execute)
         self._own_client = ActionClient(node, NavigateToPose, "navigate_to_pose")
@@ -75,7 +85,7 @@ class BtNavigatorNode:
     def _on_goal_pose(self, message: PoseStamped) -> None:
         self._own_client.send_goal(new(NavigateToPose.Goal, pose=message))
 
-    def _execute(self, handle: ServerGoal) -> Generator[None, None, Any]:
+    def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         self._goal, self._path, self._failure = handle.request.pose, None, ""
         started, recoveries = self.node.now_ns, self.recoveries
         target = pose2(self._goal.pose)
@@ -109,7 +119,8 @@ class BtNavigatorNode:
         assert self._goal is not None
         goal = pose2(self._goal.pose)
         now = self.node.now_ns
-        return new(NavigateToPose.Feedback, 
+        return new(
+            NavigateToPose.Feedback,
             current_pose=pose_stamped(pose or goal, self._robot_pose.frames.map, now),
             navigation_time=duration(now - started),
             number_of_recoveries=recoveries,
@@ -184,7 +195,6 @@ class BtNavigatorNode:
                 self.recoveries += 1
                 self._path = None
                 self.node.get_logger().warn(f"recovery {name} after: {self._failure}")
-                return None
 
             return sequence(name, [Do(f"Note{name}", note), leaf])
 
@@ -218,7 +228,9 @@ class BtNavigatorNode:
                 ),
                 count(
                     "Wait",
-                    CallAction("Wait", self._wait, lambda: new(Wait.Goal, time=duration(int(config.wait_s * 1e9)))),
+                    CallAction(
+                        "Wait", self._wait, lambda: new(Wait.Goal, time=duration(int(config.wait_s * 1e9)))
+                    ),
                 ),
             ],
         )

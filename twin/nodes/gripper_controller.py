@@ -6,12 +6,11 @@ from collections.abc import Generator
 from typing import Any
 
 from twin.bridge.action_types import GripperCommand
-from twin.bridge.actions import ActionServer, ServerGoal
+from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import new
 from twin.manipulation.gripper import GripperConfig, GripperMonitor
 from twin.nodes.hardware import HardwareInterface
-
 
 
 class GripperControllerNode:
@@ -35,7 +34,7 @@ class GripperControllerNode:
         self._dt = period_ns * 1e-9
         ActionServer(self.node, GripperCommand, "gripper_controller/gripper_cmd", self._execute)
 
-    def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
+    def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         target = float(goal.request.command.position)
         monitor = GripperMonitor(self.config, target)
         self._hardware.command(self._joint, target)
@@ -49,7 +48,8 @@ class GripperControllerNode:
                 goal.canceled()
             elif state == "moving":
                 continue
-            return new(GripperCommand.Result, 
+            return new(
+                GripperCommand.Result,
                 position=position,
                 effort=float(reading.effort[self._index]),
                 stalled=state == "stalled",

@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from typing import Any
 
 from twin.bridge.action_types import FollowJointTrajectory
-from twin.bridge.actions import ActionServer, ServerGoal
+from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import new, ns
 from twin.manipulation.trajectory import Trajectory, concatenate
@@ -36,12 +36,13 @@ class JointTrajectoryControllerNode:
         self._patience_ns = int(goal_time_tolerance_s * 1e9)
         ActionServer(self.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory", self._execute)
 
-    def _execute(self, goal: ServerGoal) -> Generator[None, None, Any]:
+    def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
         unknown = [name for name in names if name not in self._index]
         if unknown or not goal.request.trajectory.points:
             goal.abort()
-            return new(FollowJointTrajectory.Result, 
+            return new(
+                FollowJointTrajectory.Result,
                 error_code=_INVALID_JOINTS,
                 error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
             )
@@ -57,7 +58,7 @@ class JointTrajectoryControllerNode:
         return (yield from self._settle(goal, names, trajectory))
 
     def _settle(
-        self, goal: ServerGoal, names: list[str], trajectory: Trajectory
+        self, goal: GoalHandle, names: list[str], trajectory: Trajectory
     ) -> Generator[None, None, Any]:
         deadline = self.node.now_ns + self._patience_ns
         while True:
@@ -71,7 +72,8 @@ class JointTrajectoryControllerNode:
                 return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="")
             if self.node.now_ns > deadline:
                 goal.abort()
-                return new(FollowJointTrajectory.Result, 
+                return new(
+                    FollowJointTrajectory.Result,
                     error_code=_GOAL_TOLERANCE_VIOLATED,
                     error_string=f"'{worst}' is {errors[worst]:+.4f} away from its goal, "
                     f"{self._tolerance} is allowed",

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy as np
+from numpy.typing import NDArray
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import MapMetaData, OccupancyGrid, header, stamp
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import GetMap
-from twin.geometry import Array, Pose2
+from twin.geometry import Pose2
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.nodes.messages import pose2, pose_msg
 
 
-def grid_msg(
-    data: Array | Any, resolution: float, origin: Pose2, frame: str, time_ns: int
-) -> OccupancyGrid:
+def grid_msg(data: NDArray[np.int8], resolution: float, origin: Pose2, frame: str, time_ns: int) -> OccupancyGrid:
     """Return a grid, int8 of shape (height, width), as a message."""
     height, width = data.shape
     info = MapMetaData(

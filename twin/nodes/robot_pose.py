@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twin.bridge.msgs import Header, ns
 from twin.bridge.tf import Buffer, TransformError
 from twin.geometry import Pose2
 
@@ -38,3 +39,7 @@ class RobotPose:
             return self.buffer.lookup(target, source, time_ns).to_pose2()
         except TransformError:
             return None
+
+    def at_stamp(self, target: str, header: Header) -> Pose2 | None:
+        """Return the planar pose, in `target`, of the frame that a message was measured in, when it was."""
+        return self.relative(target, header.frame_id, ns(header.stamp))

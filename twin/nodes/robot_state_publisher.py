@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import JointState, String
 from twin.bridge.qos import LATCHED
 from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster
-from twin.geometry import Pose3
-from twin.models.description import Joint, RobotDescription
-
-
-def joint_transform(joint: Joint, position: float) -> Pose3:
-    """Return the pose of a joint's child link in its parent link at `position` [rad or m]."""
-    axis = np.asarray(joint.axis)
-    if joint.type == "prismatic":
-        motion = Pose3(axis * position, np.array([1.0, 0.0, 0.0, 0.0]))
-    else:
-        half = position / 2.0
-        motion = Pose3(np.zeros(3), np.array([math.cos(half), *(math.sin(half) * axis)]))
-    return joint.T_parent_joint @ motion
+from twin.models.description import RobotDescription
+from twin.models.kinematics import joint_motion
 
 
 class RobotStatePublisherNode:
@@ -67,7 +52,7 @@ class RobotStatePublisherNode:
                 positions[joint.name] = joint.mimic.multiplier * leader + joint.mimic.offset
         self._tf.send_all(
             [
-                (joint.parent, joint.child, joint_transform(joint, positions[name]))
+                (joint.parent, joint.child, joint.T_parent_joint @ joint_motion(joint, positions[name]))
                 for name, joint in self._joints.items()
                 if name in positions
             ],

@@ -10,6 +10,7 @@ import numpy as np
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Bool, Header, Imu, LaserScan, Quaternion, Range, Vector3, stamp
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.topics import Publisher
 from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 
 
@@ -66,6 +67,7 @@ def _range(spec: RangeSpec, header: Header, reading: Any) -> Range:
         min_range=spec.range_min,
         max_range=spec.range_max,
         range=float(reading.range),
+        variance=spec.noise_stddev**2,
     )
 
 
@@ -88,7 +90,7 @@ class SensorPublisher:
         self.sensor = sensor
         self.node = bus.create_node(f"{sensor.spec.name}_driver", namespace)
         msgtype, self._to_message = _MESSAGES[type(sensor.spec)]
-        self._publisher = self.node.create_publisher(msgtype, sensor.spec.topic, SENSOR_DATA)
+        self._publisher: Publisher[Any] = self.node.create_publisher(msgtype, sensor.spec.topic, SENSOR_DATA)
 
     def publish(self, time_ns: int) -> None:
         """Sample at `time_ns` and publish, stamped with it."""

@@ -28,17 +28,16 @@ from twin.bridge.msgs import (
     JointTrajectory,
     JointTrajectoryPoint,
     PoseStamped,
-    String,
     duration,
     header,
     new,
 )
-from twin.bridge.qos import LATCHED
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
 from twin.nodes.bt.control import RecoveryNode, sequence
 from twin.nodes.bt.leaves import CallAction, Condition, Do
+from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.messages import pose2, pose_stamped
 from twin.nodes.robot_pose import Frames
 
@@ -87,8 +86,6 @@ class PickAndPlaceConfig:
     """Between tote and surface when the gripper opens [m]."""
     carry_z: float = 0.45
     """Height of the grasp frame while driving with a tote [m]."""
-    gripper_open: float = 0.17
-    """Finger joint, open [m]."""
     gripper_effort: float = 160.0
     """[N]"""
     grip_tolerance: float = 0.012
@@ -108,10 +105,9 @@ class _Memory:
     totes: list[tuple[int, Pose2]]
     """Recent detections: stamp [ns] and pose of the tote's centre in the base frame."""
     joints: dict[str, float]
-    reason: str = ""
 
 
-class PickAndPlaceNode:
+class PickAndPlaceNode(MissionNode):
     """`/mission`: runs the tasks one after the other; publishes `mission/state`."""
 
     def __init__(
@@ -121,39 +117,29 @@ class PickAndPlaceNode:
         arm: TelescopicArm,
         *,
         gripper_joint: str,
+        gripper_open: float,
         frames: Frames,
         config: PickAndPlaceConfig | None = None,
         period_ns: int = 100_000_000,
         namespace: str = "",
     ) -> None:
-        self.node = node = bus.create_node("mission", namespace)
+        super().__init__(bus, namespace=namespace)
+        node = self.node
         self.config = config or PickAndPlaceConfig()
         self._arm = arm
         self._gripper_joint = gripper_joint
+        self._gripper_open = gripper_open
         self._frames = frames
         self._memory = _Memory([], {})
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
         self._dock = ActionClient(node, DockRobot, "dock_robot")
         self._undock = ActionClient(node, UndockRobot, "undock_robot")
-        self._trajectory = ActionClient(
-            node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory"
-        )
-        self._gripper = ActionClient(
-            node, GripperCommand, "gripper_controller/gripper_cmd"
-        )
-        self._state_publisher = node.create_publisher(String, "mission/state", LATCHED)
+        self._trajectory = ActionClient(node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory")
+        self._gripper = ActionClient(node, GripperCommand, "gripper_controller/gripper_cmd")
         node.create_subscription(JointState, "joint_states", self._on_joint_states, 10)
         node.create_subscription(PoseStamped, "tote_pose", self._on_tote_pose, 10)
-        self.state = "start"
-        self.done = False
-        self.succeeded: bool | None = None
         self._tree = sequence("PickAndPlace", [self._task(task) for task in tasks])
         node.create_timer(period_ns, self._tick)
-
-    @property
-    def reason(self) -> str:
-        """Why the mission failed."""
-        return self._memory.reason
 
     def _tick(self) -> None:
         if self.done:
@@ -161,11 +147,7 @@ class PickAndPlaceNode:
         self._tree.tick_once()
         if self._tree.status == Status.RUNNING:
             return
-        self.done = True
-        self.succeeded = self._tree.status == Status.SUCCESS
-        self._enter("done" if self.succeeded else "failed")
-        if not self.succeeded:
-            self.node.get_logger().error(f"mission failed: {self.reason}")
+        self.finish(self._tree.status == Status.SUCCESS)
 
     def _on_joint_states(self, message: JointState) -> None:
         self._memory.joints = dict(zip(message.name, message.position.tolist(), strict=True))
@@ -221,9 +203,7 @@ class PickAndPlaceNode:
                 Do("ForgetTotes", self._forget_totes),
                 _Wait(lambda: len(self._memory.totes) >= config.tote_samples, self._clock, 3_000_000_000),
                 self._state(f"{task.tote}: reach"),
-                self._move(
-                    "Reach", lambda: self._reach_for(grasp_z, task.tote_depth), on_failure=self._note
-                ),
+                self._move("Reach", lambda: self._reach_for(grasp_z, task.tote_depth), on_failure=self.note),
                 self._state(f"{task.tote}: grasp"),
                 self._close(task),
                 self._move_to_height("LiftOff", grasp_z + config.lift_off, loaded=True),
@@ -258,16 +238,7 @@ class PickAndPlaceNode:
     # Leaves
 
     def _state(self, state: str) -> Behaviour:
-        return Do(f"State[{state}]", lambda: self._enter(state))
-
-    def _enter(self, state: str) -> None:
-        self.state = state
-        self._state_publisher.publish(String(data=state))
-        self.node.get_logger().info(state)
-
-    def _note(self, reason: str) -> None:
-        self._memory.reason = f"{self.state}: {reason}"
-        self.node.get_logger().warn(self._memory.reason)
+        return Do(f"State[{state}]", lambda: self.enter(state))
 
     def _clock(self) -> int:
         return self.node.now_ns
@@ -277,10 +248,8 @@ class PickAndPlaceNode:
         return CallAction(
             f"NavigateTo[{station.name}]",
             self._navigate,
-            lambda: new(
-                NavigateToPose.Goal, pose=pose_stamped(staging, self._frames.map, self.node.now_ns)
-            ),
-            on_failure=self._note,
+            lambda: new(NavigateToPose.Goal, pose=pose_stamped(staging, self._frames.map, self.node.now_ns)),
+            on_failure=self.note,
         )
 
     def _dock_at(self, station: Station, dock_type: str) -> Behaviour:
@@ -294,7 +263,7 @@ class PickAndPlaceNode:
                 dock_type=dock_type,
                 navigate_to_staging_pose=False,
             ),
-            on_failure=self._note,
+            on_failure=self.note,
         )
 
     def _undock_from(self, dock_type: str) -> Behaviour:
@@ -302,11 +271,11 @@ class PickAndPlaceNode:
             "Undock",
             self._undock,
             lambda: new(UndockRobot.Goal, dock_type=dock_type),
-            on_failure=self._note,
+            on_failure=self.note,
         )
 
     def _open(self) -> Behaviour:
-        return CallAction("OpenGripper", self._gripper, lambda: self._gripper_goal(self.config.gripper_open))
+        return CallAction("OpenGripper", self._gripper, lambda: self._gripper_goal(self._gripper_open))
 
     def _close(self, task: PickAndPlaceTask) -> Behaviour:
         def judge(result: Any) -> str | None:
@@ -319,7 +288,7 @@ class PickAndPlaceNode:
             self._gripper,
             lambda: self._gripper_goal(0.0),
             on_result=judge,
-            on_failure=self._note,
+            on_failure=self.note,
         )
 
     def _gripper_goal(self, position: float) -> Any:
@@ -331,7 +300,7 @@ class PickAndPlaceNode:
             finger = self._memory.joints.get(self._gripper_joint, 0.0)
             if abs(finger - task.tote_width / 2.0) < self.config.grip_tolerance:
                 return True
-            self._note(f"lost {task.tote}: finger at {finger:.3f} m instead of {task.tote_width / 2.0:.3f} m")
+            self.note(f"lost {task.tote}: finger at {finger:.3f} m instead of {task.tote_width / 2.0:.3f} m")
             return False
 
         return Condition("HoldsTote", held)
@@ -339,7 +308,7 @@ class PickAndPlaceNode:
     def _move_to_height(self, name: str, z: float, *, loaded: bool = False) -> Behaviour:
         lift = self._arm.config.lift_joint
         return self._move(
-            name, lambda: {lift: z - self._arm.config.grasp_z}, loaded=loaded, on_failure=self._note
+            name, lambda: {lift: z - self._arm.config.grasp_z}, loaded=loaded, on_failure=self.note
         )
 
     def _retract(self, *, loaded: bool = False) -> Behaviour:
@@ -379,10 +348,10 @@ class PickAndPlaceNode:
             try:
                 return self._trajectory_goal(target(), self.config.loaded_speed if loaded else 1.0)
             except ValueError as error:
-                self._note(str(error))
+                self.note(str(error))
                 return None
 
-        return CallAction(name, self._trajectory, goal, on_failure=on_failure or self._note)
+        return CallAction(name, self._trajectory, goal, on_failure=on_failure or self.note)
 
     def _trajectory_goal(self, target: dict[str, float], speed: float) -> Any:
         trajectory = plan_joint_move(self._memory.joints, target, self._arm.limits, speed=speed)

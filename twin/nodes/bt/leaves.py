@@ -8,8 +8,8 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from twin.bridge.actions import ActionClient, ClientGoal, GoalStatus
-from twin.bridge.node import Client, Future
+from twin.bridge.actions import ActionClient, ClientGoal
+from twin.bridge.services import Client, Future
 
 
 class CallAction(Behaviour):
@@ -58,7 +58,7 @@ class CallAction(Behaviour):
             return Status.RUNNING
         if not self._goal.done:
             return Status.RUNNING
-        if self._goal.status != GoalStatus.SUCCEEDED:
+        if not self._goal.succeeded:
             text = getattr(self._goal.result, "error_msg", "") or getattr(
                 self._goal.result, "error_string", ""
             )

@@ -1,0 +1,129 @@
+"""Simple missions: a list of actions one after the other, a profile of velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from py_trees.common import Status
+
+from twin.bridge.actions import ActionClient
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import String, Twist
+from twin.bridge.qos import LATCHED
+from twin.bridge.types import ActionType
+from twin.nodes.bt.control import sequence
+from twin.nodes.bt.leaves import CallAction, Do
+from twin.nodes.velocity_smoother import twist
+
+
+class MissionNode:
+    """`/mission`: publishes `mission/state`, and knows whether the mission is over and how it ended."""
+
+    def __init__(self, bus: Bus, *, namespace: str = "") -> None:
+        self.node = bus.create_node("mission", namespace)
+        self._publisher = self.node.create_publisher(String, "mission/state", LATCHED)
+        self.state = "start"
+        self.done = False
+        self.succeeded: bool | None = None
+        self.reason = ""
+
+    def enter(self, state: str) -> None:
+        """Go on to `state` and tell it."""
+        self.state = state
+        self._publisher.publish(String(data=state))
+        self.node.get_logger().info(state)
+
+    def note(self, reason: str) -> None:
+        """Keep a reason for a failure; the last one is that of the mission."""
+        self.reason = f"{self.state}: {reason}"
+        self.node.get_logger().warn(self.reason)
+
+    def finish(self, succeeded: bool) -> None:
+        """End the mission."""
+        self.done, self.succeeded = True, succeeded
+        if succeeded:
+            self.reason = ""
+        self.enter("done" if succeeded else "failed")
+
+
+@dataclass(frozen=True)
+class ActionStep:
+    """One action to call."""
+
+    label: str
+    """Shown as the mission's state."""
+    action_type: ActionType
+    name: str
+    """Of the action."""
+    goal: Callable[[], Any]
+    """Makes the goal message when its turn comes."""
+
+
+class ActionSequenceNode(MissionNode):
+    """Calls actions one after the other; the first that fails ends the mission."""
+
+    def __init__(
+        self, bus: Bus, steps: Sequence[ActionStep], *, period_ns: int = 100_000_000, namespace: str = ""
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        clients: dict[str, ActionClient] = {}
+        leaves = []
+        for step in steps:
+            if step.name not in clients:
+                clients[step.name] = ActionClient(self.node, step.action_type, step.name)
+            leaves += [
+                Do(f"State[{step.label}]", lambda label=step.label: self.enter(label)),
+                CallAction(step.label, clients[step.name], step.goal, on_failure=self.note),
+            ]
+        self._tree = sequence("Behaviors", leaves)
+        self.node.create_timer(period_ns, self._tick)
+
+    def _tick(self) -> None:
+        if self.done:
+            return
+        self._tree.tick_once()
+        if self._tree.status != Status.RUNNING:
+            self.finish(self._tree.status == Status.SUCCESS)
+
+
+class VelocityProfileNode(MissionNode):
+    """Sends velocity commands open loop on `cmd_vel`: steps of (duration [s], linear [m/s], angular [rad/s])."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        steps: Sequence[tuple[float, float, float]],
+        *,
+        period_ns: int = 100_000_000,
+        settle_ns: int = 1_000_000_000,
+        namespace: str = "",
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        self._ends: list[tuple[int, float, float]] = []
+        end = 0
+        for duration, linear, angular in steps:
+            end += round(duration * 1e9)
+            self._ends.append((end, linear, angular))
+        self._settle_ns = settle_ns
+        self._start = self.node.now_ns
+        self._step = -1
+        self._commands = self.node.create_publisher(Twist, "cmd_vel", 10)
+        self.node.create_timer(period_ns, self._update)
+
+    def _update(self) -> None:
+        if self.done:
+            return
+        elapsed = self.node.now_ns - self._start
+        step = next((i for i, (end, _, _) in enumerate(self._ends) if elapsed <= end), len(self._ends))
+        if step == len(self._ends):
+            self._commands.publish(twist(0.0, 0.0))
+            if elapsed > self._ends[-1][0] + self._settle_ns:
+                self.finish(succeeded=True)
+            return
+        _, linear, angular = self._ends[step]
+        if step != self._step:
+            self._step = step
+            self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
+        self._commands.publish(twist(linear, angular))

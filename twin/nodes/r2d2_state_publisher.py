@@ -1,0 +1,80 @@
+"""R2-D2's state publisher of the URDF tutorial: a circle in `odom`, while tilt, swivel and periscope sweep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import Float64MultiArray, MultiArrayLayout
+from twin.bridge.tf import TransformBroadcaster
+from twin.geometry import Pose2, Pose3
+from twin.nodes.mission_nodes import MissionNode
+from twin.nodes.robot_pose import Frames
+
+_DEGREE = math.pi / 180.0
+_HEIGHT = 0.7
+"""z of `axis` in `odom`, as the tutorial publishes it [m]."""
+
+
+class R2D2StatePublisherNode(MissionNode):
+    """Publishes odom → axis and moves the base there; sends the joints' targets to `/position_controller`.
+
+    Each cycle the circle angle a grows, swivel grows by 1°, tilt sweeps 0 … −0.5 by 1° and periscope sweeps by
+    5 mm. The tutorial sweeps the periscope 0 … 0.2, outside its own limits of −0.5 … 0; here it sweeps 0 … −0.2.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        *,
+        joints: Sequence[str],
+        frames: Frames,
+        move_base: Callable[[Pose2], None],
+        radius: float = 2.0,
+        rate_hz: float = 25.0,
+        degrees_per_cycle: float = 0.25,
+        turns: float = 1.0,
+        namespace: str = "",
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        self._joints = tuple(joints)
+        self._frames = frames
+        self._move_base = move_base
+        self._radius = radius
+        self._step = degrees_per_cycle * _DEGREE
+        self._end = turns * 2.0 * math.pi
+        self._angle = 0.0
+        self._positions = {"tilt": 0.0, "swivel": 0.0, "periscope": 0.0}
+        self._rates = {"tilt": -_DEGREE, "swivel": _DEGREE, "periscope": -0.005}
+        self._tf = TransformBroadcaster(self.node)
+        self._commands = self.node.create_publisher(Float64MultiArray, "position_controller/commands", 1)
+        self.node.create_timer(round(1e9 / rate_hz), self._cycle)
+
+    def _cycle(self) -> None:
+        if self.done:
+            return
+        if self.state == "start":
+            self.enter("driving the circle")
+        a = self._angle
+        pose = Pose2(self._radius * math.cos(a), self._radius * math.sin(a), a + math.pi / 2.0)
+        self._move_base(pose)
+        T_odom_axis = Pose3.from_pose2(pose, _HEIGHT)
+        self._tf.send(self._frames.odom, self._frames.base, T_odom_axis, self.node.now_ns)
+        layout = MultiArrayLayout(dim=[], data_offset=0)
+        targets = np.array([self._positions[joint] for joint in self._joints])
+        self._commands.publish(Float64MultiArray(layout=layout, data=targets))
+        self._advance()
+        if self._angle > self._end:
+            self.finish(succeeded=True)
+
+    def _advance(self) -> None:
+        self._angle += self._step
+        for joint, rate in self._rates.items():
+            self._positions[joint] += rate
+        for joint, lowest in (("tilt", -0.5), ("periscope", -0.2)):
+            if not lowest <= self._positions[joint] <= 0.0:
+                self._rates[joint] = -self._rates[joint]
+                self._positions[joint] += 2.0 * self._rates[joint]

@@ -1,0 +1,165 @@
+"""The mission of a scenario as nodes on the bus."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Protocol
+
+from twin.bridge.action_types import BackUp, DriveOnHeading, NavigateToPose, Spin, Wait
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import Point, duration, new
+from twin.errors import ScenarioError
+from twin.geometry import Pose2, Pose3
+from twin.nodes.messages import pose_stamped
+from twin.nodes.mission_nodes import ActionSequenceNode, ActionStep, VelocityProfileNode
+from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.runtime.robot_stack import RobotStack
+from twin.scenario.missions import (
+    Behaviors,
+    BehaviorStep,
+    Idle,
+    Mission,
+    PickAndPlace,
+    R2D2StatePublisher,
+    VelocityProfile,
+)
+from twin.warehouse.arena import Arena
+from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask, Station
+
+
+class MissionHandle(Protocol):
+    """What the runtime asks of a mission node."""
+
+    @property
+    def state(self) -> str:
+        """What it is doing."""
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended; a run ends with it."""
+
+    @property
+    def succeeded(self) -> bool | None:
+        """None until it has ended."""
+
+    @property
+    def reason(self) -> str:
+        """Why it failed."""
+
+
+class IdleMission:
+    """Nothing to do; the run lasts its whole duration."""
+
+    state = "idle"
+    done = False
+    succeeded: bool | None = None
+    reason = ""
+
+
+def build_mission(
+    bus: Bus, mission: Mission, stacks: Mapping[str, RobotStack], arena: Arena | None, namespaces: Mapping[str, str]
+) -> MissionHandle:
+    """Return the scenario's mission as a node on the bus."""
+    if isinstance(mission, Idle):
+        return IdleMission()
+    stack, namespace = stacks[mission.robot], namespaces[mission.robot]
+    match mission:
+        case PickAndPlace():
+            return _pick_and_place(bus, mission, stack, arena, namespace)
+        case Behaviors():
+            steps = [_behavior(step, stack) for step in mission.steps]
+            return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
+        case VelocityProfile():
+            profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
+            return VelocityProfileNode(bus, profile * mission.repeat, namespace=namespace)
+        case R2D2StatePublisher():
+            return R2D2StatePublisherNode(
+                bus,
+                radius=mission.radius,
+                rate_hz=mission.rate,
+                degrees_per_cycle=mission.degrees_per_cycle,
+                joints=tuple(stack.handle.description.commands),
+                move_base=lambda pose: stack.handle.set_kinematic_pose(
+                    Pose3.from_pose2(pose, stack.spawn_height)
+                ),
+                frames=stack.frames,
+                namespace=namespace,
+            )
+
+
+def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
+    """Return the action of one step of a behaviour mission."""
+    allowance = duration(120_000_000_000)
+    if (drive := step.drive_on_heading) is not None:
+        drive_goal = new(
+            DriveOnHeading.Goal,
+            target=Point(x=drive.distance, y=0.0, z=0.0),
+            speed=drive.speed,
+            time_allowance=allowance,
+        )
+        label = f"drive {drive.distance:g} m"
+        return ActionStep(label, DriveOnHeading, "drive_on_heading", lambda: drive_goal)
+    if (backup := step.backup) is not None:
+        backup_goal = new(
+            BackUp.Goal,
+            target=Point(x=backup.distance, y=0.0, z=0.0),
+            speed=backup.speed,
+            time_allowance=allowance,
+        )
+        return ActionStep(f"back up {backup.distance:g} m", BackUp, "backup", lambda: backup_goal)
+    if (spin := step.spin) is not None:
+        spin_goal = new(Spin.Goal, target_yaw=spin.angle, time_allowance=allowance)
+        return ActionStep(f"spin {math.degrees(spin.angle):.0f}°", Spin, "spin", lambda: spin_goal)
+    if (wait := step.wait) is not None:
+        wait_goal = new(Wait.Goal, time=duration(round(wait.duration * 1e9)))
+        return ActionStep(f"wait {wait.duration:g} s", Wait, "wait", lambda: wait_goal)
+    goal = step.navigate_to_pose
+    assert goal is not None
+    target = pose_stamped(Pose2(goal.x, goal.y, goal.yaw), stack.frames.map, 0)
+    navigate_goal = new(NavigateToPose.Goal, pose=target)
+    label = f"navigate to ({goal.x:g}, {goal.y:g})"
+    return ActionStep(label, NavigateToPose, "navigate_to_pose", lambda: navigate_goal)
+
+
+def _pick_and_place(
+    bus: Bus, mission: PickAndPlace, stack: RobotStack, arena: Arena | None, namespace: str
+) -> MissionHandle:
+    if arena is None:
+        raise ScenarioError("the mission pick_and_place needs an arena with totes; set world.arena")
+    if stack.manipulator is None or stack.navigator is None:
+        lacks = "arm with a grasp_frame" if stack.manipulator is None else "navigation"
+        raise ScenarioError(f"the mission pick_and_place needs a robot with an {lacks}; '{stack.name}' has none")
+    taken: dict[str, int] = {}
+    tasks = []
+    for task in mission.tasks:
+        tote, zone = arena.tote(task.tote), arena.zone(task.to)
+        index = taken.setdefault(task.to, 0)
+        taken[task.to] += 1
+        if index >= len(zone.slots):
+            raise ScenarioError(
+                f"zone '{task.to}' has room for {len(zone.slots)} totes; the mission brings it more"
+            )
+        place = zone.slots[index]
+        depth, width, height = tote.size
+        tasks.append(
+            PickAndPlaceTask(
+                tote=task.tote,
+                tote_depth=depth,
+                tote_width=width,
+                tote_height=height,
+                pick=Station(
+                    name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height
+                ),
+                place=Station(name=place.name, face=place.approach(0.0), surface_z=place.height),
+            )
+        )
+    return PickAndPlaceNode(
+        bus,
+        tasks,
+        stack.manipulator.arm,
+        gripper_joint=stack.manipulator.gripper_joint,
+        gripper_open=stack.manipulator.gripper_open,
+        frames=stack.frames,
+        namespace=namespace,
+    )
