@@ -25,15 +25,15 @@ from twin.navigation.particles import (
 
 @dataclass(frozen=True, kw_only=True)
 class AmclConfig:
-    """Parameters; names are those of nav2_amcl."""
+    """Parameters; names are those of nav2_amcl (its alphas default to 0.2: more slip than wheels here have)."""
 
-    alpha1: float = 0.2
+    alpha1: float = 0.05
     """Turning noise per turn."""
-    alpha2: float = 0.2
+    alpha2: float = 0.05
     """Turning noise per metre."""
-    alpha3: float = 0.2
+    alpha3: float = 0.05
     """Driving noise per metre."""
-    alpha4: float = 0.2
+    alpha4: float = 0.05
     """Driving noise per turn."""
     min_particles: int = 500
     max_particles: int = 2000
@@ -59,7 +59,7 @@ class AmclConfig:
     resample_interval: int = 1
     recovery_alpha_slow: float = 0.0
     recovery_alpha_fast: float = 0.0
-    least_effective: float = 100.0
+    least_effective: float = 20.0
     """Weights are flattened while fewer particles than this would count."""
     global_particles: int = 50_000
     """How many poses `global_localisation` tries at once."""
@@ -205,7 +205,6 @@ class Amcl:
         lost = max(0.0, 1.0 - self._w_fast / self._w_slow) if self._w_slow > 0.0 else 0.0
         fresh = round(lost * count)
         if fresh:
-            self.particles[:: max(1, count // fresh)][:fresh] = self._anywhere(
-                len(self.particles[:: max(1, count // fresh)][:fresh])
-            )
+            replaced = np.linspace(0, count - 1, fresh).astype(np.int64)
+            self.particles[replaced] = self._anywhere(fresh)
             self._w_slow = self._w_fast = 0.0

@@ -62,7 +62,7 @@ def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
 
     Source: nav2_costmap_2d FootprintCollisionChecker. 254 is a collision; 255 touches unknown space.
     """
-    corners = np.ascontiguousarray(footprint, dtype=np.float64)
+    corners = np.array(footprint, dtype=np.float64, order="C")
     return outline_cost(costmap.costs, corners, *pose, *costmap.origin, costmap.resolution)
 
 

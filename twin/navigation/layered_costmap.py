@@ -118,7 +118,7 @@ class LayeredCostmap:
                 beyond `obstacle_max_range`: it clears and does not mark. NaN points are skipped.
             sensor_origin: x, y of the sensor in the costmap's frame [m].
         """
-        points = np.ascontiguousarray(scan_points, dtype=np.float64).reshape(-1, 2)
+        points = np.array(scan_points, dtype=np.float64, order="C").reshape(-1, 2)
         sensor = np.asarray(sensor_origin, dtype=np.float64)
         config, grid = self.config, self.costmap
         reach = max(config.obstacle_max_range, config.raytrace_max_range)

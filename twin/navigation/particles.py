@@ -23,8 +23,8 @@ def sample_motion(
 ) -> Array:
     """Return the particles, shape (n, 3), moved as odometry moved from `before` to `now`, with noise.
 
-    Source: Thrun et al., sample_motion_model_odometry, in nav2_amcl's differential form: turning noise is the same
-    forwards and backwards, and the first turn is 0 for steps below 1 cm.
+    Source: Thrun et al., sample_motion_model_odometry, in nav2_amcl's differential form: turning noise is the
+    same forwards and backwards, and the first turn is 0 for steps below 1 cm.
 
     Args:
         particles: Shape (n, 3).
@@ -62,7 +62,7 @@ def bin_keys(particles: Array) -> NDArray[np.int64]:
 
 
 def kld_sample_size(bins: int, error: float, z: float) -> int:
-    """Return how many samples keep the Kullback-Leibler error below `error` with quantile `z` (Fox 2003, eq. 7)."""
+    """Return how many samples keep the Kullback-Leibler error below `error` at quantile `z` (Fox 2003)."""
     if bins <= 1:
         return 1
     b = 2.0 / (9.0 * (bins - 1))
@@ -119,7 +119,7 @@ def mean_and_covariance(particles: Array, weights: Array) -> tuple[Pose2, Array]
 def tempered_weights(log_weights: Array, least_effective: float) -> Array:
     """Return normalised weights of log-weights, shape (n,), flattened until enough particles count.
 
-    The exponent is the largest in (0, 1] for which the effective sample size 1 / sum w² reaches `least_effective`:
+    The exponent is the largest in (0, 1] for which the effective sample size 1 / sum w² is `least_effective`:
     a filter that starts far off approaches in steps instead of betting everything on its luckiest particle.
     """
     relative = log_weights - log_weights.max()

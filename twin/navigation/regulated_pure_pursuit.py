@@ -80,7 +80,7 @@ class RegulatedPurePursuit:
     """The lookahead point of the last command, in the path's frame [m]."""
 
     def __post_init__(self) -> None:
-        self.footprint = np.ascontiguousarray(self.footprint, dtype=np.float64)
+        self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
         self._radius = max(radii(self.footprint)[1], 0.05)
         self.desired_linear_vel = self.config.desired_linear_vel
         self.reset()

@@ -47,7 +47,7 @@ class SimpleSmoother:
         config = self.config
         costs = np.zeros((0, 0), dtype=np.uint8) if costmap is None else costmap.costs
         origin, resolution = ((0.0, 0.0), 1.0) if costmap is None else (costmap.origin, costmap.resolution)
-        points = np.ascontiguousarray(path[:, :2])
+        points = np.array(path[:, :2], dtype=np.float64, order="C")
         for _ in range(1 + config.refinement_num):
             points = _relax(
                 points,

@@ -1,0 +1,162 @@
+"""Docking with a lidar: where the wall or the box in front is, read from scan points in the base frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.geometry import Array, Pose2, wrap_angle
+
+HYPOTHESIS_POINTS = 40
+"""Lines through every pair of so many points are tried."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallFit:
+    """A wall in front of the robot."""
+
+    distance: float
+    """From the base origin, perpendicular to the wall [m]."""
+    yaw: float
+    """Direction of the perpendicular in the base frame [rad]; 0 when the robot faces the wall squarely."""
+    rms: float
+    """Of the points' distances from the line [m]."""
+    inliers: NDArray[np.bool_]
+    """Which points belong to the wall, shape (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxFace:
+    """The face of a box in front of the robot."""
+
+    pose: Pose2
+    """Of the face's centre in the base frame, x into the box: yaw 0 when the robot faces it squarely."""
+    width: float
+    """As measured [m]."""
+    rms: float
+    """Of the points' distances from the face [m]."""
+    quality: float
+    """1 perfect ... 0: width at the edge of the tolerance, or rms 3 cm."""
+
+
+def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
+    """Return the line that most points lie on, or None if there are fewer than 5 of them.
+
+    Lines through pairs of points are scored by truncated squared distance (MSAC, Torr and Zisserman 2000), in a
+    fixed order; then total least squares over the inliers.
+
+    Args:
+        points: Shape (n, 2), in the base frame [m].
+        tolerance: Points within this of the line belong to it [m].
+    """
+    xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    if len(xy) < 5:
+        return None
+    some = xy[np.linspace(0, len(xy) - 1, min(HYPOTHESIS_POINTS, len(xy))).astype(np.int64)]
+    i, j = np.triu_indices(len(some), k=1)
+    along = some[j] - some[i]
+    length = np.hypot(along[:, 0], along[:, 1])
+    apart = length > 2.0 * tolerance
+    if not apart.any():
+        return None
+    i, along, length = i[apart], along[apart], length[apart]
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    offsets = np.einsum("ij,ij->i", normals, some[i])
+    squared = (normals @ some.T - offsets[:, None]) ** 2
+    best = int(np.argmin(np.minimum(squared, tolerance**2).sum(axis=1)))
+    normal, offset = normals[best], float(offsets[best])
+    for _ in range(3):
+        inliers = np.abs(xy @ normal - offset) <= tolerance
+        if np.count_nonzero(inliers) < 5:
+            return None
+        normal, offset, rms = _total_least_squares(xy[inliers])
+    if offset < 0.0:
+        normal, offset = -normal, -offset
+    yaw = math.atan2(normal[1], normal[0])
+    return WallFit(distance=offset, yaw=yaw, rms=rms, inliers=inliers)
+
+
+def find_box_face(
+    points: ArrayLike,
+    width: float,
+    *,
+    expected_y: float = 0.0,
+    width_tolerance: float = 0.03,
+    max_gap: float = 0.05,
+    max_yaw: float = math.radians(40.0),
+) -> BoxFace | None:
+    """Return the face of a box of known width that is nearest to an expected lateral position, or None.
+
+    The scan is cut where neighbours are far apart and at corners; a piece is a face if its width fits.
+
+    Args:
+        points: Shape (n, 2), in the base frame, in the order of the beams [m].
+        width: Of the face [m].
+        expected_y: Lateral position of its centre in the base frame [m].
+        width_tolerance: [m].
+        max_gap: Neighbouring points farther apart than this belong to different things [m].
+        max_yaw: A face turned away farther than this is not looked at [rad].
+    """
+    xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    xy = xy[np.isfinite(xy).all(axis=1)]
+    if len(xy) < 5:
+        return None
+    gaps = np.flatnonzero(np.hypot(*np.diff(xy, axis=0).T) > max_gap) + 1
+    faces = []
+    for segment in np.split(xy, gaps):
+        for piece in _split_at_corners(segment, 0.02):
+            face = _face(piece, width, width_tolerance, max_yaw)
+            if face is not None:
+                faces.append(face)
+    return min(faces, key=lambda face: abs(face.pose.y - expected_y), default=None)
+
+
+def _total_least_squares(points: Array) -> tuple[Array, float, float]:
+    """Return unit normal, offset (normal · x = offset) and rms of the line nearest to the points."""
+    centre = points.mean(axis=0)
+    values, vectors = np.linalg.eigh((points - centre).T @ (points - centre) / len(points))
+    normal: Array = vectors[:, 0]
+    return normal, float(normal @ centre), math.sqrt(max(float(values[0]), 0.0))
+
+
+def _split_at_corners(points: Array, deviation: float) -> list[Array]:
+    """Cut a chain of points where it leaves its chord by more than `deviation` (Ramer 1972)."""
+    if len(points) < 5:
+        return [points]
+    chord = points[-1] - points[0]
+    length = math.hypot(chord[0], chord[1])
+    if length == 0.0:
+        return [points]
+    offset = points - points[0]
+    away = np.abs(chord[0] * offset[:, 1] - chord[1] * offset[:, 0]) / length
+    corner = int(np.argmax(away))
+    if away[corner] <= deviation:
+        return [points]
+    left = _split_at_corners(points[: corner + 1], deviation)
+    return left + _split_at_corners(points[corner:], deviation)
+
+
+def _face(points: Array, width: float, tolerance: float, max_yaw: float) -> BoxFace | None:
+    """Return the face that these points would be, or None if the width or the direction does not fit."""
+    if len(points) < 5:
+        return None
+    normal, offset, rms = _total_least_squares(points)
+    if offset < 0.0:
+        normal, offset = -normal, -offset
+    yaw = math.atan2(normal[1], normal[0])
+    tangent = np.array([-normal[1], normal[0]])
+    at = points @ tangent
+    low, high = float(at.min()), float(at.max())
+    # The edges lie, on average, half a beam outside the first and last point.
+    measured = (high - low) * len(points) / (len(points) - 1)
+    misfit = abs(measured - width)
+    if misfit > tolerance or rms > 0.03 or abs(wrap_angle(yaw)) > max_yaw:
+        return None
+    centre = offset * normal + 0.5 * (low + high) * tangent
+    quality = (1.0 - misfit / tolerance) * (1.0 - rms / 0.03)
+    return BoxFace(
+        pose=Pose2(float(centre[0]), float(centre[1]), yaw), width=measured, rms=rms, quality=quality
+    )

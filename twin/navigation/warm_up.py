@@ -1,0 +1,32 @@
+"""Compile (or load from the disk cache) every compiled function before the clock starts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twin.geometry import Pose2
+from twin.navigation.costmap import footprint_cost
+from twin.navigation.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.likelihood_field import LikelihoodField
+from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.planner import Planner, PlannerConfig
+from twin.navigation.recovery import DriveOnHeading
+from twin.navigation.smoother import SimpleSmoother
+
+
+def warm_up() -> None:
+    """Call each compiled function once on a 2 x 2 m room with the types that it is called with later."""
+    data = np.zeros((40, 40), dtype=np.int8)
+    data[0] = data[-1] = 100
+    room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
+    layered = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room)
+    layered.update([[0.5, 1.0]], (1.0, 1.0))
+    costmap = layered.costmap
+    start, goal = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
+    SimpleSmoother().smooth(Planner(config=PlannerConfig()).plan(costmap, start, goal), costmap)
+    footprint_cost(costmap, layered.config.polygon, start)
+    DriveOnHeading().update(start, 0.1, costmap)
+    field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
+    field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
