@@ -117,13 +117,14 @@ def _limit_force(actuator: mujoco.MjsActuator, effort: float | None) -> None:
 
 def _add_follower(spec: mujoco.MjSpec, joint: Joint, timestep: float) -> None:
     assert joint.mimic is not None
-    spec.add_equality(
+    equality = spec.add_equality(
         name=f"{joint.name}_mimic",
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=joint.name,
         name2=joint.mimic.joint,
-        data=[joint.mimic.offset, joint.mimic.multiplier, *[0.0] * 9],
         solref=[max(0.004, 2.0 * timestep), 1.0],
         solimp=FOLLOWER_SOLIMP,
     )
+    # a polynomial in the leader's position; the array's length differs between MuJoCo versions
+    equality.data[:2] = joint.mimic.offset, joint.mimic.multiplier

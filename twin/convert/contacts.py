@@ -40,7 +40,7 @@ def spawn_height(model: mujoco.MjModel) -> float:
         for geom in range(model.ngeom)
         if model.geom_group[geom] == GROUP_COLLISION
     ]
-    return -float(min(lowest)) if lowest else 0.0
+    return 0.0 - float(min(lowest)) if lowest else 0.0
 
 
 def _reach_down(model: mujoco.MjModel, geom: int, down: np.ndarray) -> float:

@@ -42,13 +42,9 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         wheel_joints=wheel_joints,
     )
     add_excludes(spec, description)
-    try:
-        model = _compile(spec)
-        entries = add_actuators(spec, description, model, timestep=timestep)
-        _compile(spec)
-    except ValueError as error:
-        message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
-        raise ConversionError(Problem(message, description.source)) from error
+    model = _compile(spec, description)
+    entries = add_actuators(spec, description, model, timestep=timestep)
+    _compile(spec, description)
     return Conversion(
         description=description,
         spec=spec,
@@ -58,10 +54,14 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
     )
 
 
-def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
     """Compile a copy, in which a root link named like MuJoCo's world body has another name."""
     probe = spec.copy()
     root = probe.worldbody.first_body()
     if root.name == probe.worldbody.name:
         root.name = "world_link"
-    return probe.compile()
+    try:
+        return probe.compile()
+    except ValueError as error:
+        message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
+        raise ConversionError(Problem(message, description.source)) from error
