@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
-from twin.geometry import Pose2, Pose3, xyzw_from_wxyz
-from twin.recording.columns import ScalarColumns, TrailColumns, TransformColumns
+from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
+from twin.recording.columns import TIMELINE, ScalarColumns, TrailColumns, TransformColumns
 from twin.recording.frames import Frames
 
 TRUTH_COLOUR = (90, 200, 120, 255)
@@ -25,6 +26,7 @@ GHOST_RADIUS = 0.35
 TRAIL_HEIGHT = 0.03
 """Above the floor, so that trails lie on the map [m]."""
 
+Numbers = tuple[float, ...]
 TruePose = Callable[[str], Pose3]
 """Returns the pose of a body in `world`, now."""
 
@@ -59,6 +61,7 @@ class Belief:
         self._period_ns = period_ns
         self._next_ns = 0
         self._base: str | None = None
+        self._names: dict[tuple[str, str], tuple[str, str]] = {}
         self._anchor: Pose2 | None = None
         self._T_map_odom: Pose2 | None = None
         robot = frames.robot(namespace)
@@ -88,35 +91,41 @@ class Belief:
             static=True,
         )
 
-    def on_transform(self, time_ns: int, parent: str, child: str, T_parent_child: Pose3) -> None:
-        """Take one transform of `/tf` whose parent is `map` or `odom`; frame ids as in the message."""
-        link = child.rsplit("/", 1)[-1]
-        if link == "odom":
-            self._T_map_odom = T_parent_child.to_pose2()
+    def on_transform(self, time_ns: int, parent: str, child: str, transform: Any) -> None:
+        """Take one transform of `/tf` whose parent is `map` or `odom`.
+
+        Args:
+            time_ns: Of publication [ns].
+            parent: Frame id as in the message.
+            child: Frame id as in the message.
+            transform: A geometry_msgs/Transform.
+        """
+        if child.rsplit("/", 1)[-1] == "odom":
+            self._T_map_odom = _pose2(transform)
         elif parent.rsplit("/", 1)[-1] == "odom":
-            self._on_odometry(time_ns, parent, child, T_parent_child.to_pose2())
-        self._add(time_ns, parent, child, T_parent_child)
+            if time_ns < self._next_ns:
+                return
+            self._next_ns = time_ns + self._period_ns
+            self._on_odometry(time_ns, parent, child, _pose2(transform))
+        t, q = transform.translation, transform.rotation
+        self._add(time_ns, parent, child, (t.x, t.y, t.z), (q.x, q.y, q.z, q.w))
 
     def send(self, recording: rr.RecordingStream) -> None:
         """Send the block."""
         for columns in (self._transforms, *self._trails.values(), self._error_xy, self._error_yaw):
             columns.send(recording)
 
-    def _add(self, time_ns: int, parent: str, child: str, pose: Pose3) -> None:
-        self._transforms.append(
-            time_ns,
-            self._frames.belief(self._namespace, parent),
-            [self._frames.belief(self._namespace, child)],
-            np.array([pose.xyz]),
-            np.array([xyzw_from_wxyz(pose.quat_wxyz)]),
-        )
+    def _add(self, time_ns: int, parent: str, child: str, xyz: Numbers, quat_xyzw: Numbers) -> None:
+        names = self._names.get((parent, child))
+        if names is None:
+            belief = self._frames.belief
+            names = (belief(self._namespace, parent), belief(self._namespace, child))
+            self._names[parent, child] = names
+        self._transforms.append(time_ns, names[0], [names[1]], [xyz], [quat_xyzw])
 
     def _on_odometry(self, time_ns: int, odom: str, child: str, T_odom_base: Pose2) -> None:
         if self._anchor is None:
-            self._start(time_ns, odom, child, T_odom_base)
-        if time_ns < self._next_ns or self._anchor is None:
-            return
-        self._next_ns = time_ns + self._period_ns
+            self._anchor = self._start(time_ns, odom, child, T_odom_base)
         odometry = self._anchor @ T_odom_base
         self._trails["odometry"].append(time_ns, odometry.x, odometry.y, TRAIL_HEIGHT)
         estimate = None if self._T_map_odom is None else self._T_map_odom @ T_odom_base
@@ -130,15 +139,20 @@ class Belief:
                 self._error_xy.append(time_ns, math.hypot(error.x, error.y))
                 self._error_yaw.append(time_ns, error.yaw)
 
-    def _start(self, time_ns: int, odom: str, child: str, T_odom_base: Pose2) -> None:
+    def _start(self, time_ns: int, odom: str, child: str, T_odom_base: Pose2) -> Pose2:
         self._base = self._frames.body(self._namespace, child)
         if self._base is None:
-            self._anchor = self._T_map_odom or Pose2(0.0, 0.0, 0.0)
+            anchor = self._T_map_odom or Pose2(0.0, 0.0, 0.0)
         else:
-            self._anchor = self._true_pose(self._base).to_pose2() @ T_odom_base.inverse()
+            anchor = self._true_pose(self._base).to_pose2() @ T_odom_base.inverse()
         if self._T_map_odom is None:
-            self._add(time_ns, "map", odom, Pose3.from_pose2(self._anchor))
+            half = anchor.yaw / 2.0
+            self._add(
+                time_ns, "map", odom, (anchor.x, anchor.y, 0.0), (0.0, 0.0, math.sin(half), math.cos(half))
+            )
+        self._recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
         self._draw_ghost(self._frames.belief(self._namespace, child))
+        return anchor
 
     def _draw_ghost(self, frame: str) -> None:
         angles = np.linspace(0.0, 2.0 * math.pi, 33)
@@ -155,3 +169,8 @@ class Belief:
                 vectors=[nose], origins=[(0.0, 0.0, TRAIL_HEIGHT)], colors=[ESTIMATE_COLOUR], radii=[0.03]
             ),
         )
+
+
+def _pose2(transform: Any) -> Pose2:
+    t, q = transform.translation, transform.rotation
+    return Pose2(t.x, t.y, yaw_from_quat_wxyz((q.w, q.x, q.y, q.z)))

@@ -6,14 +6,14 @@ is sent once a block. Importing this module imports rerun (0.6 s): only a run th
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 TIMELINE = "sim_time"
 """The one timeline: simulated time as a duration, from integer nanoseconds."""
@@ -54,11 +54,11 @@ class TransformColumns(Columns):
         super().__init__(entity)
         self._parents: list[str] = []
         self._children: list[str] = []
-        self._xyz: list[NDArray[Any]] = []
-        self._quat_xyzw: list[NDArray[Any]] = []
+        self._xyz: list[ArrayLike] = []
+        self._quat_xyzw: list[ArrayLike] = []
 
     def append(
-        self, time_ns: int, parent: str, children: list[str], xyz: NDArray[Any], quat_xyzw: NDArray[Any]
+        self, time_ns: int, parent: str, children: list[str], xyz: ArrayLike, quat_xyzw: ArrayLike
     ) -> None:
         """Add the poses of `children` in `parent` at one time; `xyz` (n, 3) [m], `quat_xyzw` (n, 4)."""
         n = len(children)
@@ -147,19 +147,17 @@ class TrailColumns(Columns):
     def __init__(self, entity: str, step_m: float) -> None:
         super().__init__(entity)
         self._step_m = step_m
-        self._last: NDArray[np.float64] | None = None
-        self._segments: list[NDArray[np.float64]] = []
+        self._last: tuple[float, float, float] | None = None
+        self._segments: list[tuple[tuple[float, float, float], tuple[float, float, float]]] = []
 
     def append(self, time_ns: int, x: float, y: float, z: float) -> None:
         """Add a position [m]; ignored until it is a step away from the last one kept."""
-        point = np.array((x, y, z))
+        point = (x, y, z)
         if self._last is None:
             self._last = point
-            return
-        dx, dy, dz = point - self._last
-        if dx * dx + dy * dy + dz * dz >= self._step_m * self._step_m:
+        elif math.dist(point, self._last) >= self._step_m:
             self._times.append(time_ns)
-            self._segments.append(np.stack((self._last, point)))
+            self._segments.append((self._last, point))
             self._last = point
 
     def _take(self) -> Iterable[rr.ComponentColumn]:
@@ -169,23 +167,20 @@ class TrailColumns(Columns):
 
 
 class ScalarColumns(Columns):
-    """One or several numbers per row."""
+    """A number per row."""
 
     def __init__(self, entity: str) -> None:
         super().__init__(entity)
         self._rows: list[float] = []
-        self._lengths: list[int] = []
 
-    def append(self, time_ns: int, *values: float) -> None:
-        """Add a row of numbers."""
+    def append(self, time_ns: int, value: float) -> None:
+        """Add a number."""
         self._times.append(time_ns)
-        self._rows += values
-        self._lengths.append(len(values))
+        self._rows.append(value)
 
     def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.Scalars.columns(scalars=np.array(self._rows, dtype=np.float64)).partition(self._lengths)
+        columns = rr.Scalars.columns(scalars=np.array(self._rows, dtype=np.float64))
         self._rows.clear()
-        self._lengths.clear()
         return columns
 
 

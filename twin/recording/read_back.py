@@ -6,6 +6,7 @@ Works on the file of a killed run too, which has no footer, up to its last compl
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -101,8 +102,11 @@ def read(path: Path) -> Recording:
         RecordingError: The file is missing, not a recording or empty.
     """
     import rerun.chunk as rc
+    from rerun.error_utils import RerunWarning
 
-    reader = rc.RrdReader(check_recording(path))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # of a killed run
+        reader = rc.RrdReader(check_recording(path))
     stores = reader.recordings()
     if not stores:
         raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")

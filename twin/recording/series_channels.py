@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import rerun as rr
 
-from twin.geometry import Pose3
-from twin.recording.channel import Context, set_time
+from twin.recording.channel import Context
 from twin.recording.columns import LogColumns, ScalarColumns, StateColumns
 from twin.recording.frames import BELIEF_FRAMES
 from twin.recording.sources import Sample
@@ -96,7 +94,6 @@ class TransformChannel:
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         del topic
-        self._recording = context.recording
         self._belief = context.belief(namespace)
 
     def take(self, sample: Sample) -> None:
@@ -104,10 +101,7 @@ class TransformChannel:
         for stamped in sample.message.transforms:
             parent = stamped.header.frame_id
             if parent.rsplit("/", 1)[-1] in BELIEF_FRAMES:
-                t, q = stamped.transform.translation, stamped.transform.rotation
-                pose = Pose3(np.array((t.x, t.y, t.z)), np.array((q.w, q.x, q.y, q.z)))
-                set_time(self._recording, sample.time_ns)
-                self._belief.on_transform(sample.time_ns, parent, stamped.child_frame_id, pose)
+                self._belief.on_transform(sample.time_ns, parent, stamped.child_frame_id, stamped.transform)
 
     def send(self, recording: rr.RecordingStream) -> None:
         """Send the block."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,12 +51,28 @@ class RecordingConfig:
             raise RecordingError("; ".join(problems))
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """A copy of a sample; the bus lends a message only during the call."""
+
+    topic: str
+    msgtype: str
+    time_ns: int
+    payload: bytes
+    message: Any
+
+    @classmethod
+    def of(cls, sample: Sample) -> _Kept:
+        return cls(sample.topic, sample.msgtype, sample.time_ns, sample.payload, deepcopy(sample.message))
+
+
 class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
-    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes is
-    a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order: construct,
-    `bus.tap(sink.on_sample)`, `declare(world)`, then `on_tick(world)` after every tick, `close(verdict)`.
+    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes
+    is a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order:
+    construct, `bus.tap(sink.on_sample)`, `declare(world)`, then `on_tick(world)` after every tick and
+    `close(verdict)`.
     """
 
     def __init__(
@@ -128,7 +145,7 @@ class RerunSink:
     def on_sample(self, sample: Sample) -> None:
         """Keep what is shown of a message (a callback for `Bus.tap`)."""
         if self._world is None:
-            self._early.append(sample)
+            self._early.append(_Kept.of(sample))
             return
         key = (sample.topic, sample.msgtype)
         if key not in self._channels:
@@ -150,7 +167,7 @@ class RerunSink:
             self._send()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
-        """Write what waits, the verdict (as in `verdict.json`) and the footer; what comes later is ignored."""
+        """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored."""
         if self._world is None or self._closed:
             return
         from twin.recording.stream import log_verdict

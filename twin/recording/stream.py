@@ -22,7 +22,7 @@ def open_recording(
 ) -> rr.RecordingStream:
     """Return a stream into a new file.
 
-    Nothing in it depends on the wall clock: no `log_time`, no start time, and chunks end when the sink flushes.
+    Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
 
     Raises:
         RecordingError: The file cannot be written.

@@ -1,0 +1,80 @@
+"""Opening recordings: the screen has no errors, and mistakes are one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from twin.errors import RecordingError
+from twin.recording import player
+
+needs_vulkan = pytest.mark.skipif(
+    not player.has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"
+)
+
+
+@needs_vulkan
+@pytest.mark.parametrize("time_s", [0.0, 2.5])
+def test_screen_has_no_errors(recorded: Any, time_s: float) -> None:
+    with player.headless_viewer(recorded.path, time_s=time_s) as client:
+        state = client.get_state()
+        (recording,) = state.recordings
+        assert recording.current_timeline == "sim_time"
+        names = {view.name for view in state.views}
+        assert {"Simulation", "Map", "Mission", "Log", "Verdict", "Forward velocity [m/s]"} <= names
+        assert [(view.name, report) for view in state.views for report in view.reports] == []
+
+
+@needs_vulkan
+def test_screenshot(recorded: Any, tmp_path: Path) -> None:
+    player.screenshot(recorded.path, tmp_path / "shot.png", time_s=2.0, view="Map")
+    assert (tmp_path / "shot.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "shot.png").stat().st_size > 5_000
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no\.rrd: cannot read the recording: No such file"):
+        player.play(tmp_path / "no.rrd")
+
+
+def test_something_else(tmp_path: Path) -> None:
+    (tmp_path / "a.rrd").write_text("hello")
+    with pytest.raises(RecordingError, match="not a Rerun recording"):
+        player.play(tmp_path / "a.rrd")
+
+
+def test_no_display(recorded: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(player.sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(RecordingError, match=r"no display.*--web"):
+        player.play(recorded.path)
+
+
+def test_web_viewer_serves_only_this_computer(recorded: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[list[str]] = []
+
+    class Viewer:
+        def __init__(self, command: list[str], **_: Any) -> None:
+            started.append(command)
+
+        def wait(self) -> int:
+            return 0
+
+    monkeypatch.setattr(player.subprocess, "Popen", Viewer)
+    urls: list[str] = []
+    assert player.play(recorded.path, web=True, port=player.free_port(), on_ready=urls.append) == 0
+    assert started[0][1:3] == ["--bind", "127.0.0.1"]
+    assert urls[0].startswith("http://127.0.0.1:")
+
+
+def test_port_in_use(recorded: Any) -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(RecordingError, match="in use"):
+            player.play(recorded.path, web=True, port=taken.getsockname()[1])
