@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pytest
 
-from twin.geometry import Pose3
+from twin.convert.conversion import Conversion
+from twin.geometry import Pose2, Pose3
 from twin.models.description import (
     Box,
     ContactSpec,
@@ -22,6 +23,7 @@ from twin.models.description import (
     SensorSpec,
     Visual,
 )
+from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
 
 XML = """
@@ -92,20 +94,15 @@ def description(sensors: tuple[SensorSpec, ...] = (LIDAR, IMU, SONAR, BUMPER)) -
     )  # fmt: skip
 
 
-@dataclass
-class HandMade:
-    """Stands in for twin.convert.Conversion."""
-
-    base: str = "free"
-    description: RobotDescription = field(default_factory=description)
-    spawn_height: float = 0.05
-
-    @property
-    def spec(self) -> mujoco.MjSpec:
-        joint = "<freejoint/>" if self.base == "free" else ""
-        spec = mujoco.MjSpec.from_string(XML.format(joint=joint))
-        spec.body("base_link").mocap = self.base == "kinematic"
-        return spec
+def hand_made(base: str = "free", sensors: tuple[SensorSpec, ...] | None = None) -> Conversion:
+    """A two-wheeled cart with a lifting mast; wheels of radius 0.05 m, track 0.30 m."""
+    spec = mujoco.MjSpec.from_string(XML.format(joint="<freejoint/>" if base == "free" else ""))
+    spec.body("base_link").mocap = base == "kinematic"
+    robot = description() if sensors is None else description(sensors)
+    return Conversion(
+        description=robot, spec=spec, spawn_height=0.05, ledger=(),
+        root_joint="base_link" if base == "free" else None,
+    )  # fmt: skip
 
 
 def box(name: str, xyz: tuple[float, float, float], size: tuple[float, float, float]) -> StaticBody:
@@ -119,6 +116,13 @@ def tote(name: str, xyz: tuple[float, float, float], mass: float = 2.5) -> FreeB
         name=name, T_world_body=Pose3.from_xyz_rpy(xyz), mass=mass, friction=0.6,
         shapes=(Shape(geometry=Box(size=(0.30, 0.24, 0.18))),),
     )  # fmt: skip
+
+
+ORIGIN = Pose2(0.0, 0.0, 0.0)
+
+
+def placed(pose: Pose2 | Pose3 = ORIGIN, base: str = "free", **changes: Any) -> RobotPlacement:
+    return RobotPlacement(name="cart", conversion=hand_made(base, **changes), pose=pose)
 
 
 @pytest.fixture

@@ -74,9 +74,10 @@ def _look(spec: mujoco.MjSpec, scene: Scene) -> None:
     spec.visual.headlight.diffuse = [0.45, 0.45, 0.45]
     spec.visual.headlight.specular = [0.1, 0.1, 0.1]
     spec.visual.map.zfar = 100.0
+    spec.visual.quality.shadowsize = 8192
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
     # MuJoCo would derive these from all bodies, the 40 m floor included.
-    spec.stat.extent, spec.stat.center = 10.0, [0.0, 0.0, 0.5]
+    spec.stat.extent, spec.stat.center = 14.0, [0.0, 0.0, 0.5]
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -89,7 +90,7 @@ def _look(spec: mujoco.MjSpec, scene: Scene) -> None:
     spec.worldbody.add_light(
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0.0, 0.0, 10.0],
+        pos=[0.0, 0.0, 25.0],
         dir=[0.35, 0.5, -1.0],
         diffuse=[0.5, 0.5, 0.48],
         castshadow=True,
@@ -186,4 +187,5 @@ def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
     spec.attach(robot, prefix=f"{placement.name}/", frame=spec.worldbody.add_frame())
     root = spec.body(f"{placement.name}/{placement.conversion.description.root}")
     root.pos, root.quat = placement.T_world_root.xyz, placement.T_world_root.quat_wxyz
-    root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+    if root.joints:  # MuJoCo refuses a policy for a body that cannot move
+        root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from pathlib import Path
 
@@ -17,6 +18,9 @@ _BAD = (
     mujoco.mjtWarning.mjWARN_BADQVEL,
     mujoco.mjtWarning.mjWARN_BADQACC,
 )
+# MuJoCo would write to stderr and to MUJOCO_LOG.TXT in the current folder.
+mujoco.set_mju_user_warning(logging.getLogger("twin.mujoco").info)
+
 _WHAT = ("position", "velocity", "acceleration")
 
 
@@ -60,26 +64,27 @@ class DivergenceGuard:
         raise SimulationError(f"{message}; {hint}")
 
     def _replay(self) -> tuple[str, str]:
-        """Step singly from the last good state to find the first bad number; appends each step's state."""
+        """Step singly from the last good state to find the first bad number; remembers each step's state."""
         model, data = self._model, self._data
         mujoco.mj_setState(model, data, self._states[-1], _STATE)
         for warning in self._warnings:
             warning.number = 0
         for _ in range(10_000):
             mujoco.mj_step(model, data)
-            for kind, (warning, what) in enumerate(zip(self._warnings, _WHAT, strict=True)):
+            for warning, what in zip(self._warnings, _WHAT, strict=True):
                 if warning.number:
-                    joint = _joint_of(model, warning.lastinfo, is_qpos=kind == 0)
-                    return what, _describe(model, joint)
+                    return what, _describe(model, self._worst_joint(warning, what))
             self.remember()
         return "state", "the world"
 
-
-def _joint_of(model: mujoco.MjModel, index: int, *, is_qpos: bool) -> int:
-    """Return the joint that owns an entry of qpos or qvel."""
-    if is_qpos:
-        return int(np.searchsorted(model.jnt_qposadr, index, side="right")) - 1
-    return int(model.dof_jntid[index])
+    def _worst_joint(self, warning: mujoco.MjWarningStat, what: str) -> int:
+        """Return the joint that moves worst; MuJoCo names the first bad one, perhaps only dragged along."""
+        model, data = self._model, self._data
+        if what == "position":
+            return int(np.searchsorted(model.jnt_qposadr, warning.lastinfo, side="right")) - 1
+        values = np.abs(data.qvel if what == "velocity" else data.qacc)
+        worst = int(np.argmax(values)) if np.isfinite(values).all() else warning.lastinfo
+        return int(model.dof_jntid[worst])
 
 
 def _describe(model: mujoco.MjModel, joint: int) -> str:

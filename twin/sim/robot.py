@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import mujoco
 
+from twin.convert.conversion import Conversion
 from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 
@@ -15,29 +16,13 @@ if TYPE_CHECKING:
     from twin.sim.sensors import Sensor
 
 
-class ConvertedRobot(Protocol):
-    """What a world needs of `twin.convert.Conversion`."""
-
-    @property
-    def spec(self) -> mujoco.MjSpec:
-        """The robot alone: every link a body of its name; is copied, not changed."""
-
-    @property
-    def spawn_height(self) -> float:
-        """Height of the root link at which the robot just stands on the floor [m]."""
-
-    @property
-    def description(self) -> RobotDescription:
-        """What the robot file says."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class RobotPlacement:
     """A robot and where it starts; `convert(base=...)` chose whether its base is free, fixed or kinematic."""
 
     name: str
     """Prefix of its elements in the model: link `base_link` is the body `<name>/base_link`."""
-    conversion: ConvertedRobot
+    conversion: Conversion
     pose: Pose2 | Pose3
     """Of the root link in the world; a Pose2 stands the robot on the floor."""
 

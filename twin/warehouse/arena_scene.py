@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
+from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,11 @@ from twin.geometry import Pose2, Pose3
 from twin.models.description import Box
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
-from twin.warehouse.arena_file import PartitionEntry, RackEntry
+from twin.warehouse.arena_file import PartitionEntry, RackEntry, ToteKind
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena
-    from twin.warehouse.shelf import Zone
+    from twin.warehouse.shelf import Shelf, Zone
 
 PALETTE: MappingProxyType[str, Rgba] = MappingProxyType(
     {
@@ -35,13 +36,16 @@ _WALL: Rgba = (0.86, 0.87, 0.88, 1.0)
 _PARTITION: Rgba = (0.72, 0.80, 0.84, 1.0)
 _PLINTH: Rgba = (0.30, 0.33, 0.37, 1.0)
 _BOARD: Rgba = (0.80, 0.81, 0.80, 1.0)
+_TAPE: Rgba = (0.62, 0.47, 0.31, 1.0)
 _CARDBOARD: Rgba = (0.72, 0.56, 0.38, 1.0)
 _STOCK: tuple[Rgba, ...] = (
-    (0.40, 0.50, 0.60, 1.0),
-    (0.47, 0.55, 0.62, 1.0),
-    (0.70, 0.55, 0.38, 1.0),
+    (0.33, 0.47, 0.60, 1.0),
+    (0.40, 0.52, 0.60, 1.0),
+    (0.52, 0.56, 0.60, 1.0),
     (0.63, 0.64, 0.63, 1.0),
 )
+_GRIPPER_ROOM = 0.15
+"""Free on each side of a tote [m]."""
 _BOARD_THICKNESS = 0.03
 _UPRIGHT = 0.05
 _PAINT = 0.002
@@ -96,19 +100,34 @@ def goods(
 
 
 def _stock(arena: Arena, seed: int, jitter: tuple[float, float]) -> Iterator[StaticBody]:
+    """Fill other slots with totes of the same make and with cartons."""
     file, kind = arena.file, arena.file.tote
     taken = {tote.slot.name for tote in arena.totes.values()}
     for rack in arena.racks.values():
         for slot in rack.slots():
-            chance, colour = NoiseStream(seed, f"stock/{slot.name}").uniform(0, 2)
+            chance, look = NoiseStream(seed, f"stock/{slot.name}").uniform(0, 2)
             if file.stock is None or slot.name in taken or chance >= file.stock.fill:
                 continue
-            pose = slot.standing(kind.depth, kind.height, kind.inset)
-            yield StaticBody(
-                name=f"stock/{slot.name}",
-                T_world_body=pose @ _placement_error(seed, slot.name, jitter),
-                shapes=_tote_shapes((kind.depth, kind.width, kind.height), _STOCK[int(colour * len(_STOCK))]),
-            )
+            index = int(look * (len(_STOCK) + 2))
+            if index < len(_STOCK):
+                size = (kind.depth, kind.width, kind.height)
+                shapes = _tote_shapes(size, _STOCK[index])
+            else:
+                size = _carton_size(rack, kind)
+                shapes = _carton_shapes(size)
+            pose = slot.standing(size[0], size[2], kind.inset) @ _placement_error(seed, slot.name, jitter)
+            yield StaticBody(name=f"stock/{slot.name}", T_world_body=pose, shapes=shapes)
+
+
+def _carton_size(rack: Shelf, kind: ToteKind) -> tuple[float, float, float]:
+    """Return a carton's depth, width and height, as large as leaves a gripper room at a tote beside it."""
+    gaps = [high - low for low, high in pairwise(rack.levels)]
+    room = 2.0 * rack.slot_spacing - kind.width - 2.0 * _GRIPPER_ROOM
+    return (
+        min(0.36, rack.depth - 2.0 * kind.inset),
+        min(0.42, room, rack.slot_spacing - 0.1),
+        min(0.25, *(gap - 0.08 for gap in gaps), 0.25),
+    )
 
 
 def _placement_error(seed: int, name: str, jitter: tuple[float, float]) -> Pose3:
@@ -156,24 +175,20 @@ def _rack(name: str, rack: RackEntry) -> StaticBody:
     depth, length = rack.depth, rack.length
     lowest, top = rack.levels[0], rack.levels[-1] + rack.headroom
     shapes = [box((depth, length, lowest), (0.0, 0.0, lowest / 2.0), _PLINTH)]
-    for level in rack.levels[1:]:
-        z = level - _BOARD_THICKNESS / 2.0
-        shapes.append(box((depth, length, _BOARD_THICKNESS), (0.0, 0.0, z), _BOARD))
-    for level in rack.levels:
-        beam = (depth + 2.0 * _PAINT, length - 2.0 * _UPRIGHT, 0.055)
-        shapes.append(box(beam, (0.0, 0.0, level - 0.0275 - _PAINT), PALETTE["orange"], solid=False))
-    bays = max(1, round(length / rack.bay))
+    board = (depth - 2.0 * _PAINT, length - 2.0 * _PAINT, _BOARD_THICKNESS)
+    shapes += [box(board, (0.0, 0.0, z - _BOARD_THICKNESS / 2.0), _BOARD) for z in rack.levels[1:]]
+    beam = (depth + 2.0 * _PAINT, length - 2.0 * _UPRIGHT, 0.055)
+    shapes += [
+        box(beam, (0.0, 0.0, z - 0.0275 - _PAINT), PALETTE["orange"], solid=False) for z in rack.levels
+    ]
+    # Uprights stand within the rack's length and depth, front and back, between the bays.
     edge = (length - _UPRIGHT) / 2.0
-    for y in np.linspace(-edge, edge, bays + 1):
-        # Front and back; the end ones stand within the rack's length.
-        shapes += [
-            box(
-                (_UPRIGHT, _UPRIGHT, top),
-                (side * (depth - _UPRIGHT) / 2.0, float(y), top / 2.0),
-                PALETTE["blue"],
-            )
-            for side in (-1.0, 1.0)
-        ]
+    post = (_UPRIGHT, _UPRIGHT, top - lowest)
+    shapes += [
+        box(post, (side * (depth - _UPRIGHT) / 2.0, float(y), (top + lowest) / 2.0), PALETTE["blue"])
+        for y in np.linspace(-edge, edge, max(1, round(length / rack.bay)) + 1)
+        for side in (-1.0, 1.0)
+    ]
     return StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*rack.pose)), shapes=tuple(shapes))
 
 
@@ -184,9 +199,19 @@ def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, .
     p = 2.0 * _PAINT
     return (
         box(size, (0.0, 0.0, 0.0), rgba),
-        box((depth + p, width + p, 0.022), (0.0, 0.0, height / 2.0 - 0.011), light, solid=False),
-        box((depth - 0.03, width - 0.03, p), (0.0, 0.0, height / 2.0), dark, solid=False),
+        box((depth + p, width + p, 0.022), (0.0, 0.0, height / 2.0 - 0.01), light, solid=False),
+        box((depth - 0.03, width - 0.03, p), (0.0, 0.0, height / 2.0 + 0.001), dark, solid=False),
         box((p, 0.10, 0.06), (depth / 2.0, 0.0, -0.015), PALETTE["white"], solid=False),
+    )
+
+
+def _carton_shapes(size: tuple[float, float, float]) -> tuple[Shape, ...]:
+    depth, width, height = size
+    p = 2.0 * _PAINT
+    return (
+        box(size, (0.0, 0.0, 0.0), _CARDBOARD),
+        box((depth + p, 0.05, height + p), (0.0, 0.0, 0.0), _TAPE, solid=False),
+        box((p, 0.08, 0.06), (depth / 2.0, width / 4.0, 0.02), PALETTE["white"], solid=False),
     )
 
 

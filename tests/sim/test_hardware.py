@@ -1,0 +1,94 @@
+"""Joints as measured, commands as taken."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.sim.conftest import placed
+from twin.errors import SimulationError
+from twin.sim.scene import Scene
+from twin.sim.world import World
+
+TICK = 2.0 * math.pi / 4096
+
+
+@pytest.fixture
+def world(room: Scene) -> World:
+    return World.compose(room, [placed(sensors=())], seed=5)
+
+
+def test_commands_take_effect_only_when_applied(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("left_wheel_joint", 3.0)
+    world.step(50)
+    assert hardware.read().velocity[0] == 0.0
+    hardware.apply()
+    world.step(50)
+    assert hardware.read().velocity[0] > 1.0
+
+
+def test_a_command_that_is_not_finite_is_refused_and_counted(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("left_wheel_joint", 3.0)
+    hardware.command("left_wheel_joint", math.nan)
+    hardware.command("right_wheel_joint", math.inf)
+    hardware.apply()
+    assert hardware.refused == 2
+    np.testing.assert_array_equal(world.data.ctrl, [3.0, 0.0, 0.0])
+
+
+def test_a_joint_without_actuator_is_named(world: World) -> None:
+    with pytest.raises(
+        SimulationError, match="no actuator for joint 'left_wheel'; did you mean 'left_wheel_joint'"
+    ):
+        world.robots["cart"].hardware.command("left_wheel", 1.0)
+
+
+def test_encoders_count_whole_ticks_and_differentiate_them(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("left_wheel_joint", 3.0)
+    hardware.command("right_wheel_joint", 3.0)
+    hardware.apply()
+    before = hardware.read()
+    for _ in range(50):
+        world.step(10)
+        reading = hardware.read()
+        true = world.data.joint("cart/left_wheel_joint").qpos[0]
+        assert abs(reading.position[0] - true) <= TICK / 2 + 1e-12
+        assert reading.position[0] / TICK == pytest.approx(round(reading.position[0] / TICK), abs=1e-6)
+        assert reading.velocity[0] == pytest.approx(
+            (reading.position[0] - before.position[0]) / 0.02, abs=1e-9
+        )
+        before = reading
+    assert reading.velocity[0] == pytest.approx(3.0, abs=TICK / 0.02 + 0.05)
+
+
+def test_other_joints_have_a_little_noise_and_reach_their_command(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("mast_joint", 0.2)
+    hardware.apply()
+    world.step(1000)
+    positions = []
+    for _ in range(100):
+        world.step(10)
+        positions.append(hardware.read().position[2])
+    assert np.mean(positions) == pytest.approx(0.2, abs=0.003)
+    assert 5e-5 < np.std(positions) < 2e-4
+
+
+def test_reading_twice_at_one_time_is_the_same_reading(world: World) -> None:
+    world.step(10)
+    hardware = world.robots["cart"].hardware
+    assert hardware.read() is hardware.read()
+
+
+def test_effort_is_what_the_actuator_gives(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("mast_joint", 0.1)
+    hardware.apply()
+    world.step(2000)
+    # The mast of 0.3 kg is held up by the position servo.
+    assert hardware.read().effort[2] == pytest.approx(0.3 * 9.81, rel=0.01)

@@ -1,0 +1,217 @@
+"""Composition, stepping, truth, determinism."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.sim.conftest import box, placed, tote
+from twin.errors import ModelError, ScenarioError, SimulationError
+from twin.geometry import Pose2, Pose3
+from twin.models.description import Box, ImuSpec
+from twin.sim.physics import Physics
+from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.world import World
+
+
+def drive(world: World, seconds: float, left: float, right: float, robot: str = "cart") -> None:
+    hardware = world.robots[robot].hardware
+    for _ in range(round(seconds / 0.02)):
+        hardware.command("left_wheel_joint", left)
+        hardware.command("right_wheel_joint", right)
+        hardware.apply()
+        world.step(10)
+
+
+def test_links_are_named_after_their_robot(room: Scene) -> None:
+    world = World.compose(room, [placed(Pose2(1.0, -0.5, math.pi / 2))])
+    assert world.body_names == (
+        "tote", "cart/base_link", "cart/laser", "cart/imu", "cart/left_wheel", "cart/right_wheel",
+        "cart/mast",
+    )  # fmt: skip
+    laser = world.pose("cart/laser")
+    np.testing.assert_allclose(laser.xyz, [1.0, -0.45, 0.18], atol=1e-12)
+    xyz, quat = world.body_poses()
+    assert xyz.shape == (7, 3)
+    assert quat.shape == (7, 4)
+    np.testing.assert_array_equal(xyz[2], laser.xyz)
+
+
+def test_static_poses_and_unknown_bodies(room: Scene) -> None:
+    world = World.compose(room, [placed()])
+    np.testing.assert_array_equal(world.pose("shelf").xyz, [-2.0, 1.5, 0.385])
+    with pytest.raises(ScenarioError, match="no body 'cart/lasr' in the world; did you mean 'cart/laser'"):
+        world.pose("cart/lasr")
+
+
+def test_names_must_differ(room: Scene) -> None:
+    with pytest.raises(ScenarioError, match="2 things in scene 'room' have the name 'cart'"):
+        World.compose(room, [placed(), placed(Pose2(1.0, 1.0, 0.0))])
+
+
+def test_a_robot_drives_as_its_wheels_turn(room: Scene) -> None:
+    world = World.compose(room, [placed()])
+    drive(world, 0.5, 8.0, 8.0)  # the wheels slip while they start
+    x0 = world.pose("cart/base_link").xyz[0]
+    angle0 = world.data.joint("cart/left_wheel_joint").qpos[0]
+    drive(world, 2.5, 8.0, 8.0)
+    x, y, yaw = world.pose("cart/base_link").to_pose2()
+    turned = world.data.joint("cart/left_wheel_joint").qpos[0] - angle0
+    assert x - x0 == pytest.approx(turned * 0.05, rel=0.02)
+    assert x - x0 > 0.95
+    assert abs(y) < 0.001
+    assert abs(yaw) < 0.001
+    assert world.time_ns == 3_000_000_000
+
+
+def test_two_robots_do_not_share_parts(room: Scene) -> None:
+    from dataclasses import replace
+
+    first = placed(Pose2(0.0, 1.0, 0.0))
+    second = replace(placed(Pose2(0.0, -1.0, 0.0)), name="other")
+    world = World.compose(room, [first, second])
+    drive(world, 1.0, 5.0, 5.0, robot="other")
+    assert world.pose("cart/base_link").xyz[0] == pytest.approx(0.0, abs=1e-3)
+    assert world.pose("other/base_link").xyz[0] > 0.2
+
+
+def test_fixed_and_kinematic_bases(room: Scene) -> None:
+    start = Pose3.from_xyz_rpy((0.5, 0.0, 0.3), (0.0, 0.0, 1.0))
+    fixed = World.compose(room, [placed(start, "fixed")])
+    fixed.step(200)
+    np.testing.assert_allclose(fixed.pose("cart/base_link").xyz, start.xyz)
+    with pytest.raises(ValueError, match="no kinematic base"):
+        fixed.robots["cart"].set_kinematic_pose(start)
+
+    moved = World.compose(room, [placed(start, "kinematic")])
+    moved.robots["cart"].set_kinematic_pose(Pose3.from_xyz_rpy((0.0, 1.0, 0.4)))
+    moved.step(10)
+    np.testing.assert_allclose(moved.pose("cart/base_link").xyz, [0.0, 1.0, 0.4], atol=1e-12)
+
+
+def test_a_tote_rests_and_sleeps_where_it_was_put(room: Scene) -> None:
+    world = World.compose(room, [placed()])
+    start = world.pose("tote")
+    for _ in range(50):
+        world.step(50)
+        assert np.linalg.norm(world.pose("tote").xyz - start.xyz) < 1e-4
+    awake = dict(zip(["world", *world.body_names], world.data.body_awake, strict=True))
+    assert awake["tote"] == mujoco.mjtSleepState.mjS_ASLEEP
+    assert awake["cart/base_link"] == mujoco.mjtSleepState.mjS_AWAKE
+
+
+def test_a_tote_wakes_when_pushed(room: Scene) -> None:
+    scene = Scene(name="push", goods=(tote("tote", (0.6, 0.0, 0.09)),))
+    world = World.compose(scene, [placed()])
+    world.step(500)
+    drive(world, 2.0, 6.0, 6.0)
+    assert world.pose("tote").xyz[0] > 0.62
+
+
+def test_paint_is_neither_heavy_nor_solid() -> None:
+    paint = Shape(geometry=Box(size=(0.5, 0.5, 0.5)), solid=False)
+    body = Shape(geometry=Box(size=(0.2, 0.2, 0.2)))
+    free = FreeBody(name="box", T_world_body=Pose3.from_xyz_rpy((0, 0, 0.1)), shapes=(body, paint), mass=2.0)
+    stage = StaticBody(name="stage", T_world_body=Pose3.from_xyz_rpy(), shapes=(paint,))
+    world = World.compose(Scene(name="paint", goods=(free,), statics=(stage,)), [])
+    world.step(100)
+    assert world.model.body("box").mass[0] == pytest.approx(2.0)
+    assert world.pose("box").xyz[2] == pytest.approx(0.1, abs=1e-4)
+    side = 2.0 * 0.2**2 / 6.0
+    np.testing.assert_allclose(world.model.body("box").inertia, [side] * 3)
+
+
+def test_contacts_name_what_a_robot_touches(room: Scene) -> None:
+    world = World.compose(room, [placed(Pose2(2.6, 0.0, 0.0))])
+    assert world.contacts() == []
+    drive(world, 2.0, 5.0, 5.0)
+    (contact,) = world.contacts()
+    assert (contact.body1, contact.body2) == ("cart/base_link", "wall_east")
+    assert 1.0 < contact.force_N < 200.0
+    assert contact.geoms[0] == ("cart/chassis", "wall_east#0")
+
+
+def test_the_same_seed_is_the_same_run_whether_sampled_or_not(room: Scene) -> None:
+    digests = []
+    for sampled in (False, True):
+        world = World.compose(room, [placed()], seed=3)
+        for _ in range(50):
+            world.robots["cart"].hardware.command("left_wheel_joint", 4.0)
+            world.robots["cart"].hardware.apply()
+            world.step(10)
+            if sampled:
+                world.robots["cart"].hardware.read()
+                world.contacts()
+                for sensor in world.robots["cart"].sensors:
+                    sensor.sample(world.time_ns)
+        digests.append(world.state_digest())
+    assert world.step_count == 500
+    assert digests[0] == digests[1]
+    world.step(1)
+    assert world.state_digest() != digests[1]
+
+
+def test_divergence_stops_the_run_and_leaves_evidence(room: Scene, tmp_path: Path) -> None:
+    world = World.compose(room, [placed()], crash_folder=tmp_path)
+    drive(world, 2.0, 1.0, 1.0)
+    world.data.qfrc_applied[world.model.joint("cart/mast_joint").dofadr[0]] = 1e12
+    with pytest.raises(
+        SimulationError,
+        match=r"diverged at t = 2\.00\d s: the \w+ of joint 'cart/mast_joint' \(body 'cart/mast'",
+    ):
+        world.step(10)
+    saved = np.load(tmp_path / "diverged.npz")
+    assert len(saved["states"]) >= 50
+    assert np.isfinite(saved["states"][0]).all()
+    assert np.all(np.diff(saved["times"]) > 0)
+
+
+def test_a_sensor_period_must_be_whole_physics_steps(room: Scene) -> None:
+    odd = ImuSpec(name="imu", link="imu", topic="imu", rate_hz=30.0, line=7)
+    with pytest.raises(
+        ModelError, match=r"cart.urdf:7: sensor 'imu'.*33.3333 ms.*step of 2 ms.*29.4118 Hz or 31.25"
+    ):
+        World.compose(room, [placed(sensors=(odd,))])
+
+
+def test_saved_model_moves_as_the_world_does(room: Scene, tmp_path: Path) -> None:
+    world = World.compose(room, [placed()])
+    file = world.save_model(tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = world.data.ctrl[:] = 1.0
+    mujoco.mj_step(model, data, 100)
+    world.step(100)
+    np.testing.assert_allclose(data.qpos, world.data.qpos, atol=1e-6)
+
+
+def test_shapes_tell_scenery_from_what_moves(room: Scene) -> None:
+    world = World.compose(room, [placed()])
+    shapes = world.shapes()
+    assert {s.body for s in shapes if s.static} == {s.name for s in room.statics}
+    moving = {s.body for s in shapes if not s.static}
+    assert moving == {"tote", "cart/base_link"}
+    assert moving <= set(world.body_names)
+
+
+def test_physics_options_reach_the_model() -> None:
+    world = World.compose(Scene(name="empty"), [], Physics(timestep=0.004, gravity=1.62, cone="pyramidal"))
+    assert world.model.opt.timestep == 0.004
+    assert world.model.opt.gravity[2] == -1.62
+    assert world.model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    assert world.timestep_ns == 4_000_000
+    assert hashlib.sha256().digest_size == len(world.state_digest())
+
+
+def test_adding_an_obstacle_is_composing_it(room: Scene) -> None:
+    from dataclasses import replace
+
+    blocked = replace(room, statics=(*room.statics, box("crate", (1.0, 0.0, 0.25), (0.4, 0.4, 0.5))))
+    world = World.compose(blocked, [placed()])
+    drive(world, 4.0, 8.0, 8.0)
+    assert world.pose("cart/base_link").xyz[0] < 0.7
