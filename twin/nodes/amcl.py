@@ -19,7 +19,7 @@ from twin.bridge.msgs import (
 )
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty
-from twin.bridge.tf import TransformBroadcaster
+from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.amcl import Amcl, AmclConfig, Estimate
 from twin.nodes.diff_drive_controller import planar_covariance
@@ -48,7 +48,7 @@ class InitialPose:
 class AmclNodeConfig:
     """Rates of what is published."""
 
-    transform_tolerance_ns: int = 500_000_000
+    transform_tolerance_ns: int = 150_000_000
     """map → odom is stamped this far ahead, so that it holds until the next scan (Nav2: transform_tolerance)."""
     particles_period_ns: int = 1_000_000_000
     """Time between two particle clouds [ns]."""
@@ -126,12 +126,9 @@ class AmclNode:
         if estimate is not None:
             self._publish_pose(estimate, stamp_ns)
         if self._filter.estimate is not None:
-            self._tf.send(
-                frames.map,
-                frames.odom,
-                Pose3.from_pose2(self._filter.estimate.T_map_odom),
-                stamp_ns + self.config.transform_tolerance_ns,
-            )
+            valid_until = stamp_ns + self.config.transform_tolerance_ns
+            T_map_odom = Pose3.from_pose2(self._filter.estimate.T_map_odom)
+            self._tf.send_transform(transform_stamped(frames.map, frames.odom, valid_until, T_map_odom))
         if stamp_ns >= self._particles_due:
             self._particles_due = stamp_ns + self.config.particles_period_ns
             self._publish_particles(stamp_ns)

@@ -19,7 +19,7 @@ from twin.bridge.msgs import (
     Vector3,
     stamp,
 )
-from twin.bridge.tf import TransformBroadcaster
+from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
@@ -101,7 +101,9 @@ class DiffDriveControllerNode:
                 ),
             )
         )
-        self._tf.send(self.config.odom_frame, self.config.base_frame, Pose3.from_pose2(pose), now)
+        self._tf.send_transform(
+            transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
+        )
 
 
 _UNUSED_AXIS = 1e6

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Float64MultiArray, MultiArrayLayout
-from twin.bridge.tf import TransformBroadcaster
+from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
 from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.robot_pose import Frames
@@ -62,7 +62,9 @@ class R2D2StatePublisherNode(MissionNode):
         pose = Pose2(self._radius * math.cos(a), self._radius * math.sin(a), a + math.pi / 2.0)
         self._move_base(pose)
         T_odom_axis = Pose3.from_pose2(pose, _HEIGHT)
-        self._tf.send(self._frames.odom, self._frames.base, T_odom_axis, self.node.now_ns)
+        self._tf.send_transform(
+            transform_stamped(self._frames.odom, self._frames.base, self.node.now_ns, T_odom_axis)
+        )
         layout = MultiArrayLayout(dim=[], data_offset=0)
         targets = np.array([self._positions[joint] for joint in self._joints])
         self._commands.publish(Float64MultiArray(layout=layout, data=targets))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twin.bridge.msgs import Header, ns
-from twin.bridge.tf import Buffer, TransformError
+from twin.bridge.tf import TransformBuffer, TransformError
 from twin.geometry import Pose2
 
 
@@ -21,7 +21,7 @@ class Frames:
 class RobotPose:
     """Looks the robot's planar pose up in its transform buffer."""
 
-    def __init__(self, buffer: Buffer, frames: Frames) -> None:
+    def __init__(self, buffer: TransformBuffer, frames: Frames) -> None:
         self.buffer = buffer
         self.frames = frames
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import JointState, String
 from twin.bridge.qos import LATCHED
-from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster
+from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster, transform_stamped
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_motion
 
@@ -29,13 +29,10 @@ class RobotStatePublisherNode:
         self._mimics = [joint for joint in self._joints.values() if joint.mimic is not None]
         description_publisher = self.node.create_publisher(String, "robot_description", LATCHED)
         description_publisher.publish(String(data=description.urdf))
-        StaticTransformBroadcaster(self.node).send_all(
-            [
-                (joint.parent, joint.child, joint.T_parent_joint)
-                for joint in description.joints.values()
-                if joint.type == "fixed"
-            ],
-            self.node.now_ns,
+        StaticTransformBroadcaster(self.node).send_transform(
+            transform_stamped(joint.parent, joint.child, self.node.now_ns, joint.T_parent_joint)
+            for joint in description.joints.values()
+            if joint.type == "fixed"
         )
         self.node.create_subscription(JointState, "joint_states", self._on_joint_states, 10)
 
@@ -50,11 +47,13 @@ class RobotStatePublisherNode:
             if joint.mimic.joint in positions:
                 leader = positions[joint.mimic.joint]
                 positions[joint.name] = joint.mimic.multiplier * leader + joint.mimic.offset
-        self._tf.send_all(
-            [
-                (joint.parent, joint.child, joint.T_parent_joint @ joint_motion(joint, positions[name]))
-                for name, joint in self._joints.items()
-                if name in positions
-            ],
-            now,
+        self._tf.send_transform(
+            transform_stamped(
+                joint.parent,
+                joint.child,
+                now,
+                joint.T_parent_joint @ joint_motion(joint, positions[name]),
+            )
+            for name, joint in self._joints.items()
+            if name in positions
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.bridge.bus import Bus
-from twin.bridge.tf import Buffer, TransformListener
+from twin.bridge.tf import TransformBuffer, TransformListener
 
 
 class TransformListenerNode:
@@ -11,5 +11,5 @@ class TransformListenerNode:
 
     def __init__(self, bus: Bus, *, namespace: str = "") -> None:
         self.node = bus.create_node("transform_listener", namespace)
-        self.buffer = Buffer()
+        self.buffer = TransformBuffer()
         self.listener = TransformListener(self.buffer, self.node)

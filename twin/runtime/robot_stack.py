@@ -66,6 +66,8 @@ class StackContext:
     map: OccupancyMap | None
     seed: int
     control_period_ns: int
+    spawn_height: float
+    """Of the root link when the robot stands on the floor [m]."""
     namespace: str
     """'' for a single robot, '/name' among several."""
 
@@ -79,6 +81,7 @@ class RobotStack:
         self.name = handle.name
         self.handle = handle
         self._context = context
+        self.spawn_height = context.spawn_height
         drive = description.drive
         base_frame = drive.base_frame if drive else description.root
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
@@ -240,7 +243,7 @@ class RobotStack:
         )
         lidar = self.handle.description.sensors
         if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in lidar):
-            DockingServerNode(bus, self.robot_pose, self.footprint, namespace=namespace)
+            DockingServerNode(bus, self.robot_pose, namespace=namespace)
         self.navigator = BtNavigatorNode(bus, self.robot_pose, namespace=namespace)
 
     def _build_arm(self, description: RobotDescription) -> None:

@@ -1,0 +1,63 @@
+"""`/tote_detector`: finds the front face of a tote in the palm's scan and publishes it as `tote_pose`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import LaserScan, PoseStamped
+from twin.bridge.qos import SENSOR_DATA
+from twin.navigation.docking import find_box_face
+from twin.nodes.costmap import scan_points
+from twin.nodes.messages import pose_stamped
+from twin.nodes.robot_pose import RobotPose
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToteDetectorConfig:
+    """What a tote looks like."""
+
+    tote_width: float = 0.24
+    """Width of the face [m]."""
+    width_tolerance: float = 0.035
+    """[m]"""
+    max_range: float = 1.6
+    """Readings beyond this are not looked at [m]."""
+
+
+class ToteDetectorNode:
+    """Takes `palm_scan`; publishes the face's centre in the base frame, x into the tote."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        robot_pose: RobotPose,
+        config: ToteDetectorConfig | None = None,
+        *,
+        namespace: str = "",
+    ) -> None:
+        self.node = bus.create_node("tote_detector", namespace)
+        self.config = config or ToteDetectorConfig()
+        self._robot_pose = robot_pose
+        self._publisher = self.node.create_publisher(PoseStamped, "tote_pose", 10)
+        self.node.create_subscription(LaserScan, "palm_scan", self._on_scan, SENSOR_DATA)
+
+    def _on_scan(self, message: LaserScan) -> None:
+        config, base = self.config, self._robot_pose.frames.base
+        T_base_palm = self._robot_pose.at_stamp(base, message.header)
+        if T_base_palm is None:
+            return
+        # Without return, or far behind the shelf's front: not this tote.
+        near = message.ranges < config.max_range
+        if np.count_nonzero(near) < 5:
+            return
+        points = scan_points(message, math.nan)
+        points[~near] = math.nan
+        face = find_box_face(
+            T_base_palm.apply(points), config.tote_width, width_tolerance=config.width_tolerance
+        )
+        if face is not None:
+            self._publisher.publish(pose_stamped(face.pose, base, self.node.now_ns))

@@ -1,0 +1,200 @@
+"""From a Scenario to everything that a run consists of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
+from twin.convert import convert
+from twin.errors import MapError, ScenarioError
+from twin.geometry import Pose2, Pose3
+from twin.models import load
+from twin.models.description import Box
+from twin.navigation.occupancy_map import OccupancyMap
+from twin.runtime.missions import MissionHandle, build_mission
+from twin.runtime.robot_stack import RobotStack, StackContext
+from twin.scenario.missions import PickAndPlace
+from twin.scenario.navigation import AmclLocalisation
+from twin.scenario.observation import CheckContext, Zone
+from twin.scenario.robots import RobotConfig
+from twin.scenario.schema import Scenario
+from twin.scenario.world import Obstacle
+from twin.sim.physics import Physics
+from twin.sim.robot import RobotPlacement
+from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.world import World
+from twin.warehouse import arena as arenas
+from twin.warehouse.arena import Arena
+from twin.warehouse.map_files import map_of_arena, named_map
+
+_OBSTACLE_RGBA = (0.85, 0.33, 0.10, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """What a run consists of."""
+
+    world: World
+    bus: Bus
+    clock: Clock
+    stacks: Mapping[str, RobotStack]
+    mission: MissionHandle
+    checks: CheckContext
+    control_period_ns: int
+
+
+def build(scenario: Scenario, *, listen: Sequence[str] = (), crash_folder: Path | None = None) -> Parts:
+    """Build the world, the bus and all nodes.
+
+    Raises:
+        TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
+    """
+    arena = arenas.load(scenario.world.arena) if scenario.world.arena is not None else None
+    starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
+    timestep = scenario.physics.timestep
+    placements, heights = [], {}
+    for robot in scenario.robots:
+        description = load(robot.model, args=robot.args)
+        conversion = convert(description, base=robot.base, timestep=timestep)
+        heights[robot.id] = conversion.spawn_height
+        placements.append(RobotPlacement(name=robot.id, conversion=conversion, pose=starts[robot.id]))
+    scene = _scene(scenario, arena)
+    maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
+    world = World.compose(
+        scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
+    )
+    clock = Clock()
+    bus = Bus.open(clock, listen=listen)
+    try:
+        control_period_ns = round(scenario.physics.control_period * 1e9)
+        alone = len(scenario.robots) == 1
+        namespaces = {robot.id: "" if alone else f"/{robot.id}" for robot in scenario.robots}
+        stacks = {
+            robot.id: RobotStack(
+                StackContext(
+                    bus=bus,
+                    config=robot,
+                    handle=world.robots[robot.id],
+                    start=starts[robot.id],
+                    map=maps[robot.id],
+                    seed=scenario.seed,
+                    control_period_ns=control_period_ns,
+                    spawn_height=heights[robot.id],
+                    namespace=namespaces[robot.id],
+                )
+            )
+            for robot in scenario.robots
+        }
+        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces)
+    except BaseException:
+        bus.close()
+        raise
+    return Parts(
+        world=world,
+        bus=bus,
+        clock=clock,
+        stacks=stacks,
+        mission=mission,
+        checks=_check_context(scenario, scene, arena),
+        control_period_ns=control_period_ns,
+    )
+
+
+def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:
+    if robot.pose is not None:
+        return robot.pose.pose
+    if robot.start is None:
+        return Pose2(0.0, 0.0, 0.0)
+    if arena is None:
+        raise ScenarioError(f"robot '{robot.id}' starts at '{robot.start}', but there is no arena with poses")
+    return arena.pose(robot.start)
+
+
+def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
+    obstacles = [_obstacle(obstacle) for obstacle in scenario.world.obstacles]
+    statics = [o for o in obstacles if isinstance(o, StaticBody)]
+    movable = [o for o in obstacles if isinstance(o, FreeBody)]
+    if arena is None:
+        return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable))
+    totes = {task.tote for task in scenario.mission.tasks} if isinstance(scenario.mission, PickAndPlace) else set()
+    overrides = {good.name: good for good in scenario.world.goods}
+    scene = arena.scene(totes | set(overrides), seed=scenario.seed, obstacles=statics)
+    goods = []
+    for good in scene.goods:
+        override = overrides.get(good.name)
+        changes = {} if override is None else {"mass": override.mass, "friction": override.friction}
+        goods.append(replace(good, **{key: value for key, value in changes.items() if value is not None}))
+    return Scene(
+        name=scene.name,
+        floor_friction=scene.floor_friction,
+        floor_size=scene.floor_size,
+        statics=scene.statics,
+        goods=(*goods, *movable),
+    )
+
+
+def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody:
+    pose = Pose3.from_pose2(obstacle.pose.pose, obstacle.size[2] / 2.0)
+    shapes = (Shape(geometry=Box(size=obstacle.size), rgba=_OBSTACLE_RGBA),)
+    if obstacle.mass is None:
+        return StaticBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
+    return FreeBody(
+        name=obstacle.name, T_world_body=pose, shapes=shapes, mass=obstacle.mass, friction=obstacle.friction
+    )
+
+
+def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
+    """Return the map a robot localises on, or None.
+
+    Raises:
+        MapError: There is none, or it does not cover the arena.
+    """
+    if not isinstance(robot.localisation, AmclLocalisation):
+        return None
+    name = robot.localisation.map
+    if name is None and arena is None:
+        raise MapError(f"robot '{robot.id}' localises with amcl but names no map, and there is no arena with one")
+    if name is None:
+        assert arena is not None
+        return map_of_arena(arena)
+    path = named_map(name)
+    grid = OccupancyMap.load(path)
+    if arena is not None:
+        height, width = grid.data.shape
+        hall = arena.file.hall
+        x0, y0 = grid.origin.x, grid.origin.y
+        x1, y1 = x0 + width * grid.resolution, y0 + height * grid.resolution
+        slack = 2.0 * grid.resolution
+        if x0 > hall.x[0] + slack or y0 > hall.y[0] + slack or x1 < hall.x[1] - slack or y1 < hall.y[1] - slack:
+            raise MapError(
+                f"{path}: the map covers x {x0:.2f} … {x1:.2f}, y {y0:.2f} … {y1:.2f} m, but the arena "
+                f"'{arena.name}' spans x {hall.x[0]:g} … {hall.x[1]:g}, y {hall.y[0]:g} … {hall.y[1]:g} m"
+            )
+    return grid
+
+
+def _check_context(scenario: Scenario, scene: Scene, arena: Arena | None) -> CheckContext:
+    zones = {}
+    if arena is not None:
+        for name, zone in arena.zones.items():
+            table = zone.table
+            zones[name] = (
+                Zone(centre=zone.pose, size=(zone.area.size_x, zone.area.size_y))
+                if table is None
+                else Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
+            )
+    bottoms = {
+        good.name: max((_half_height(shape) - float(shape.T_body_geometry.xyz[2]) for shape in good.shapes), default=0.0)
+        for good in scene.goods
+    }
+    return CheckContext(
+        robots=tuple(robot.id for robot in scenario.robots), zones=zones, good_bottoms=bottoms
+    )
+
+
+def _half_height(shape: Shape) -> float:
+    return shape.geometry.size[2] / 2.0 if isinstance(shape.geometry, Box) else math.nan

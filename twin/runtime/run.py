@@ -1,0 +1,249 @@
+"""One run: the tick, its order and its rates."""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from twin.bridge.msgs import Clock as ClockMsg
+from twin.bridge.msgs import stamp
+from twin.errors import ScenarioError
+from twin.navigation.warm_up import warm_up
+from twin.recording.digest import RunDigest
+from twin.runtime.build import Parts, build
+from twin.runtime.observe import Observer
+from twin.scenario.checks import Check
+from twin.scenario.provenance import cpu_class, versions
+from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Verdict
+
+if TYPE_CHECKING:
+    from twin.recording.sink import RerunSink
+
+_SETTLE_NS = 1_000_000_000
+"""The run goes on for so long after its mission has ended, so that the recording shows how it ended."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """How far a run is."""
+
+    time_s: float
+    """Simulated time [s]."""
+    duration_s: float
+    """Longest simulated time [s]."""
+    real_time_factor: float
+    mission_state: str
+
+
+class Run:
+    """A built scenario that can be ticked; `PHASES` is the order of one tick."""
+
+    PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
+
+    def __init__(self, scenario: Scenario, parts: Parts, sink: RerunSink | None) -> None:
+        self.scenario = scenario
+        self.parts = parts
+        self.world, self.bus = parts.world, parts.bus
+        self.digest = RunDigest()
+        self.bus.tap(self.digest.on_sample)
+        self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
+        goods = [good.name for good in self.world.scene.goods]
+        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
+        self._sink = sink
+        self._sensors = [sensor for stack in parts.stacks.values() for sensor in stack.sensors]
+        self.tick_ns = self._tick_length()
+        self._substeps = self.tick_ns // self.world.timestep_ns
+        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
+
+    def _tick_length(self) -> int:
+        """Return the greatest common divisor of all periods [ns]; each is a multiple of the physics step."""
+        step = self.world.timestep_ns
+        periods = {f"sensor '{s.sensor.spec.name}'": s.sensor.period_ns for s in self._sensors}
+        periods["control_period"] = self.parts.control_period_ns
+        for what, period in periods.items():
+            if period % step:
+                raise ScenarioError(
+                    f"the period of {what}, {period / 1e6:g} ms, is not a whole multiple of the physics step, "
+                    f"{step / 1e6:g} ms"
+                )
+        return math.gcd(*periods.values())
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is up, or the mission has been over for a moment."""
+        return self.world.time_ns >= self._end_ns
+
+    _end_ns = 0
+
+    def start(self) -> None:
+        """Set the longest duration; nodes run first at the first tick."""
+        self._end_ns = round(self.scenario.duration * 1e9)
+
+    def tick(self) -> None:
+        """Advance by one tick."""
+        for phase in self._phases:
+            phase()
+
+    def admit(self) -> None:
+        """1. Samples from outside enter the inboxes."""
+        self.bus.admit()
+
+    def nodes(self) -> None:
+        """2. Nodes run: inboxes, timers due, actions; in the order of their creation."""
+        self.bus.spin()
+
+    def actuate(self) -> None:
+        """3. Actuators take the commands."""
+        for stack in self.parts.stacks.values():
+            stack.handle.hardware.apply()
+
+    def step(self) -> None:
+        """4. Physics."""
+        self.world.step(self._substeps)
+
+    def sense(self) -> None:
+        """5. Sensors due publish, stamped with the new time."""
+        now = self.parts.clock.now_ns = self.world.time_ns
+        for sensor in self._sensors:
+            if now % sensor.sensor.period_ns == 0:
+                sensor.publish(now)
+
+    def clock(self) -> None:
+        """6. `/clock`."""
+        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)))
+
+    def sinks(self) -> None:
+        """7. Checks and recording."""
+        if self.world.time_ns % self.parts.control_period_ns == 0:
+            observation = self._observer.observe()
+            for check in self.checks:
+                check.observe(observation)
+        if self._sink is not None:
+            self._sink.on_tick(self.world)
+        if self.parts.mission.done:
+            self._end_ns = min(self._end_ns, self._mission_end() + _SETTLE_NS)
+
+    _mission_end_ns: int | None = None
+
+    def _mission_end(self) -> int:
+        if self._mission_end_ns is None:
+            self._mission_end_ns = self.world.time_ns
+        return self._mission_end_ns
+
+
+def run(
+    scenario: Scenario,
+    *,
+    out: Path | None = None,
+    record: bool = True,
+    pace: float | None = None,
+    listen: Sequence[str] = (),
+    save_model: Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Verdict:
+    """Run a scenario to its verdict.
+
+    Args:
+        scenario: What to run.
+        out: Folder for the recording, and for the last states if the physics diverges; None writes neither.
+        record: Whether to write `<scenario>.rrd`.
+        pace: Simulated seconds per second; None is as fast as possible. Changes no result.
+        listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`; they make the run
+            non-deterministic, and the verdict says so.
+        save_model: Folder for the compiled world as MJCF.
+        progress: Called about four times a second.
+
+    Raises:
+        TwinError: The run cannot be made, or the physics diverged.
+    """
+    parts = build(scenario, listen=listen, crash_folder=out)
+    sink: RerunSink | None = None
+    try:
+        if save_model is not None:
+            parts.world.save_model(save_model)
+        sink = _recording(scenario, parts, out) if record else None
+        simulation = Run(scenario, parts, sink)
+        warm_up()
+        wall, cpu = _loop(simulation, pace, progress)
+        verdict = _verdict(simulation, wall, cpu, deterministic=not listen)
+        if sink is not None:
+            sink.close(verdict.to_dict())
+        return verdict
+    finally:
+        if sink is not None:
+            sink.close()
+        parts.bus.close()
+
+
+def _recording(scenario: Scenario, parts: Parts, out: Path | None) -> RerunSink | None:
+    if out is None or not scenario.recording.enabled:
+        return None
+    from twin.recording.sink import RecordingConfig, RerunSink
+
+    config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
+    sink = RerunSink(
+        out / f"{scenario.name}.rrd",
+        config=config,
+        recording_id=f"{scenario.name}-{scenario.seed}",
+    )
+    sink.declare(parts.world)
+    parts.bus.tap(sink.on_sample)
+    return sink
+
+
+def _loop(
+    simulation: Run, pace: float | None, progress: Callable[[Progress], None] | None
+) -> tuple[float, float]:
+    """Tick to the end; return the wall and CPU time it took [s]. Pacing is the only use of the wall clock."""
+    simulation.start()
+    gc.collect()
+    gc.freeze()  # the model and the types stay; collections look only at what ticks make
+    wall, cpu = time.perf_counter(), time.process_time()
+    shown = wall
+    while not simulation.over:
+        simulation.tick()
+        now = time.perf_counter()
+        simulated = simulation.world.time_ns * 1e-9
+        if pace is not None and (ahead := simulated / pace - (now - wall)) > 0.0:
+            time.sleep(ahead)
+        if progress is not None and now - shown > 0.25:
+            shown = now
+            progress(
+                Progress(
+                    time_s=simulated,
+                    duration_s=simulation.scenario.duration,
+                    real_time_factor=simulated / (now - wall),
+                    mission_state=simulation.parts.mission.state,
+                )
+            )
+    elapsed = time.perf_counter() - wall, time.process_time() - cpu
+    gc.unfreeze()
+    return elapsed
+
+
+def _verdict(simulation: Run, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
+    simulated = simulation.world.time_ns * 1e-9
+    navigators = [stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None]
+    return Verdict(
+        scenario=simulation.scenario.name,
+        seed=simulation.scenario.seed,
+        checks=tuple(check.result() for check in simulation.checks),
+        metrics={
+            "sim_time_s": simulated,
+            "wall_time_s": wall,
+            "cpu_time_s": cpu,
+            "real_time_factor": simulated / wall,
+            "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
+        },
+        digest=simulation.digest.finish(simulation.world.state_digest()),
+        deterministic=deterministic,
+        versions=versions(),
+        cpu=cpu_class(),
+    )
