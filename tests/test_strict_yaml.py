@@ -117,12 +117,10 @@ count: 1.5
 flag: true
 """
     assert faults(tmp_path, text) == [
-        "file.yaml:1: missing key 'name'",
         "file.yaml:1: unknown key 'nam'; did you mean 'name'? "
         "Valid: base, count, flag, name, physics, shapes",
         "file.yaml:3: unknown key 'timestp' in physics; did you mean 'timestep'? Valid: timestep",
         "file.yaml:4: physics.timestep: must have a unit of time (s, ms, us, min, h), not '3 kg'",
-        "file.yaml:6: missing key 'size' in shapes.0",
         "file.yaml:7: unknown key 'sise' in shapes.0; did you mean 'size'? Valid: size, type",
         "file.yaml:8: shapes.1.type: unknown value 'bal'; did you mean 'ball'? Valid: ball, box",
         "file.yaml:9: shapes.2.radius: must be a number (length in m) "
@@ -197,6 +195,22 @@ def test_faults_behind_other_faults_are_found_in_the_same_go(tmp_path: Path) -> 
         "and so mus",
         "unknown ke",
     ]
+
+
+def test_a_misspelling_hides_no_fault_behind_it_and_makes_none(tmp_path: Path) -> None:
+    assert faults(tmp_path, "nme: 3\nphysics:\n  tmestep: 1 kg\n") == [
+        "file.yaml:1: unknown key 'nme'; did you mean 'name'? "
+        "Valid: base, count, flag, name, physics, shapes",
+        "file.yaml:1: name: must be text, not 3",
+        "file.yaml:3: unknown key 'tmestep' in physics; did you mean 'timestep'? Valid: timestep",
+        "file.yaml:3: physics.timestep: must have a unit of time (s, ms, us, min, h), not '1 kg'",
+    ]
+    assert faults(tmp_path, "name: a\nbase: fre\ncount: 2\n") == [
+        "file.yaml:1: and so must this",
+        "file.yaml:2: base: unknown value 'fre'; did you mean 'free'? Valid: fixed, free",
+        "file.yaml:3: count must be 1",
+    ]
+    assert len(faults(tmp_path, "name: a\nxyz: 1\n")) == 1
 
 
 def test_overrides_replace_and_add_values(tmp_path: Path) -> None:

@@ -92,14 +92,14 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     mission = scenario.mission
     if isinstance(mission, Idle):
         return
-    robots = {robot.id: robot for robot in scenario.robots}
-    robot = robots.get(mission.robot)
-    if robot is None:
+    robots = [robot.id for robot in scenario.robots]
+    if mission.robot not in robots:
         yield Fault(
             ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"
         )
         return
-    at = ("robots", list(robots).index(mission.robot))
+    index = robots.index(mission.robot)
+    at, robot = ("robots", index), scenario.robots[index]
     if isinstance(mission, R2D2StatePublisher) and robot.base != "kinematic":
         yield Fault((*at, "base"), "the mission r2d2_state_publisher needs the base 'kinematic'")
     if isinstance(mission, PickAndPlace) and robot.navigation is None:

@@ -44,6 +44,13 @@ class Document:
     overrides: dict[Loc, str] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
+    def alias(self, loc: Loc, original: Loc) -> None:
+        """Let everything below `loc` come from where everything below `original` came from."""
+        for place in [place for place in self.lines if place[: len(original)] == original]:
+            self.lines[(*loc, *place[len(original) :])] = self.lines[place]
+        for place in [place for place in self.overrides if place[: len(original)] == original]:
+            self.overrides[(*loc, *place[len(original) :])] = self.overrides[place]
+
     def problem(self, loc: Loc, message: str) -> Problem:
         """Place a message: at the override that set the value, else at the innermost known line."""
         for end in range(len(loc), -1, -1):

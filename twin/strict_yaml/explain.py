@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from pydantic import BaseModel
 
@@ -28,6 +29,17 @@ class Faults(ValueError):
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = tuple(faults)
         super().__init__("; ".join(f"{'.'.join(map(str, f.loc))}: {f.message}" for f in self.faults))
+
+
+class Finding(NamedTuple):
+    """One fault in the data of a file."""
+
+    loc: Loc
+    """Where: of a key that is missing, where it should be."""
+    message: str
+    kind: Literal["unknown key", "unknown value", "missing key", "other"] = "other"
+    meant: str | None = None
+    """The key or value that was probably meant."""
 
 
 _WORDS = MappingProxyType(
@@ -91,32 +103,36 @@ def _expand(node: dict[str, Any], root: dict[str, Any]) -> list[dict[str, Any]]:
     return [node, *(found for alternative in alternatives for found in _expand(alternative, root))]
 
 
-def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Iterator[tuple[Loc, str]]:
-    """Yield place and sentence of one pydantic error about `data`."""
+def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield what one pydantic error about `data` means; one error may stand for several faults."""
     kind, loc, context = fault["type"], tuple(fault["loc"]), fault.get("ctx", {})
     at = _data_loc(data, loc)
     name = ".".join(map(str, at)) or "the file"
     if kind == "extra_forbidden":
-        hint = nearest(str(loc[-1]), _valid_keys(schema, loc[:-1]))
-        yield at, f"unknown key '{loc[-1]}'{within(at[:-1])}; {hint}"
+        valid = _valid_keys(schema, loc[:-1])
+        text = f"unknown key '{loc[-1]}'{within(at[:-1])}; {nearest(str(loc[-1]), valid)}"
+        yield Finding(at, text, "unknown key", _closest(str(loc[-1]), valid))
     elif kind == "missing" and isinstance(loc[-1], int):
-        yield at, f"{name}: must have at least {loc[-1] + 1} items"
-    elif kind == "missing":
-        yield (*at, loc[-1]), f"missing key '{loc[-1]}'{within(at)}"
-    elif kind == "union_tag_not_found":
-        key = context["discriminator"].strip("'")
-        yield (*at, key), f"missing key '{key}'{within(at)}"
+        yield Finding(at, f"{name}: must have at least {loc[-1] + 1} items")
+    elif kind in ("missing", "union_tag_not_found"):
+        key = context["discriminator"].strip("'") if "discriminator" in context else loc[-1]
+        yield Finding((*at, key), f"missing key '{key}'{within(at)}", "missing key")
     elif kind in ("union_tag_invalid", "literal_error"):
         word = str(context.get("tag", fault["input"]))
         valid = re.findall(r"'([^']*)'", context.get("expected_tags") or context["expected"])
-        key = context["discriminator"].strip("'") if "discriminator" in context else None
-        where = at if key is None else (*at, key)
-        yield where, f"{'.'.join(map(str, where))}: unknown value '{word}'; {nearest(word, valid)}"
+        where = (*at, context["discriminator"].strip("'")) if "discriminator" in context else at
+        text = f"{'.'.join(map(str, where))}: unknown value '{word}'; {nearest(word, valid)}"
+        yield Finding(where, text, "unknown value", _closest(word, valid))
     elif isinstance(context.get("error"), Faults):
         for inner in context["error"].faults:
-            yield (*at, *inner.loc), inner.message
+            yield Finding((*at, *inner.loc), inner.message)
     elif isinstance(context.get("error"), ValueError):
-        yield at, f"{name}: {context['error']}, not {shown(fault['input'])}"
+        yield Finding(at, f"{name}: {context['error']}, not {shown(fault['input'])}")
     else:
         words = _WORDS.get(kind, fault["msg"][:1].lower() + fault["msg"][1:]).format(**context)
-        yield at, f"{name}: {words}, not {shown(fault['input'])}"
+        yield Finding(at, f"{name}: {words}, not {shown(fault['input'])}")
+
+
+def _closest(word: str, valid: Sequence[str]) -> str | None:
+    """Return the name that `nearest` suggests."""
+    return next(iter(difflib.get_close_matches(word, sorted(valid), n=1, cutoff=0.5)), None)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Annotated
 
 from twin.geometry import Array
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
 from twin.scenario.fields import Positive
-from twin.scenario.observation import CheckContext, Observation
+from twin.scenario.observation import CheckContext, Held, Observation
 from twin.strict_yaml import Metres
+
+_LONGEST_GAP_NS = 500_000_000
+"""A tote that nobody holds for longer was put down [ns]."""
 
 
 class ToteSlipConfig(CheckConfig):
@@ -25,37 +29,50 @@ class ToteSlipConfig(CheckConfig):
         return ToteSlip(kind if self.tote is None else f"{kind}({self.tote})", self)
 
 
+@dataclass
+class _Grasp:
+    robot: str
+    start: Array
+    """Origin of the tote in the gripper's frame when the grasp closed, shape (3,) [m]."""
+    last_ns: int
+    """When it was last seen."""
+
+
 class ToteSlip(Check):
     """Compares with the pose at the first tick of each grasp."""
 
     def __init__(self, name: str, config: ToteSlipConfig) -> None:
         super().__init__(name)
         self._config = config
-        self._grasps: dict[str, tuple[str, Array]] = {}
+        self._grasps: dict[str, _Grasp] = {}
         self._worst: float | None = None
         self._at_s: float | None = None
         self._reason = "no tote was carried" if config.tote is None else f"{config.tote} was never carried"
 
     def observe(self, observation: Observation) -> None:
         """Take one control tick."""
-        if self._at_s is None or self._worst is None:
+        if self._worst is None:
             self._at_s = observation.time_s
-        for tote in [tote for tote in self._grasps if tote not in observation.held]:
-            del self._grasps[tote]
         for tote, held in observation.held.items():
             if self._config.tote not in (None, tote):
                 continue
-            robot, start = self._grasps.setdefault(tote, (held.robot, held.T_gripper_good.xyz.copy()))
-            if robot != held.robot:  # handed over: another gripper, another grasp
-                self._grasps[tote] = (held.robot, held.T_gripper_good.xyz.copy())
-                continue
-            slip = math.dist(held.T_gripper_good.xyz, start)
+            grasp = self._grasp(tote, held, observation.time_ns)
+            slip = math.dist(held.T_gripper_good.xyz, grasp.start)
             if self._worst is None or slip > self._worst:
                 self._worst, self._at_s = slip, observation.time_s
                 passed = slip <= self._config.max
                 self._reason = (
                     "" if passed else f"{tote} slipped {slip * 1e3:.1f} mm in {held.robot}'s gripper"
                 )
+
+    def _grasp(self, tote: str, held: Held, time_ns: int) -> _Grasp:
+        """Return the grasp that is going on; a contact that is lost for a moment does not end it."""
+        grasp = self._grasps.get(tote)
+        if grasp is None or grasp.robot != held.robot or time_ns - grasp.last_ns > _LONGEST_GAP_NS:
+            grasp = _Grasp(held.robot, held.T_gripper_good.xyz.copy(), time_ns)
+            self._grasps[tote] = grasp
+        grasp.last_ns = time_ns
+        return grasp
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the largest slip."""

@@ -1,0 +1,179 @@
+"""Scenario files: what is read, and what is said about a wrong one."""
+# ruff: noqa: E501  (a table reads better in one line per row)
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+import yaml
+
+from twin.errors import ScenarioError
+from twin.scenario.missions import PickAndPlace
+from twin.scenario.navigation import AmclLocalisation
+from twin.scenario.schema import Scenario, json_schema, load
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = sorted((ROOT / "scenarios").rglob("*.yaml"))
+
+GOOD = """\
+name: demo
+duration: 10 s
+world: {arena: warehouse}
+robots:
+  - model: warehouse_bot
+    name: bot
+    start: start
+    localisation: {type: amcl}
+    navigation: {}
+mission:
+  type: pick_and_place
+  robot: bot
+  tasks: [{tote: tote_a, to: unloading}]
+checks:
+  - mission_succeeded:
+"""
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "demo.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def faults(tmp_path: Path, text: str) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        load(write(tmp_path, text))
+    return [str(problem).removeprefix(f"{tmp_path}/") for problem in caught.value.problems]
+
+
+def test_a_whole_scenario(tmp_path: Path) -> None:
+    text = GOOD.replace(
+        "{type: amcl}", "{type: amcl, initial_pose_error: {xy: 20 cm}, parameters: {max_beams: 60}}"
+    )
+    scenario = load(write(tmp_path, text), {"robots.0.navigation.controller.desired_linear_vel": "0.5 m/s"})
+    robot = scenario.robots[0]
+    assert isinstance(robot.localisation, AmclLocalisation)
+    assert robot.localisation.initial_pose_error.xy == 0.2
+    assert robot.localisation.parameters.overrides() == {"max_beams": 60}
+    assert robot.navigation is not None
+    assert robot.navigation.controller.overrides() == {"desired_linear_vel": 0.5}
+    assert isinstance(scenario.mission, PickAndPlace)
+    assert (scenario.seed, scenario.physics.timestep, robot.id) == (0, 0.002, "bot")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("name: demo", "name: a b", "demo.yaml:1: name: must be a ROS name (letters, digits and _, a letter first), not 'a b'"),
+        ("duration: 10 s", "duration: 10 kg", "demo.yaml:2: duration: must have a unit of time (s, ms, us, min, h), not '10 kg'"),
+        ("duration: 10 s", "duration: -1", "demo.yaml:2: duration: must be greater than 0, not -1"),
+        ("duration: 10 s", "duration: 10.01 s", "demo.yaml:2: the duration (10010 ms) must be a whole number of control periods (20 ms)"),
+        ("duration: 10 s", "duration: 10\nphysics: {timestep: 3 ms}", "demo.yaml:3: the control period (20 ms) must be a whole number of physics steps (3 ms)"),
+        ("duration: 10 s", "duration: 10\nrecording: {poses_hz: 30}", "demo.yaml:3: the period of the recorded poses (33.3333 ms) must be a whole number of control periods (20 ms)"),
+        ("{arena: warehouse}", "{arna: warehouse}", "demo.yaml:3: unknown key 'arna' in world; did you mean 'arena'? Valid: arena, goods, obstacles"),
+        ("    start: start", "    strat: start", "demo.yaml:7: unknown key 'strat' in robots.0; did you mean 'start'? Valid: args, base, localisation, model, name, navigation, pose, start"),
+        ("    start: start", "    start: start\n    pose: {x: 1}", "demo.yaml:7: give the robot either a pose or the name of a start, not both"),
+        ("{type: amcl}", "{type: amlc}", "demo.yaml:8: robots.0.localisation.type: unknown value 'amlc'; did you mean 'amcl'? Valid: amcl, none, odometry"),
+        ("{type: amcl}", "{type: none}", "demo.yaml:9: navigation needs a localisation of type odometry or amcl"),
+        ("{type: amcl}", "{type: amcl, parameters: {max_beam: 3}}", "demo.yaml:8: unknown key 'max_beam' in robots.0.localisation.parameters; did you mean 'max_beams'? Valid: "),
+        ("    navigation: {}", "    base: fixed\n    navigation: {}", "demo.yaml:9: navigation needs the base 'free', not 'fixed'"),
+        ("    navigation: {}\n", "", "demo.yaml:5: the mission pick_and_place needs a navigation of robot 'bot'"),
+        ("  robot: bot", "  robot: bob", "demo.yaml:12: unknown robot 'bob'; did you mean 'bot'? Valid: bot"),
+        ("pick_and_place", "pick_n_place", "demo.yaml:11: mission.type: unknown value 'pick_n_place'; did you mean 'pick_and_place'? Valid: "),
+        ("tasks: [{tote: tote_a, to: unloading}]", "tasks: []", "demo.yaml:13: mission.tasks: must have at least 1 items, not []"),
+        ("to: unloading", "too: unloading", "demo.yaml:13: unknown key 'too' in mission.tasks.0; did you mean 'to'? Valid: to, tote"),
+        ("- mission_succeeded:", "- mission_suceeded:", "demo.yaml:15: unknown key 'mission_suceeded' in checks.0; did you mean 'mission_succeeded'? Valid: "),
+        ("- mission_succeeded:", "- {}", "demo.yaml:15: checks.0: must have exactly one of the keys closed_loop, delivered"),
+        ("- mission_succeeded:", "- delivered:", "demo.yaml:15: missing key 'tote' in checks.0.delivered"),
+        ("- mission_succeeded:", "- localisation_error:", "demo.yaml:15: checks.0.localisation_error: must have at least one of the keys rms, max, not {}"),
+        ("- mission_succeeded:", "- driven_distance: {min: 3, max: 2}", "demo.yaml:15: checks.0.driven_distance: min (3 m) must not exceed max (2 m)"),
+        ("- mission_succeeded:", "- energy: {max: 3, robot: bit}", "demo.yaml:15: unknown robot 'bit'; did you mean 'bot'? Valid: bot"),
+        ("- mission_succeeded:", "- tote_slip: {max: 3 mm, tote: tote_b}", "demo.yaml:15: the mission carries no tote 'tote_b'; did you mean 'tote_a'? Valid: tote_a"),
+        ("{arena: warehouse}", "{arena: warehouse, obstacles: [{name: a, size: [1, 1, 1]}, {name: a, size: [1, 1, 1]}]}", "demo.yaml:3: the name 'a' is taken by world.obstacles.0; names must differ"),
+        ("checks:\n  - mission_succeeded:\n", "checks: []\n", "demo.yaml:14: checks: must have at least 1 items, not []"),
+    ],
+)  # fmt: skip
+def test_one_fault(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert old in GOOD
+    found = faults(tmp_path, GOOD.replace(old, new))
+    assert any(fault.startswith(expected) for fault in found), found
+
+
+def test_faults_of_all_parts_come_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("robot: bot", "robot: bob").replace("arena", "area")
+    text += "  - energy: {max: 1, robot: bit}\n  - enrgy: {max: 1}\n"
+    lines = [fault.partition(": ")[0] for fault in faults(tmp_path, text)]
+    assert lines == ["demo.yaml:3", "demo.yaml:12", "demo.yaml:16", "demo.yaml:17"]
+
+
+def test_without_an_arena(tmp_path: Path) -> None:
+    text = GOOD.replace("world: {arena: warehouse}\n", "")
+    assert faults(tmp_path, text) == [
+        "demo.yaml:6: the start 'start' needs an arena; name one as world.arena",
+        "demo.yaml:7: amcl without a map needs an arena; name one as world.arena, or a map",
+        "demo.yaml:9: pick_and_place needs an arena; name one as world.arena",
+    ]
+
+
+def test_several_robots(tmp_path: Path) -> None:
+    text = (
+        GOOD.replace("mission:\n", "  - {model: diff_bot, name: bot}\nmission:\n") + "  - energy: {max: 1}\n"
+    )
+    assert faults(tmp_path, text) == [
+        "demo.yaml:10: the name 'bot' is taken by robots.0; names must differ",
+        "demo.yaml:17: energy must name its robot, there are several; valid: bot, bot",
+    ]
+
+
+def test_idle_has_no_end(tmp_path: Path) -> None:
+    text = "name: demo\nduration: 1\nrobots: [{model: diff_bot}]\nchecks: [{mission_succeeded: }]\n"
+    assert faults(tmp_path, text) == ["demo.yaml:4: mission_succeeded needs a mission that ends, not 'idle'"]
+
+
+def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
+    text = GOOD.replace("arena: warehouse", "arena: ../hall.yaml").replace(
+        "model: warehouse_bot", "model: my/bot.xacro"
+    )
+    scenario = load(write(tmp_path, text))
+    assert scenario.world.arena == str(tmp_path / "../hall.yaml")
+    assert (scenario.robots[0].model, scenario.robots[0].id) == (str(tmp_path / "my/bot.xacro"), "bot")
+    unnamed = load(write(tmp_path, text.replace("    name: bot\n", "")))
+    assert unnamed.robots[0].id == "bot"
+
+
+def test_xacro_arguments_become_text(tmp_path: Path) -> None:
+    text = GOOD.replace("name: bot\n", "name: bot\n    args: {mass: 3, wide: true, colour: red}\n")
+    assert load(write(tmp_path, text)).robots[0].args == {"mass": "3", "wide": "true", "colour": "red"}
+
+
+def test_built_in_python_the_same_rules_hold() -> None:
+    data: dict[str, Any] = yaml.safe_load(GOOD)
+    data["mission"]["robot"] = "bob"
+    with pytest.raises(ValueError, match=r"mission\.robot: unknown robot 'bob'"):
+        Scenario.model_validate(data)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_scenarios_are_valid_for_us_and_for_editors(path: Path) -> None:
+    scenario = load(path)
+    assert scenario.name == path.stem
+    assert scenario.description
+    jsonschema.validate(yaml.safe_load(path.read_text(encoding="utf-8")), json_schema())
+
+
+def test_json_schema_describes_every_key() -> None:
+    schema = json.loads(json.dumps(json_schema()))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for node in (schema, *schema["$defs"].values()):
+        for key, value in node["properties"].items():
+            model = schema["$defs"].get(
+                value.get("$ref", "").rpartition("/")[2], {}
+            )  # drops a text it repeats
+            assert value.get("description") or model.get("description"), (node["title"], key)
+    bad = yaml.safe_load(GOOD) | {"chekcs": []}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(bad, schema)
