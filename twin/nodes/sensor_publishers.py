@@ -72,7 +72,7 @@ def _range(spec: RangeSpec, header: Header, reading: Any) -> Range:
 
 
 def _contact(_spec: ContactSpec, _header: Header, reading: Any) -> Bool:
-    return Bool(data=bool(reading.touching))
+    return Bool(data=bool(reading.touched))
 
 
 _MESSAGES: Mapping[type[SensorSpec], tuple[type, Callable[[Any, Header, Any], Any]]] = {
