@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
@@ -41,6 +42,7 @@ class Bus:
         self._ids = 0
         self._thread = threading.get_ident()
         self._closed = False
+        atexit.register(self.close)
 
     @classmethod
     def open(
@@ -125,6 +127,7 @@ class Bus:
         if self._closed:
             return
         self._closed = True
+        atexit.unregister(self.close)
         for node in reversed(self.nodes):
             node.destroy()
         self.session.close()  # type: ignore[no-untyped-call]

@@ -172,7 +172,7 @@ def _encode_poses(message: PoseArray) -> bytes:
     frame = message.header.frame_id.encode() + b"\0"
     time, n = message.header.stamp, len(message.poses)
     to_count = -len(frame) % 4
-    to_poses = (4 - (len(frame) + to_count)) % 8 if n else 0  # 12 bytes stand before the text, 4 after it
+    to_poses = -(len(frame) + to_count) % 8 if n else 0  # the other 16 bytes since the header are aligned
     values = [(p.position, p.orientation) for p in message.poses]
     numbers = chain.from_iterable((t.x, t.y, t.z, q.x, q.y, q.z, q.w) for t, q in values)
     layout = f"<4siII{len(frame)}s{to_count}xI{to_poses}x{7 * n}d"

@@ -42,6 +42,11 @@ class ExternalQueue:
         self._to_report: list[str] = []
         self._reported: set[tuple[str, str]] = set()
 
+    @property
+    def waiting(self) -> int:
+        """How much the next `drain` returns."""
+        return len(self._arrivals)
+
     def push(self, arrival: Arrival) -> None:
         """Queue; called in any thread."""
         with self._lock:

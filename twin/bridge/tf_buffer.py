@@ -1,4 +1,4 @@
-"""The transform tree over time, with tf2's rules: linear interpolation, no extrapolation, static transforms always.
+"""The transform tree over time, with tf2's rules: interpolation, no extrapolation, static transforms always.
 
 Inside, transforms are tuples of floats: at this size far cheaper than arrays.
 """
@@ -145,7 +145,7 @@ class TransformBuffer:
         common = next((frame for frame in up if frame in down), None)
         if common is None:
             raise DisconnectedFramesError(
-                f"{source!r} (root {up[-1]!r}) and {target!r} (root {down[-1]!r}) are in different transform trees"
+                f"{source!r} (root {up[-1]!r}) and {target!r} (root {down[-1]!r}) are in different trees"
             )
         return up[: up.index(common)], down[: down.index(common)]
 

@@ -95,6 +95,11 @@ class Publisher(Endpoint, Generic[M]):
             self._zenoh = session.declare_publisher(self.key, congestion_control=zenoh.CongestionControl.DROP)
         self._declared.append(self._zenoh)
 
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether somebody listens now, here or elsewhere; always true if latched: Zenoh does not tell."""
+        return self._latched or self._zenoh.matching_status.matching
+
     def publish(self, message: M) -> None:
         """Publish at the clock's time.
 
@@ -110,7 +115,7 @@ class Publisher(Endpoint, Generic[M]):
             sample = Sample(self.name, time_ns, message, self.codec)
             for tap in self._bus.taps:
                 tap(sample)
-        if self._latched or self._zenoh.matching_status.matching:
+        if self.has_subscribers:
             payload = self.codec.encode(message) if sample is None else sample.payload
             self._zenoh.put(payload, attachment=pack_attachment(self._sequence, time_ns, self.gid))
 

@@ -80,6 +80,8 @@ def get(typename: str) -> type[Any]:
     name = "/".join(parts(typename))
     if name not in store.types:
         _load(name)
+    if name not in store.types:
+        raise BridgeError(f"{name} is no message; its parts are, such as {name}_Request or {name}_Goal")
     return store.types[name]
 
 
@@ -90,11 +92,8 @@ def rihs01(typename: str) -> str:
         BridgeError: an unknown type.
     """
     name = "/".join(parts(typename))
-    if name not in store.fielddefs and name not in _derived:
-        if parts(name).kind == "msg" or "_" in parts(name).name:
-            get(name)
-        else:
-            _load(name)
+    if name not in store.types and name not in _derived:
+        _load(name)
     return _rihs01(name)
 
 
