@@ -121,7 +121,7 @@ def quat_wxyz_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
 
 def rpy_from_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
     """Return roll, pitch, yaw [rad] with pitch in [-pi/2, pi/2]; the inverse of `quat_wxyz_from_rpy`."""
-    w, x, y, z = (float(value) for value in np.asarray(quat_wxyz, dtype=np.float64))
+    w, x, y, z = _floats(quat_wxyz)
     return np.array(
         [
             math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
@@ -133,35 +133,47 @@ def rpy_from_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
 
 def yaw_from_quat_wxyz(quat_wxyz: ArrayLike) -> float:
     """Return the yaw [rad] of a rotation."""
-    w, x, y, z = (float(value) for value in np.asarray(quat_wxyz, dtype=np.float64))
+    w, x, y, z = _floats(quat_wxyz)
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def multiply_wxyz(a: ArrayLike, b: ArrayLike) -> Array:
     """Return the Hamilton product a·b of two quaternions."""
-    aw, ax, ay, az = (float(value) for value in np.asarray(a, dtype=np.float64))
-    bw, bx, by, bz = (float(value) for value in np.asarray(b, dtype=np.float64))
+    aw, ax, ay, az = _floats(a)
+    bw, bx, by, bz = _floats(b)
     return np.array(
-        [
+        (
             aw * bw - ax * bx - ay * by - az * bz,
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw,
-        ]
+        )
     )
 
 
 def rotate_wxyz(quat_wxyz: ArrayLike, vector: ArrayLike) -> Array:
     """Return `vector`, shape (3,), turned by a unit quaternion."""
-    q = np.asarray(quat_wxyz, dtype=np.float64)
-    v = np.asarray(vector, dtype=np.float64)
-    t = 2.0 * np.cross(q[1:], v)
-    return v + q[0] * t + np.cross(q[1:], t)
+    # v + 2 w (q × v) + 2 q × (q × v) in plain floats: ten times as fast as numpy on three numbers.
+    w, i, j, k = _floats(quat_wxyz)
+    x, y, z = _floats(vector)
+    cx, cy, cz = 2.0 * (j * z - k * y), 2.0 * (k * x - i * z), 2.0 * (i * y - j * x)
+    return np.array(
+        (
+            x + w * cx + j * cz - k * cy,
+            y + w * cy + k * cx - i * cz,
+            z + w * cz + i * cy - j * cx,
+        )
+    )
+
+
+def _floats(values: ArrayLike) -> list[float]:
+    floats: list[float] = np.asarray(values, dtype=np.float64).tolist()
+    return floats
 
 
 def matrix_from_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
     """Return the rotation matrix, shape (3, 3), of a unit quaternion."""
-    w, x, y, z = (float(value) for value in np.asarray(quat_wxyz, dtype=np.float64))
+    w, x, y, z = _floats(quat_wxyz)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
