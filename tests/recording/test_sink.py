@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,8 @@ def test_digest_tells_every_difference(recorded: Any) -> None:
     assert digest(samples, b"t") != reference
     assert digest([samples[1], samples[0], *samples[2:]]) != reference
     assert digest(samples[:-1]) != reference
+    for change in ({"topic": "/other"}, {"msgtype": "a/msg/B"}, {"time_ns": 5}, {"payload": b"x"}):
+        assert digest([*samples[:-1], replace(samples[-1], **change)]) != reference
 
 
 @pytest.mark.bench

@@ -24,7 +24,7 @@ ODOMETRY_COLOUR = (160, 120, 220, 255)
 GHOST_RADIUS = 0.35
 """Of the ring around the estimated pose [m]."""
 TRAIL_HEIGHT = 0.03
-"""Above the floor, so that trails lie on the map [m]."""
+"""Above the floor, so that trails lie on the map [m]; each has its own level, so that they do not flicker."""
 
 Numbers = tuple[float, ...]
 TruePose = Callable[[str], Pose3]
@@ -127,10 +127,10 @@ class Belief:
         if self._anchor is None:
             self._anchor = self._start(time_ns, odom, child, T_odom_base)
         odometry = self._anchor @ T_odom_base
-        self._trails["odometry"].append(time_ns, odometry.x, odometry.y, TRAIL_HEIGHT)
+        self._trails["odometry"].append(time_ns, odometry.x, odometry.y, TRAIL_HEIGHT - 0.01)
         estimate = None if self._T_map_odom is None else self._T_map_odom @ T_odom_base
         if estimate is not None:
-            self._trails["estimate"].append(time_ns, estimate.x, estimate.y, TRAIL_HEIGHT)
+            self._trails["estimate"].append(time_ns, estimate.x, estimate.y, TRAIL_HEIGHT + 0.01)
         if self._base is not None:
             truth = self._true_pose(self._base).to_pose2()
             self._trails["truth"].append(time_ns, truth.x, truth.y, TRAIL_HEIGHT)
@@ -164,7 +164,7 @@ class Belief:
         self._recording.log(
             f"/estimate/{self._frames.robot(self._namespace)}",
             rr.CoordinateFrame(frame),
-            rr.LineStrips3D([ring], colors=[ESTIMATE_COLOUR], radii=[0.015]),
+            rr.LineStrips3D([ring], colors=[ESTIMATE_COLOUR], radii=[0.01]),
             rr.Arrows3D(
                 vectors=[nose], origins=[(0.0, 0.0, TRAIL_HEIGHT)], colors=[ESTIMATE_COLOUR], radii=[0.03]
             ),

@@ -9,7 +9,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from twin.geometry import Array
+from twin.geometry import Array, matrix_from_quat_wxyz
+from twin.models.description import Box, Geometry, Mesh, Sphere
 from twin.recording.columns import TIMELINE
 from twin.recording.frames import WORLD, Frames
 from twin.recording.sources import BodyShape, World
@@ -54,12 +55,24 @@ def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
 
 
 def extent(world: World, shapes: Sequence[BodyShape]) -> tuple[Array, Array]:
-    """Return the corners (x, y) [m] of a rectangle that holds the centres of all shapes."""
-    points = [world.pose(shape.body).apply(shape.T_body_geometry.xyz) for shape in shapes]
-    if not points:
-        return np.array((-5.0, -5.0)), np.array((5.0, 5.0))
-    corners = np.array(points)[:, :2]
-    return corners.min(axis=0), corners.max(axis=0)
+    """Return the corners (x, y) [m] of a rectangle that holds all shapes (of meshes: their origins)."""
+    lows, highs = [np.array((-1.0, -1.0))], [np.array((1.0, 1.0))]
+    for shape in shapes:
+        pose = world.pose(shape.body) @ shape.T_body_geometry
+        reach = (np.abs(matrix_from_quat_wxyz(pose.quat_wxyz)) @ _half_size(shape.geometry))[:2]
+        lows.append(pose.xyz[:2] - reach)
+        highs.append(pose.xyz[:2] + reach)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def _half_size(geometry: Geometry) -> Array:
+    """Return half the edges [m] of a box around a shape, in the shape's frame."""
+    if isinstance(geometry, Box):
+        return np.array(geometry.size) / 2.0
+    if isinstance(geometry, Mesh):
+        return np.zeros(3)
+    length = 0.0 if isinstance(geometry, Sphere) else geometry.length
+    return np.array((geometry.radius, geometry.radius, geometry.radius + length / 2.0))
 
 
 def _simulation(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3DView:

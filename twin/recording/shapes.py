@@ -17,7 +17,7 @@ DRAWABLE_MESHES = frozenset({".stl", ".obj", ".dae", ".glb", ".gltf"})
 """Mesh formats that the Rerun viewer reads."""
 
 FLOOR_COLOUR = (96, 100, 106, 255)
-FLOOR_MARGIN = 0.5
+FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
 FillMode = Literal["solid", "majorwireframe"]
