@@ -29,7 +29,7 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     table.add_column("why", style="red", overflow="fold")
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        value, limit = (_quantity(check[key], check["unit"]) for key in ("value", "limit"))
+        value, limit = (_quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
         at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
         table.add_row(mark, Text(check["name"]), value, limit, at, Text(check["reason"]))
     lines: list[Table | Text] = [table] if verdict["checks"] else []
@@ -91,12 +91,15 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
     return text
 
 
-def _quantity(value: float | bool | None, unit: str) -> str:
+def _quantity(value: float | bool | None, unit: str, limit: float | bool | None) -> str:
+    """Format a value in the unit that suits its limit, so that the two can be compared at a glance."""
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.4g} {unit}".rstrip()
+    if unit == "m" and limit is not None and abs(limit) < 0.1:
+        value, unit = value * 1e3, "mm"
+    return f"{round(value, 3):.5g} {unit}".rstrip()
 
 
 def _seconds(value: float | None) -> str:

@@ -1,0 +1,309 @@
+"""The command line: exit codes, output, errors in one sentence, and a light start."""
+# ruff: noqa: E501  (messages are compared whole)
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import CliRunner
+
+from twin.cli import app as app_module
+from twin.cli import batch, repeat
+from twin.cli.options import RunOptions, parse_overrides, parse_pace
+from twin.cli.play import find_recording
+from twin.errors import RecordingError, ScenarioError, SimulationError
+from twin.scenario.checks import CheckResult
+from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Verdict
+
+SCENARIO = """\
+name: demo
+duration: 1 s
+robots: [{model: diff_bot}]
+checks: [{energy: {max: 1}}]
+"""
+
+HEAVY = ("mujoco", "zenoh", "rerun", "pydantic", "numpy", "scipy", "numba", "yaml", "yourdfpy", "rosbags")
+
+
+def twin(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "twin.cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
+
+
+class FakeRuntime:
+    """Stands in for the simulation, to test what the command line does with its outcome."""
+
+    def __init__(self) -> None:
+        self.calls: list[dict[str, Any]] = []
+        self.passed = True
+        self.fault: Exception | None = None
+
+    def run(self, scenario: Scenario, **options: Any) -> Verdict:
+        self.calls.append({"scenario": scenario, **options})
+        if self.fault is not None:
+            raise self.fault
+        reason = "" if self.passed else "diff_bot used 3 J"
+        check = CheckResult(
+            name="energy", passed=self.passed, value=0.25, limit=1.0, unit="J", at_s=1.0, reason=reason
+        )
+        metrics = {"sim_time_s": 1.0, "wall_time_s": 0.1, "real_time_factor": 10.0}
+        return Verdict(
+            scenario=scenario.name, seed=scenario.seed, checks=(check,), metrics=metrics, digest="ab" * 32
+        )
+
+
+@pytest.fixture
+def runtime(monkeypatch: pytest.MonkeyPatch) -> FakeRuntime:
+    fake = FakeRuntime()
+    module = types.ModuleType("twin.runtime")
+    module.run = fake.run  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "twin.runtime", module)
+    monkeypatch.setattr("twin.runtime", module, raising=False)
+    return fake
+
+
+@pytest.fixture
+def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "demo.yaml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def invoke(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
+    def call(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["twin", *arguments])
+        with pytest.raises(SystemExit) as exit_info:
+            app_module.run_app()
+        captured = capsys.readouterr()
+        code = exit_info.value.code
+        assert isinstance(code, int)
+        return code, captured.out, captured.err
+
+    return call
+
+
+Invoke = Callable[..., tuple[int, str, str]]
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; sys.argv = ['twin', '--help']\n"
+        "import twin.cli\n"
+        "try: twin.cli.main()\n"
+        "except SystemExit: pass\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    assert "Run a scenario to its verdict" in done.stdout
+
+
+@pytest.mark.parametrize("command", [name for name, _, _ in app_module._COMMANDS])
+def test_help_of_every_command_has_an_example_that_parses(command: str) -> None:
+    result = CliRunner().invoke(app_module.app, [command, "--help"], env={"COLUMNS": "200"})
+    assert result.exit_code == 0
+    example = re.search(r"Example: (twin .*?)\s*$", result.output, re.MULTILINE)
+    assert example is not None
+    assert example[1].split()[1] == command
+
+
+def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    code, out, err = invoke(
+        "run", str(demo), "--seed", "7", "--set", "checks.0.energy.max=2 J", "--no-record"
+    )
+    assert (code, err) == (0, "")
+    assert "PASS" in out
+    assert re.search(r"ok +energy +0.25 J +1 J +1.00 s", out)
+    (folder,) = (demo.parent / "runs" / "demo").iterdir()
+    assert re.fullmatch(r"\d{8}-\d{6}", folder.name)
+    assert json.loads((folder / "verdict.json").read_text(encoding="utf-8"))["seed"] == 7
+    assert ElementTree.parse(folder / "junit.xml").getroot().get("failures") == "0"
+    (call,) = runtime.calls
+    assert call["scenario"].checks[0].energy.max == 2.0
+    assert (call["record"], call["pace"], call["listen"], call["progress"]) == (False, None, (), None)
+
+
+def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    runtime.passed = False
+    code, out, _ = invoke("run", str(demo), "--out", "here")
+    assert code == 1
+    assert "FAIL" in out
+    assert "diff_bot used 3 J" in out
+    assert (demo.parent / "here" / "verdict.json").exists()
+
+
+def test_json_is_the_file(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    code, out, _ = invoke("run", str(demo), "--json", "--out", "here", "--pace", "1")
+    assert code == 0
+    assert out == (demo.parent / "here" / "verdict.json").read_text(encoding="utf-8")
+    assert runtime.calls[0]["pace"] == 1.0
+
+
+def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    demo.write_text(SCENARIO.replace("energy", "enrgy").replace("1 s", "1 kg"), encoding="utf-8")
+    code, out, err = invoke("run", str(demo))
+    assert (code, out) == (2, "")
+    assert err.splitlines() == [
+        f"error: {demo}:2: duration: must have a unit of time (s, ms, us, min, h), not '1 kg'",
+        f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? Valid: closed_loop, delivered, "
+        "driven_distance, energy, final_pose, localisation_error, mission_succeeded, no_collision, odometry_drift, "
+        "path_on_circle, time_limit, tote_slip",
+        "2 problems, nothing was run",
+    ]
+    assert not runtime.calls
+    assert not (demo.parent / "runs").exists()
+
+
+def test_a_run_that_breaks_is_2_with_an_error_verdict(
+    demo: Path, runtime: FakeRuntime, invoke: Invoke
+) -> None:
+    runtime.fault = SimulationError("the physics diverged at 0.3 s")
+    code, out, err = invoke("run", str(demo), "--out", "here", "--json")
+    assert (code, err) == (2, "error: the physics diverged at 0.3 s\n")
+    assert json.loads(out)["verdict"] == "error"
+    assert ElementTree.parse(demo.parent / "here" / "junit.xml").getroot().get("errors") == "1"
+
+
+def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, monkeypatch: pytest.MonkeyPatch) -> None:
+    runtime.fault = ZeroDivisionError("a bug")
+    monkeypatch.setattr(sys, "argv", ["twin", "run", str(demo)])
+    with pytest.raises(ZeroDivisionError):
+        app_module.run_app()
+
+
+def test_ctrl_c_is_130(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    runtime.fault = KeyboardInterrupt()  # type: ignore[assignment]
+    assert invoke("run", str(demo)) == (130, "", "")
+
+
+def test_two_runs_in_one_second_get_two_folders(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
+    for _ in range(3):
+        invoke("run", str(demo))
+    assert len(list((demo.parent / "runs" / "demo").iterdir())) == 3
+
+
+def test_wrong_options_say_what_is_valid() -> None:
+    with pytest.raises(ScenarioError, match=r"--set seed: must be KEY=VALUE"):
+        parse_overrides(["seed"], None)
+    assert parse_overrides(["a.b=c=d", "seed=3"], 4) == {"a.b": "c=d", "seed": "4"}
+    with pytest.raises(ScenarioError, match=r"--pace fast: must be max or a number greater than 0"):
+        parse_pace("fast")
+    assert (parse_pace("max"), parse_pace("0.5")) == (None, 0.5)
+
+
+def test_options_survive_the_way_to_a_child() -> None:
+    options = RunOptions(
+        scenario=Path("a.yaml"), overrides={"x": "1", "seed": "3"}, pace=0.5, listen=("tcp/1",), record=False
+    )
+    words = options.arguments(Path("out"))
+    assert words == [
+        "run",
+        "a.yaml",
+        "--json",
+        "--out",
+        "out",
+        "--set",
+        "x=1",
+        "--set",
+        "seed=3",
+        "--pace",
+        "0.5",
+        "--listen",
+        "tcp/1",
+        "--no-record",
+    ]
+
+
+def child(digests: Iterator[str | None], passed: bool = True) -> Callable[[RunOptions, Path], dict[str, Any]]:
+    def run(options: RunOptions, out: Path) -> dict[str, Any]:
+        check = CheckResult(
+            name="c", passed=passed, value=1.0, limit=1.0, unit="m", at_s=1.0, reason="too far"
+        )
+        made = Verdict(scenario=options.scenario.stem, seed=0, checks=(check,))
+        return replace(made, digest=next(digests)).to_dict()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("digests", "flags", "code", "says"),
+    [
+        (["aa", "aa", "aa"], ["--expect-one-hash"], 0, "one digest: aa"),
+        (["aa", "bb", "aa"], ["--expect-one-hash"], 1, "2 different digests"),
+        (["aa", "bb", "aa"], [], 0, "2 different digests"),
+        ([None, None, None], ["--expect-one-hash"], 1, "one digest: none"),
+    ],
+)
+def test_repeat_compares_digests(
+    demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch,
+    digests: list[str | None], flags: list[str], code: int, says: str,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(repeat, "run_in_child", child(iter(digests)))
+    got, out, _ = invoke("run", str(demo), "--repeat", "3", *flags)
+    assert got == code
+    assert says in out
+
+
+def test_test_runs_all_and_writes_one_junit(
+    demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (demo.parent / "second.yaml").write_text(SCENARIO, encoding="utf-8")
+    monkeypatch.setattr("twin.cli.child.run_in_child", child(iter("ab"), passed=False))
+    code, out, _ = invoke("test", str(demo.parent), "--junit", "reports/all.xml")
+    assert code == 1
+    assert "0 of 2 passed" in out
+    assert "c: too far" in out
+    root = ElementTree.parse(demo.parent / "reports" / "all.xml").getroot()
+    assert [suite.get("name") for suite in root] == ["demo", "second"]
+
+
+def test_test_names_a_wrong_path(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="no such file or folder"):
+        batch.scenario_files([tmp_path / "nope"])
+    with pytest.raises(ScenarioError, match="no scenario"):
+        batch.scenario_files([tmp_path])
+
+
+def test_a_dead_child_is_an_error_not_a_crash(tmp_path: Path) -> None:
+    done = twin("test", str(tmp_path / "bad.yaml"), cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, f"error: {tmp_path}/bad.yaml: no such file or folder\n")
+    (tmp_path / "bad.yaml").write_text("name: bad\n", encoding="utf-8")
+    done = twin("test", str(tmp_path / "bad.yaml"), "--json", cwd=tmp_path)
+    assert done.returncode == 2
+    (verdict,) = json.loads(done.stdout)
+    assert verdict["verdict"] == "error"
+    assert "missing key 'robots'" in verdict["error"]
+
+
+def test_play_finds_the_recording(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="it holds none"):
+        find_recording(tmp_path)
+    (tmp_path / "a.rrd").touch()
+    assert find_recording(tmp_path) == tmp_path / "a.rrd"
+    with pytest.raises(RecordingError, match=r"not a Rerun recording; valid: \*\.rrd"):
+        find_recording(Path(__file__))
+    with pytest.raises(RecordingError, match="no such recording"):
+        find_recording(tmp_path / "b.rrd")
+
+
+def test_schema_and_robots(demo: Path, invoke: Invoke) -> None:
+    assert invoke("schema", "-o", "s.json")[0] == 0
+    assert json.loads((demo.parent / "s.json").read_text(encoding="utf-8"))["title"] == "Scenario"
+    code, out, _ = invoke("robots")
+    assert code == 0
+    assert {"diff_bot", "warehouse_bot", "r2d2", "sp1s"} <= set(out.split())
