@@ -25,7 +25,7 @@ from twin.navigation.particles import (
 
 @dataclass(frozen=True, kw_only=True)
 class AmclConfig:
-    """Parameters; names are those of nav2_amcl (its alphas default to 0.2: more slip than wheels here have)."""
+    """Parameters; names are those of nav2_amcl (whose alphas default to 0.2, for drives that slip more)."""
 
     alpha1: float = 0.05
     """Turning noise per turn."""

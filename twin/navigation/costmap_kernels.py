@@ -76,6 +76,7 @@ def trace_scan(
 def combine_and_inflate(
     costs: Cells,
     base: Cells,
+    seen_base: Cells,
     obstacles: Cells,
     stamp: Cells,
     inflate_unknown: bool,
@@ -89,6 +90,7 @@ def combine_and_inflate(
     Args:
         costs: The master grid, written.
         base: Static layer, already inflated.
+        seen_base: The same if none of its cells were unknown: what is below an unknown cell seen free.
         obstacles: Obstacle layer: 255 never seen, 0 seen free, 254 lethal.
         stamp: Costs around one lethal cell, shape (2 r + 1, 2 r + 1); 0 beyond the inflation radius.
         inflate_unknown: Whether inflation writes every cost into unknown cells, not only 253 and above.
@@ -101,8 +103,7 @@ def combine_and_inflate(
     r = stamp.shape[0] // 2
     for y in range(y0, y1):
         for x in range(x0, x1):
-            cost = base[y, x]
-            costs[y, x] = 0 if cost == 255 and obstacles[y, x] == 0 else cost
+            costs[y, x] = seen_base[y, x] if obstacles[y, x] == 0 else base[y, x]
     for y in range(max(0, y0 - r), min(height, y1 + r)):
         for x in range(max(0, x0 - r), min(width, x1 + r)):
             if obstacles[y, x] != 254 or base[y, x] == 254:

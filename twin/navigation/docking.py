@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.geometry import Array, Pose2, wrap_angle
 
+CORNER = 0.02
+"""A chain of points that leaves its chord by more than this has a corner [m]."""
 HYPOTHESIS_POINTS = 40
 """Lines through every pair of so many points are tried."""
 
@@ -45,8 +47,8 @@ class BoxFace:
 def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
     """Return the line that most points lie on, or None if there are fewer than 5 of them.
 
-    Lines through pairs of points are scored by truncated squared distance (MSAC, Torr and Zisserman 2000), in a
-    fixed order; then total least squares over the inliers.
+    Lines through pairs of points are scored by truncated squared distance (MSAC, Torr and Zisserman 2000),
+    in a fixed order; then total least squares over the inliers.
 
     Args:
         points: Shape (n, 2), in the base frame [m].
@@ -107,8 +109,8 @@ def find_box_face(
     gaps = np.flatnonzero(np.hypot(*np.diff(xy, axis=0).T) > max_gap) + 1
     faces = []
     for segment in np.split(xy, gaps):
-        for piece in _split_at_corners(segment, 0.02):
-            face = _face(piece, width, width_tolerance, max_yaw)
+        for first, last in _split_at_corners(segment, 0, len(segment) - 1):
+            face = _face(_grown(segment, first, last), width, width_tolerance, max_yaw)
             if face is not None:
                 faces.append(face)
     return min(faces, key=lambda face: abs(face.pose.y - expected_y), default=None)
@@ -122,21 +124,31 @@ def _total_least_squares(points: Array) -> tuple[Array, float, float]:
     return normal, float(normal @ centre), math.sqrt(max(float(values[0]), 0.0))
 
 
-def _split_at_corners(points: Array, deviation: float) -> list[Array]:
-    """Cut a chain of points where it leaves its chord by more than `deviation` (Ramer 1972)."""
-    if len(points) < 5:
-        return [points]
-    chord = points[-1] - points[0]
+def _split_at_corners(points: Array, first: int, last: int) -> list[tuple[int, int]]:
+    """Cut a chain where it leaves its chord by more than `CORNER` (Ramer 1972); return first and last indices."""
+    chord = points[last] - points[first]
     length = math.hypot(chord[0], chord[1])
-    if length == 0.0:
-        return [points]
-    offset = points - points[0]
+    if last - first < 4 or length == 0.0:
+        return [(first, last)]
+    offset = points[first : last + 1] - points[first]
     away = np.abs(chord[0] * offset[:, 1] - chord[1] * offset[:, 0]) / length
-    corner = int(np.argmax(away))
-    if away[corner] <= deviation:
-        return [points]
-    left = _split_at_corners(points[: corner + 1], deviation)
-    return left + _split_at_corners(points[corner:], deviation)
+    corner = first + int(np.argmax(away))
+    if away.max() <= CORNER:
+        return [(first, last)]
+    return _split_at_corners(points, first, corner) + _split_at_corners(points, corner, last)
+
+
+def _grown(points: Array, first: int, last: int) -> Array:
+    """Return the run of points that fits the line of points[first..last], which noise may have cut short."""
+    if last - first < 4:
+        return points[first : last + 1]
+    normal, offset, _ = _total_least_squares(points[first : last + 1])
+    on_line = np.abs(points @ normal - offset) <= CORNER / 2.0
+    middle = (first + last) // 2
+    off = np.flatnonzero(~on_line)
+    start = int(off[off < middle].max(initial=-1)) + 1
+    end = int(off[off > middle].min(initial=len(points)))
+    return points[start:end]
 
 
 def _face(points: Array, width: float, tolerance: float, max_yaw: float) -> BoxFace | None:

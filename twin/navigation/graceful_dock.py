@@ -98,8 +98,8 @@ class GracefulDock:
     def _curvature(self, lateral: float, yaw_error: float) -> float:
         """Return the curvature [1/m] of the path of the end that goes first.
 
-        Aiming at a point on the line ahead, not at the pose itself, keeps the law away from its singularity at
-        distance 0 (opennav_docking projects its target for the same reason).
+        Aiming at a point on the line ahead, not at the pose itself, keeps the law away from its singularity
+        at distance 0 (opennav_docking projects its target for the same reason).
         """
         config = self.config
         heading = wrap_angle(yaw_error + math.pi) if self.backward else yaw_error

@@ -102,9 +102,11 @@ class LayeredCostmap:
         if static is None:
             shape = round(config.height / self._resolution), round(config.width / self._resolution)
             self._base = np.full(shape, FREE_SPACE if config.rolling_window else unknown, dtype=np.uint8)
+            self._seen_base = np.zeros(shape, dtype=np.uint8)
             origin = (-config.width / 2.0, -config.height / 2.0)
         else:
             self._base = self._inflated_static(static, unknown)
+            self._seen_base = self._inflated_static(static, FREE_SPACE)
             origin = (static.origin.x, static.origin.y)
         self._stamp = self._make_stamp()
         self._obstacles: Cells = np.full(self._base.shape, NO_INFORMATION, dtype=np.uint8)
@@ -184,6 +186,7 @@ class LayeredCostmap:
         combine_and_inflate(
             self.costmap.costs,
             self._base,
+            self._seen_base,
             self._obstacles,
             self._stamp,
             self.config.inflate_unknown,

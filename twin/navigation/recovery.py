@@ -71,7 +71,7 @@ class _Behavior:
 
     def _timed_out(self, dt: float) -> bool:
         self._elapsed += dt
-        return 0.0 < self.time_allowance < self._elapsed
+        return 0.0 < self.time_allowance < self._elapsed - 1e-9
 
     def _ramp(
         self, remaining: float, accel: float, decel: float, least: float, most: float, dt: float

@@ -172,7 +172,7 @@ class RegulatedPurePursuit:
         change = config.max_angular_accel * dt
         target = math.copysign(config.rotate_to_heading_angular_vel, angle)
         w = min(max(target, w_now - change), w_now + change)
-        stoppable = math.sqrt(2.0 * config.max_angular_accel * abs(angle))
+        stoppable = min(math.sqrt(2.0 * config.max_angular_accel * abs(angle)), abs(angle) / dt)
         return math.copysign(stoppable, angle) if abs(w) > stoppable else w
 
     def _regulate(self, curvature: float, pose: Pose2, local: Array, costmap: Costmap | None) -> float:
