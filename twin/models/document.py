@@ -137,16 +137,22 @@ def text_of(element: Element, *names: str) -> str | None:
 
 
 def describe(element: Element) -> str:
-    """Return how to call an element in a message: the tag, with the named element that it belongs to."""
+    """Return how to call an element in a message: by its own name, or by its tag and what it belongs to."""
     name = element.get("name")
-    if name:
-        return f"{element.tag} '{name}'"
+    return f"{element.tag} '{name}'" if name else f"<{element.tag}>{_of_owner(element)}"
+
+
+def owner(element: Element) -> str:
+    """Return how to call the link, joint, sensor or gazebo element that an element belongs to."""
+    return _of_owner(element).removeprefix(" of ") or f"<{element.tag}>"
+
+
+def _of_owner(element: Element) -> str:
     for parent in element.iterancestors():
-        if parent.tag in ("link", "joint", "gazebo", "sensor") and (
-            parent.get("name") or parent.get("reference")
-        ):
-            return f"<{element.tag}> of {parent.tag} '{parent.get('name') or parent.get('reference')}'"
-    return f"<{element.tag}>"
+        name = parent.get("name") or parent.get("reference")
+        if name and parent.tag in ("link", "joint", "gazebo", "sensor"):
+            return f" of {parent.tag} '{name}'"
+    return ""
 
 
 def _refuse_doctype(text: bytes, report: Report) -> None:

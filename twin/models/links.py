@@ -23,7 +23,7 @@ from twin.models.description import (
     Surface,
     Visual,
 )
-from twin.models.document import Element, Report, describe
+from twin.models.document import Element, Report, describe, owner
 
 Rgba = tuple[float, float, float, float]
 
@@ -148,7 +148,7 @@ def _read_material(element: Element, context: LinkContext) -> Rgba:
         return context.materials[name]
     if material.find("texture") is None:
         valid = nearest(name, context.materials) if context.materials else "the file defines none"
-        context.report.add(material, f"material '{name}' of {describe(element)} is not defined; {valid}")
+        context.report.add(material, f"material '{name}' of {owner(element)} is not defined; {valid}")
     return DEFAULT_RGBA
 
 
@@ -212,7 +212,7 @@ def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
         hint = (
             "" if path is not None else f"; known packages: {', '.join(sorted(context.packages)) or 'none'}"
         )
-        report.add(shape, f"mesh '{reference}' of {describe(shape)} does not exist{hint}")
+        report.add(shape, f"mesh '{reference}' of {owner(shape)} does not exist{hint}")
         return None
     return Mesh(path=path, scale=(x, y, z))
 
