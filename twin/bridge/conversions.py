@@ -20,9 +20,9 @@ def yaw_from_quaternion(q: Quaternion) -> float:
     return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
 
 
-def pose_from_pose2(pose: Pose2) -> Pose:
-    """Return a planar pose as a message."""
-    return Pose(Point(pose.x, pose.y, 0.0), quaternion_from_yaw(pose.yaw))
+def pose_from_pose2(pose: Pose2, z: float = 0.0) -> Pose:
+    """Return a planar pose, at height z [m], as a message."""
+    return Pose(Point(pose.x, pose.y, z), quaternion_from_yaw(pose.yaw))
 
 
 def pose2_from_pose(pose: Pose) -> Pose2:
@@ -54,6 +54,6 @@ def pose3_from_transform(transform: Transform) -> Pose3:
     return Pose3(np.array([t.x, t.y, t.z]), np.array([q.w, q.x, q.y, q.z]))
 
 
-def twist_from_planar(vx: float, vy: float, wz: float) -> Twist:
+def twist_from_planar(vx: float, wz: float, vy: float = 0.0) -> Twist:
     """Return a planar velocity as a message: vx, vy [m/s] and wz [rad/s] in the base frame."""
     return Twist(Vector3(vx, vy, 0.0), Vector3(0.0, 0.0, wz))

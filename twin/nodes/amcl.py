@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
 from twin.bridge.msgs import (
     LaserScan,
     OccupancyGrid,
@@ -15,6 +16,7 @@ from twin.bridge.msgs import (
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     header,
+    new,
     ns,
 )
 from twin.bridge.qos import LATCHED, SENSOR_DATA
@@ -24,7 +26,6 @@ from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.amcl import Amcl, AmclConfig, Estimate
 from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.map_server import occupancy_map
-from twin.nodes.messages import pose2, pose_msg
 from twin.nodes.robot_pose import RobotPose
 
 
@@ -38,7 +39,7 @@ class InitialPose:
 
     @staticmethod
     def from_error(pose: Pose2, xy: float, yaw: float) -> InitialPose:
-        """Return a guess whose covariance admits an error of `xy` [m] and `yaw` [rad]; at least RViz's scale."""
+        """Return a guess whose covariance admits an error of `xy` [m] and `yaw` [rad]."""
         return InitialPose(
             pose=pose, covariance=np.diag([max(xy, 0.1) ** 2, max(xy, 0.1) ** 2, max(yaw, 0.05) ** 2])
         )
@@ -49,7 +50,7 @@ class AmclNodeConfig:
     """Rates of what is published."""
 
     transform_tolerance_ns: int = 150_000_000
-    """map → odom is stamped this far ahead, so that it holds until the next scan (Nav2: transform_tolerance)."""
+    """map → odom is stamped this far ahead, so that it holds until the next scan [ns]."""
     particles_period_ns: int = 1_000_000_000
     """Time between two particle clouds [ns]."""
     particles_published: int = 200
@@ -57,7 +58,7 @@ class AmclNodeConfig:
 
 
 class AmclNode:
-    """Takes `map`, `scan` and `initialpose`; publishes `amcl_pose`, `particle_cloud` and the transform map → odom.
+    """Takes `map`, `scan` and `initialpose`; publishes `amcl_pose`, `particle_cloud` and map → odom.
 
     It has no other input: what it knows of the robot's place comes from odometry and lidar.
     """
@@ -99,7 +100,7 @@ class AmclNode:
         if self._filter is None:
             return
         covariance = message.pose.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
-        guess = pose2(message.pose.pose)
+        guess = pose2_from_pose(message.pose.pose)
         if not (np.all(np.isfinite(guess)) and np.all(np.isfinite(covariance))):
             self.node.get_logger().error("initialpose refused: it must be finite")
             return
@@ -111,7 +112,7 @@ class AmclNode:
         if self._filter is not None:
             self._filter.global_localisation()
             self._force = True
-        return Empty.Response()
+        return new(Empty.Response)
 
     def _on_scan(self, message: LaserScan) -> None:
         frames, stamp_ns = self._robot_pose.frames, ns(message.header.stamp)
@@ -138,7 +139,7 @@ class AmclNode:
             PoseWithCovarianceStamped(
                 header=header(stamp_ns, self._robot_pose.frames.map),
                 pose=PoseWithCovariance(
-                    pose=pose_msg(estimate.pose), covariance=planar_covariance(estimate.covariance)
+                    pose=pose_from_pose2(estimate.pose), covariance=planar_covariance(estimate.covariance)
                 ),
             )
         )
@@ -147,7 +148,7 @@ class AmclNode:
         assert self._filter is not None
         particles = self._filter.particles
         step = -(-len(particles) // self.config.particles_published)
-        poses: list[Pose] = [pose_msg(Pose2(*particle)) for particle in particles[::step].tolist()]
+        poses: list[Pose] = [pose_from_pose2(Pose2(*particle)) for particle in particles[::step].tolist()]
         self._cloud_publisher.publish(
             PoseArray(header=header(stamp_ns, self._robot_pose.frames.map), poses=poses)
         )

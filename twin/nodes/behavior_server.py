@@ -8,12 +8,12 @@ from typing import Any
 from twin.bridge.action_types import BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist, duration, new, ns
 from twin.bridge.types import ActionType
 from twin.navigation import recovery
 from twin.nodes.costmap import CostmapNode
 from twin.nodes.robot_pose import RobotPose
-from twin.nodes.velocity_smoother import twist
 
 _ERROR_CODES = {
     "spin": {recovery.TIMEOUT: 701, recovery.COLLISION_AHEAD: 703},
@@ -26,7 +26,7 @@ Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait
 
 
 class BehaviorServerNode:
-    """Runs one behaviour at a time on odometry, with the local costmap, if there is one, to see collisions."""
+    """Runs behaviours on odometry, with the local costmap, if there is one, to see collisions."""
 
     def __init__(
         self,
@@ -102,9 +102,9 @@ class BehaviorServerNode:
                             error_code=_ERROR_CODES[name][step.failed_reason],
                             error_msg=f"{name}: {step.failed_reason.replace('_', ' ')}",
                         )
-                    self._publisher.publish(twist(step.v, step.w))
+                    self._publisher.publish(twist_from_planar(step.v, step.w))
                     yield
             finally:
-                self._publisher.publish(twist(0.0, 0.0))
+                self._publisher.publish(twist_from_planar(0.0, 0.0))
 
         ActionServer(self.node, action, name, execute)

@@ -16,6 +16,7 @@ from py_trees.common import Status
 from twin.bridge.action_types import BackUp, ComputePathToPose, FollowPath, NavigateToPose, Spin, Wait
 from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, Point, PoseStamped, duration, new
 from twin.bridge.srvs import ClearEntireCostmap, IsPathValid
 from twin.nodes.bt.control import (
@@ -27,7 +28,7 @@ from twin.nodes.bt.control import (
     sequence,
 )
 from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
-from twin.nodes.messages import pose2, pose_stamped
+from twin.nodes.messages import pose_stamped
 from twin.nodes.robot_pose import RobotPose
 
 
@@ -88,7 +89,7 @@ class BtNavigatorNode:
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         self._goal, self._path, self._failure = handle.request.pose, None, ""
         started, recoveries = self.node.now_ns, self.recoveries
-        target = pose2(self._goal.pose)
+        target = pose2_from_pose(self._goal.pose)
         self.node.get_logger().info(f"navigating to ({target.x:.2f}, {target.y:.2f}, {target.yaw:.2f})")
         tree = self._build_tree()
         next_tick = started
@@ -117,7 +118,7 @@ class BtNavigatorNode:
     def _feedback(self, started: int, recoveries: int) -> Any:
         pose = self._robot_pose.in_map()
         assert self._goal is not None
-        goal = pose2(self._goal.pose)
+        goal = pose2_from_pose(self._goal.pose)
         now = self.node.now_ns
         return new(
             NavigateToPose.Feedback,

@@ -9,7 +9,8 @@ from typing import Any
 from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import Odometry, PointStamped, Twist, header, new, Point
+from twin.bridge.conversions import twist_from_planar
+from twin.bridge.msgs import Odometry, Point, PointStamped, Twist, header, new
 from twin.geometry import Array, Pose2
 from twin.navigation.failures import ControlFailure
 from twin.navigation.goal_checker import GoalCheckerConfig, SimpleGoalChecker
@@ -18,7 +19,6 @@ from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuit, Regulat
 from twin.nodes.costmap import CostmapNode
 from twin.nodes.messages import path_array
 from twin.nodes.robot_pose import RobotPose
-from twin.nodes.velocity_smoother import twist
 
 _TF_ERROR, _FAILED_TO_MAKE_PROGRESS, _NO_VALID_CONTROL = 102, 105, 106
 
@@ -96,7 +96,7 @@ class ControllerServerNode:
         finally:
             # A goal that preempts this one goes on from the present speed.
             if finished:
-                self._publisher.publish(twist(0.0, 0.0))
+                self._publisher.publish(twist_from_planar(0.0, 0.0))
 
     def _control(
         self, path: Array, goal_checker: SimpleGoalChecker, progress_checker: SimpleProgressChecker, dt: float
@@ -116,9 +116,9 @@ class ControllerServerNode:
                 in_map, self._velocity, path, self._costmap.costmap, dt, costmap_pose=in_odom
             )
         except ControlFailure as failure:
-            self._publisher.publish(twist(0.0, 0.0))
+            self._publisher.publish(twist_from_planar(0.0, 0.0))
             return new(FollowPath.Result, error_code=failure.error_code, error_msg=str(failure))
-        self._publisher.publish(twist(v, w))
+        self._publisher.publish(twist_from_planar(v, w))
         if self._controller.carrot is not None:
             x, y = self._controller.carrot
             self._lookahead.publish(

@@ -1,4 +1,4 @@
-"""A costmap fed from the map and the scans, as planner and controller server each own one (nav2_costmap_2d)."""
+"""A costmap fed from the map and the scans; planner and controller server own one each (nav2_costmap_2d)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import LaserScan, OccupancyGrid
+from twin.bridge.msgs import LaserScan, OccupancyGrid, new
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import ClearEntireCostmap
 from twin.geometry import Array, Pose2
@@ -32,7 +33,7 @@ def scan_points(message: LaserScan, no_return: float) -> Array:
     return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
 
 
-def _occupancy_of_costs() -> Array:
+def _occupancy_of_costs() -> NDArray[np.int8]:
     """Return nav2_costmap_2d's table from costs to the values of an OccupancyGrid."""
     table = 1 + (97 * (np.arange(256) - 1)) // 251
     table[0] = 0
@@ -59,7 +60,7 @@ class CostmapNodeConfig:
 
 
 class CostmapNode:
-    """`/<name>/<name>`: takes `map` (unless rolling) and scans; publishes `<name>/costmap`; can be cleared."""
+    """`/<name>/<name>`: takes `map` (unless rolling) and scans; publishes `<name>/costmap`."""
 
     def __init__(
         self, bus: Bus, robot_pose: RobotPose, config: CostmapNodeConfig, *, namespace: str = ""
@@ -94,7 +95,7 @@ class CostmapNode:
     def _on_clear(self, _request: Any) -> Any:
         if self._layers is not None:
             self._layers.clear()
-        return ClearEntireCostmap.Response()
+        return new(ClearEntireCostmap.Response)
 
     def _update(self) -> None:
         if self._layers is None:

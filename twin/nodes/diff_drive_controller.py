@@ -9,7 +9,6 @@ import numpy as np
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import (
     Header,
-    Odometry as OdometryMsg,
     Point,
     Pose,
     PoseWithCovariance,
@@ -18,6 +17,9 @@ from twin.bridge.msgs import (
     TwistWithCovariance,
     Vector3,
     stamp,
+)
+from twin.bridge.msgs import (
+    Odometry as OdometryMsg,
 )
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController

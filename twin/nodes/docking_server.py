@@ -1,8 +1,8 @@
 """`/docking_server`: the actions `dock_robot` and `undock_robot`, as in Nav2's opennav_docking.
 
-A dock is a vertical face: its pose in `map` lies on the face, x into it, as a docked robot looks. The map tells where
-to expect it; scans tell where it is: distance and heading from a line fitted to the face, and for docks of type
-`tote` the lateral position from the tote that is to be grasped.
+A dock is a vertical face: its pose in `map` lies on the face, x into it, as a docked robot looks. The map
+tells where to expect it; scans tell where it is: distance and heading from a line fitted to the face, and for
+docks of type `tote` the lateral position from the tote that is to be grasped.
 """
 
 from __future__ import annotations
@@ -17,15 +17,14 @@ import numpy as np
 from twin.bridge.action_types import DockRobot, UndockRobot
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose, twist_from_planar
 from twin.bridge.msgs import LaserScan, PoseStamped, Twist, new
 from twin.bridge.qos import SENSOR_DATA
 from twin.geometry import Array, Pose2
 from twin.navigation.docking import fit_wall
 from twin.navigation.graceful_dock import GracefulDock, GracefulDockConfig
 from twin.nodes.costmap import scan_points
-from twin.nodes.messages import pose2
 from twin.nodes.robot_pose import RobotPose
-from twin.nodes.velocity_smoother import twist
 
 _FAILED_TO_DETECT_DOCK, _FAILED_TO_CONTROL = 904, 905
 
@@ -125,7 +124,7 @@ class DockingServerNode:
         T_odom_base = self._robot_pose.in_odom()
         if self._dock is None or not self._dock.wants_tote or T_odom_base is None:
             return
-        tote = self._dock.face.inverse() @ (T_odom_base @ pose2(message.pose))
+        tote = self._dock.face.inverse() @ (T_odom_base @ pose2_from_pose(message.pose))
         if abs(tote.y) > self.config.search_half_width / 2.0:
             return  # a tote of a neighbouring slot
         self._correct(self._dock.face @ Pose2(0.0, tote.y, 0.0))
@@ -144,7 +143,7 @@ class DockingServerNode:
         if in_map is None or in_odom is None:
             handle.abort()
             return self._failed(_FAILED_TO_DETECT_DOCK, "the robot is not localised", 0)
-        face = in_odom @ in_map.inverse() @ pose2(handle.request.dock_pose.pose)
+        face = in_odom @ in_map.inverse() @ pose2_from_pose(handle.request.dock_pose.pose)
         self._dock = dock = _Dock(face, wants_tote=handle.request.dock_type == "tote")
         try:
             deadline = self.node.now_ns + self.config.detection_timeout_ns
@@ -167,7 +166,7 @@ class DockingServerNode:
             return self._failed(_FAILED_TO_CONTROL, f"docking failed: {reason}", self.config.max_retries)
         finally:
             self._dock = None
-            self._publisher.publish(twist(0.0, 0.0))
+            self._publisher.publish(twist_from_planar(0.0, 0.0))
 
     def _undock_robot(self, handle: GoalHandle) -> Generator[None, None, Any]:
         pose = self._robot_pose.in_odom()
@@ -177,7 +176,7 @@ class DockingServerNode:
         away = self.config.staging_distance - self.config.docked_distance
         goal = pose @ Pose2(-away, 0.0, 0.0)
         reason = yield from self._drive(handle, lambda: goal, self.config.undock, backward=True)
-        self._publisher.publish(twist(0.0, 0.0))
+        self._publisher.publish(twist_from_planar(0.0, 0.0))
         if reason is not None:
             handle.abort()
             return new(UndockRobot.Result, success=False, error_code=905, error_msg=reason)
@@ -212,7 +211,7 @@ class DockingServerNode:
                 due += self.config.period_ns
                 control.retarget(goal())
                 step = control.update(pose, self.config.period_ns * 1e-9)
-                self._publisher.publish(twist(step.v, step.w))
+                self._publisher.publish(twist_from_planar(step.v, step.w))
                 if step.done:
                     return None
                 if step.failed_reason is not None:

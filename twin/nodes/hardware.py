@@ -24,7 +24,7 @@ class JointReading(Protocol):
 
 
 class HardwareInterface(Protocol):
-    """Joints that can be read and commanded; simulated by `twin.sim.hardware`, or a physical robot's driver."""
+    """Joints that can be read and commanded: `twin.sim.hardware`, or a physical robot's driver."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:

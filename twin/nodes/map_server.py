@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
 from twin.bridge.msgs import MapMetaData, OccupancyGrid, header, stamp
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import GetMap
 from twin.geometry import Pose2
 from twin.navigation.occupancy_map import OccupancyMap
-from twin.nodes.messages import pose2, pose_msg
 
 
-def grid_msg(data: NDArray[np.int8], resolution: float, origin: Pose2, frame: str, time_ns: int) -> OccupancyGrid:
+def grid_msg(
+    data: NDArray[np.int8], resolution: float, origin: Pose2, frame: str, time_ns: int
+) -> OccupancyGrid:
     """Return a grid, int8 of shape (height, width), as a message."""
     height, width = data.shape
     info = MapMetaData(
@@ -22,7 +24,7 @@ def grid_msg(data: NDArray[np.int8], resolution: float, origin: Pose2, frame: st
         resolution=resolution,
         width=width,
         height=height,
-        origin=pose_msg(origin),
+        origin=pose_from_pose2(origin),
     )
     return OccupancyGrid(header=header(time_ns, frame), info=info, data=data.ravel())
 
@@ -33,7 +35,7 @@ def occupancy_map(message: OccupancyGrid) -> OccupancyMap:
     return OccupancyMap(
         data=message.data.reshape(info.height, info.width),
         resolution=float(info.resolution),
-        origin=pose2(info.origin),
+        origin=pose2_from_pose(info.origin),
     )
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from py_trees.common import Status
 
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED
 from twin.bridge.types import ActionType
 from twin.nodes.bt.control import sequence
 from twin.nodes.bt.leaves import CallAction, Do
-from twin.nodes.velocity_smoother import twist
 
 
 class MissionNode:
@@ -74,8 +75,8 @@ class ActionSequenceNode(MissionNode):
             if step.name not in clients:
                 clients[step.name] = ActionClient(self.node, step.action_type, step.name)
             leaves += [
-                Do(f"State[{step.label}]", lambda label=step.label: self.enter(label)),
-                CallAction(step.label, clients[step.name], step.goal, on_failure=self.note),
+                Do(f"State[{step.label}]", partial(self.enter, step.label)),
+                CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
             ]
         self._tree = sequence("Behaviors", leaves)
         self.node.create_timer(period_ns, self._tick)
@@ -89,7 +90,7 @@ class ActionSequenceNode(MissionNode):
 
 
 class VelocityProfileNode(MissionNode):
-    """Sends velocity commands open loop on `cmd_vel`: steps of (duration [s], linear [m/s], angular [rad/s])."""
+    """Sends velocities open loop on `cmd_vel`: steps of duration [s], linear [m/s], angular [rad/s]."""
 
     def __init__(
         self,
@@ -118,7 +119,7 @@ class VelocityProfileNode(MissionNode):
         elapsed = self.node.now_ns - self._start
         step = next((i for i, (end, _, _) in enumerate(self._ends) if elapsed <= end), len(self._ends))
         if step == len(self._ends):
-            self._commands.publish(twist(0.0, 0.0))
+            self._commands.publish(twist_from_planar(0.0, 0.0))
             if elapsed > self._ends[-1][0] + self._settle_ns:
                 self.finish(succeeded=True)
             return
@@ -126,4 +127,4 @@ class VelocityProfileNode(MissionNode):
         if step != self._step:
             self._step = step
             self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
-        self._commands.publish(twist(linear, angular))
+        self._commands.publish(twist_from_planar(linear, angular))

@@ -10,6 +10,7 @@ import numpy as np
 from twin.bridge.action_types import ComputePathToPose
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.srvs import IsPathValid
 from twin.navigation.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
@@ -17,7 +18,7 @@ from twin.navigation.failures import PlanningFailure
 from twin.navigation.planner import Planner, PlannerConfig
 from twin.navigation.smoother import SimpleSmoother, SmootherConfig
 from twin.nodes.costmap import CostmapNode
-from twin.nodes.messages import path_array, path_msg, pose2
+from twin.nodes.messages import path_array, path_msg
 from twin.nodes.robot_pose import RobotPose
 
 
@@ -45,7 +46,7 @@ class PlannerServerNode:
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         request = handle.request
-        start = pose2(request.start.pose) if request.use_start else self._robot_pose.in_map()
+        start = pose2_from_pose(request.start.pose) if request.use_start else self._robot_pose.in_map()
         costmap = self._costmap.costmap
         if start is None or costmap is None:
             handle.abort()
@@ -53,7 +54,7 @@ class PlannerServerNode:
             return new(ComputePathToPose.Result, error_code=202, error_msg=f"no plan without {what}")
         yield
         try:
-            raw = self._planner.plan(costmap, start, pose2(request.goal.pose))
+            raw = self._planner.plan(costmap, start, pose2_from_pose(request.goal.pose))
         except PlanningFailure as failure:
             handle.abort()
             return new(ComputePathToPose.Result, error_code=failure.error_code, error_msg=str(failure))

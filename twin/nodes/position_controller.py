@@ -1,4 +1,4 @@
-"""`/position_controller`: position targets for single joints, as ros2_controllers' forward command controller."""
+"""`/position_controller`: targets for single joints, as ros2_controllers' forward command controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""R2-D2's state publisher of the URDF tutorial: a circle in `odom`, while tilt, swivel and periscope sweep."""
+"""R2-D2's state publisher of the URDF tutorial: a circle in `odom`, while its joints sweep."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _HEIGHT = 0.7
 class R2D2StatePublisherNode(MissionNode):
     """Publishes odom → axis and moves the base there; sends the joints' targets to `/position_controller`.
 
-    Each cycle the circle angle a grows, swivel grows by 1°, tilt sweeps 0 … −0.5 by 1° and periscope sweeps by
-    5 mm. The tutorial sweeps the periscope 0 … 0.2, outside its own limits of −0.5 … 0; here it sweeps 0 … −0.2.
+    Each cycle the angle on the circle and swivel grow, tilt sweeps 0 … −0.5 by 1° and periscope by 5 mm. The
+    tutorial sweeps the periscope 0 … 0.2, outside of its own limits of −0.5 … 0; here it sweeps 0 … −0.2.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""`/robot_state_publisher`: link frames from joint states; fixed joints on `tf_static`, moving ones on `tf`."""
+"""`/robot_state_publisher`: link frames; those of fixed joints on `tf_static`, of moving ones on `tf`."""
 
 from __future__ import annotations
 

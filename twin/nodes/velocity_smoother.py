@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import Twist, Vector3
+from twin.bridge.conversions import twist_from_planar
+from twin.bridge.msgs import Twist
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
-
-
-def twist(linear: float, angular: float) -> Twist:
-    """Return the message for a planar velocity [m/s, rad/s]."""
-    return Twist(linear=Vector3(x=linear, y=0.0, z=0.0), angular=Vector3(x=0.0, y=0.0, z=angular))
 
 
 class VelocitySmootherNode:
@@ -37,4 +33,4 @@ class VelocitySmootherNode:
     def _update(self) -> None:
         if self.smoother.idle:
             return
-        self._publisher.publish(twist(*self.smoother.update(self._period_s)))
+        self._publisher.publish(twist_from_planar(*self.smoother.update(self._period_s)))

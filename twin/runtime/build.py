@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2, Pose3
@@ -22,7 +24,7 @@ from twin.scenario.navigation import AmclLocalisation
 from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
-from twin.scenario.world import Obstacle
+from twin.scenario.world import GoodOverride, Obstacle
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
@@ -47,8 +49,20 @@ class Parts:
     control_period_ns: int
 
 
-def build(scenario: Scenario, *, listen: Sequence[str] = (), crash_folder: Path | None = None) -> Parts:
+def build(
+    scenario: Scenario,
+    *,
+    taps: Sequence[Callable[[Sample[Any]], None]] = (),
+    listen: Sequence[str] = (),
+    crash_folder: Path | None = None,
+) -> Parts:
     """Build the world, the bus and all nodes.
+
+    Args:
+        scenario: What to build.
+        taps: Called for every sample, from the first one on that a node publishes while it is made.
+        listen: Endpoints for other processes.
+        crash_folder: Where the last states go if the physics diverges.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -69,6 +83,8 @@ def build(scenario: Scenario, *, listen: Sequence[str] = (), crash_folder: Path 
     )
     clock = Clock()
     bus = Bus.open(clock, listen=listen)
+    for tap in taps:
+        bus.tap(tap)
     try:
         control_period_ns = round(scenario.physics.control_period * 1e9)
         alone = len(scenario.robots) == 1
@@ -120,20 +136,30 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
     if arena is None:
         return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable))
-    totes = {task.tote for task in scenario.mission.tasks} if isinstance(scenario.mission, PickAndPlace) else set()
+    totes = (
+        {task.tote for task in scenario.mission.tasks}
+        if isinstance(scenario.mission, PickAndPlace)
+        else set()
+    )
     overrides = {good.name: good for good in scenario.world.goods}
     scene = arena.scene(totes | set(overrides), seed=scenario.seed, obstacles=statics)
-    goods = []
-    for good in scene.goods:
-        override = overrides.get(good.name)
-        changes = {} if override is None else {"mass": override.mass, "friction": override.friction}
-        goods.append(replace(good, **{key: value for key, value in changes.items() if value is not None}))
+    goods = [_overridden(good, overrides.get(good.name)) for good in scene.goods]
     return Scene(
         name=scene.name,
         floor_friction=scene.floor_friction,
         floor_size=scene.floor_size,
         statics=scene.statics,
         goods=(*goods, *movable),
+    )
+
+
+def _overridden(good: FreeBody, override: GoodOverride | None) -> FreeBody:
+    if override is None:
+        return good
+    return replace(
+        good,
+        mass=good.mass if override.mass is None else override.mass,
+        friction=good.friction if override.friction is None else override.friction,
     )
 
 
@@ -157,7 +183,9 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
         return None
     name = robot.localisation.map
     if name is None and arena is None:
-        raise MapError(f"robot '{robot.id}' localises with amcl but names no map, and there is no arena with one")
+        raise MapError(
+            f"robot '{robot.id}' localises with amcl but names no map, and there is no arena with one"
+        )
     if name is None:
         assert arena is not None
         return map_of_arena(arena)
@@ -169,7 +197,12 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
         x0, y0 = grid.origin.x, grid.origin.y
         x1, y1 = x0 + width * grid.resolution, y0 + height * grid.resolution
         slack = 2.0 * grid.resolution
-        if x0 > hall.x[0] + slack or y0 > hall.y[0] + slack or x1 < hall.x[1] - slack or y1 < hall.y[1] - slack:
+        if (
+            x0 > hall.x[0] + slack
+            or y0 > hall.y[0] + slack
+            or x1 < hall.x[1] - slack
+            or y1 < hall.y[1] - slack
+        ):
             raise MapError(
                 f"{path}: the map covers x {x0:.2f} … {x1:.2f}, y {y0:.2f} … {y1:.2f} m, but the arena "
                 f"'{arena.name}' spans x {hall.x[0]:g} … {hall.x[1]:g}, y {hall.y[0]:g} … {hall.y[1]:g} m"
@@ -188,7 +221,9 @@ def _check_context(scenario: Scenario, scene: Scene, arena: Arena | None) -> Che
                 else Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
             )
     bottoms = {
-        good.name: max((_half_height(shape) - float(shape.T_body_geometry.xyz[2]) for shape in good.shapes), default=0.0)
+        good.name: max(
+            (_half_height(shape) - float(shape.T_body_geometry.xyz[2]) for shape in good.shapes), default=0.0
+        )
         for good in scene.goods
     }
     return CheckContext(

@@ -105,7 +105,7 @@ class Manipulator:
 
 
 def manipulator(description: RobotDescription) -> Manipulator | None:
-    """Return the arm that carries the grasp frame: a lift, a telescopic extension and a wrist about the vertical.
+    """Return the arm that carries the grasp frame: a lift, a telescopic extension and a wrist.
 
     None for a robot without a grasp frame or without these joints.
     """

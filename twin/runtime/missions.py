@@ -58,7 +58,11 @@ class IdleMission:
 
 
 def build_mission(
-    bus: Bus, mission: Mission, stacks: Mapping[str, RobotStack], arena: Arena | None, namespaces: Mapping[str, str]
+    bus: Bus,
+    mission: Mission,
+    stacks: Mapping[str, RobotStack],
+    arena: Arena | None,
+    namespaces: Mapping[str, str],
 ) -> MissionHandle:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
@@ -129,7 +133,9 @@ def _pick_and_place(
         raise ScenarioError("the mission pick_and_place needs an arena with totes; set world.arena")
     if stack.manipulator is None or stack.navigator is None:
         lacks = "arm with a grasp_frame" if stack.manipulator is None else "navigation"
-        raise ScenarioError(f"the mission pick_and_place needs a robot with an {lacks}; '{stack.name}' has none")
+        raise ScenarioError(
+            f"the mission pick_and_place needs a robot with an {lacks}; '{stack.name}' has none"
+        )
     taken: dict[str, int] = {}
     tasks = []
     for task in mission.tasks:
@@ -148,9 +154,7 @@ def _pick_and_place(
                 tote_depth=depth,
                 tote_width=width,
                 tote_height=height,
-                pick=Station(
-                    name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height
-                ),
+                pick=Station(name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height),
                 place=Station(name=place.name, face=place.approach(0.0), surface_z=place.height),
             )
         )

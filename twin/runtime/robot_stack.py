@@ -173,7 +173,7 @@ class RobotStack:
             namespace=namespace,
         )
         layers = CostmapConfig(
-            footprint=polygon,  # type: ignore[arg-type]
+            footprint=polygon,
             inflation_radius=0.8,
             cost_scaling_factor=4.0,
             obstacle_max_range=4.0,
@@ -236,7 +236,7 @@ class RobotStack:
         BehaviorServerNode(
             bus,
             self.robot_pose,
-            BehaviorConfig(footprint=polygon),  # type: ignore[arg-type]
+            BehaviorConfig(footprint=polygon),
             costmap=local_costmap,
             period_ns=context.control_period_ns,
             namespace=namespace,

@@ -46,12 +46,10 @@ class Run:
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
 
-    def __init__(self, scenario: Scenario, parts: Parts, sink: RerunSink | None) -> None:
+    def __init__(self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None) -> None:
         self.scenario = scenario
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
-        self.digest = RunDigest()
-        self.bus.tap(self.digest.on_sample)
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
@@ -70,8 +68,8 @@ class Run:
         for what, period in periods.items():
             if period % step:
                 raise ScenarioError(
-                    f"the period of {what}, {period / 1e6:g} ms, is not a whole multiple of the physics step, "
-                    f"{step / 1e6:g} ms"
+                    f"the period of {what}, {period / 1e6:g} ms, is not a whole multiple of the physics "
+                    f"step, {step / 1e6:g} ms"
                 )
         return math.gcd(*periods.values())
 
@@ -163,16 +161,19 @@ def run(
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
     """
-    parts = build(scenario, listen=listen, crash_folder=out)
-    sink: RerunSink | None = None
+    digest = RunDigest()
+    sink = _recording(scenario, out) if record else None
+    taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
+    parts = build(scenario, taps=taps, listen=listen, crash_folder=out)
     try:
         if save_model is not None:
             parts.world.save_model(save_model)
-        sink = _recording(scenario, parts, out) if record else None
         simulation = Run(scenario, parts, sink)
+        if sink is not None:
+            sink.declare(parts.world)
         warm_up()
         wall, cpu = _loop(simulation, pace, progress)
-        verdict = _verdict(simulation, wall, cpu, deterministic=not listen)
+        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not listen)
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
@@ -182,20 +183,17 @@ def run(
         parts.bus.close()
 
 
-def _recording(scenario: Scenario, parts: Parts, out: Path | None) -> RerunSink | None:
+def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
     if out is None or not scenario.recording.enabled:
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
     config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
-    sink = RerunSink(
+    return RerunSink(
         out / f"{scenario.name}.rrd",
         config=config,
         recording_id=f"{scenario.name}-{scenario.seed}",
     )
-    sink.declare(parts.world)
-    parts.bus.tap(sink.on_sample)
-    return sink
 
 
 def _loop(
@@ -228,9 +226,11 @@ def _loop(
     return elapsed
 
 
-def _verdict(simulation: Run, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
+def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
-    navigators = [stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None]
+    navigators = [
+        stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None
+    ]
     return Verdict(
         scenario=simulation.scenario.name,
         seed=simulation.scenario.seed,
@@ -242,7 +242,7 @@ def _verdict(simulation: Run, wall: float, cpu: float, *, deterministic: bool) -
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
         },
-        digest=simulation.digest.finish(simulation.world.state_digest()),
+        digest=digest.finish(simulation.world.state_digest()),
         deterministic=deterministic,
         versions=versions(),
         cpu=cpu_class(),

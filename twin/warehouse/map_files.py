@@ -21,7 +21,9 @@ def named_map(name_or_path: str) -> Path:
     shipped = {path.stem: path for path in sorted(_MAPS.glob("*.yaml"))}
     path = shipped.get(name_or_path, Path(name_or_path))
     if not path.is_file():
-        raise MapError(f"no map '{name_or_path}': neither a file nor shipped; {nearest(name_or_path, shipped)}")
+        raise MapError(
+            f"no map '{name_or_path}': neither a file nor shipped; {nearest(name_or_path, shipped)}"
+        )
     return path
 
 

@@ -1,6 +1,6 @@
 """The capstone's mission: fetch totes from shelves and set them down in the unloading zone.
 
-One behaviour tree per task; every leaf is an action of the robot's nodes or a look at what its sensors publish.
+One behaviour tree per task; its leaves are actions of the robot's nodes and looks at what its sensors say.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from twin.bridge.action_types import (
 )
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import (
     GripperCommandMsg,
     JointState,
@@ -37,8 +38,8 @@ from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
 from twin.nodes.bt.control import RecoveryNode, sequence
 from twin.nodes.bt.leaves import CallAction, Condition, Do
+from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import MissionNode
-from twin.nodes.messages import pose2, pose_stamped
 from twin.nodes.robot_pose import Frames
 
 
@@ -153,7 +154,7 @@ class PickAndPlaceNode(MissionNode):
         self._memory.joints = dict(zip(message.name, message.position.tolist(), strict=True))
 
     def _on_tote_pose(self, message: PoseStamped) -> None:
-        self._memory.totes.append((self.node.now_ns, pose2(message.pose)))
+        self._memory.totes.append((self.node.now_ns, pose2_from_pose(message.pose)))
         del self._memory.totes[: -self.config.tote_samples]
 
     # The tree
@@ -281,7 +282,8 @@ class PickAndPlaceNode(MissionNode):
         def judge(result: Any) -> str | None:
             if result.stalled and abs(result.position - task.tote_width / 2.0) < self.config.grip_tolerance:
                 return None
-            return f"gripper closed on nothing of {task.tote_width:.2f} m width: finger at {result.position:.3f} m"
+            finger = f"finger at {result.position:.3f} m"
+            return f"gripper closed on nothing of {task.tote_width:.2f} m width: {finger}"
 
         return CallAction(
             "CloseGripper",
