@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 from twin.cli import app as app_module
 from twin.cli import batch, repeat
+from twin.cli.child import run_in_child
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 from twin.cli.play import find_recording
 from twin.errors import RecordingError, ScenarioError, SimulationError
@@ -288,6 +289,18 @@ def test_a_dead_child_is_an_error_not_a_crash(tmp_path: Path) -> None:
     (verdict,) = json.loads(done.stdout)
     assert verdict["verdict"] == "error"
     assert "missing key 'robots'" in verdict["error"]
+
+
+def test_a_child_that_crashes_says_its_last_line_and_keeps_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crash = "import sys; sys.exit('Traceback\\n  many lines\\nTypeError: no')"
+    monkeypatch.setattr(RunOptions, "arguments", lambda *_: [])
+    monkeypatch.setattr("twin.cli.child.COMMAND", (sys.executable, "-c", crash))
+    verdict = run_in_child(RunOptions(scenario=Path("demo.yaml")), tmp_path / "new")
+    assert verdict["verdict"] == "error"
+    assert verdict["error"].startswith("the run's process ended with code 1: TypeError: no (all of it: ")
+    assert "many lines" in (tmp_path / "new" / "stderr.txt").read_text(encoding="utf-8")
 
 
 def test_play_finds_the_recording(tmp_path: Path) -> None:

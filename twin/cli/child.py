@@ -11,10 +11,15 @@ from typing import Any
 from twin.cli.options import RunOptions
 
 
+COMMAND = (sys.executable, "-m", "twin.cli")
+"""How to start another `twin`."""
+
+
 def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
     """Return the content of the run's `verdict.json`; a process that dies gives a verdict of error."""
-    command = [sys.executable, "-m", "twin.cli", *options.arguments(out)]
-    child = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
+    child = subprocess.run(
+        [*COMMAND, *options.arguments(out)], capture_output=True, text=True, encoding="utf-8", check=False
+    )
     if child.returncode == 130:
         raise KeyboardInterrupt
     try:
@@ -22,7 +27,11 @@ def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
     except json.JSONDecodeError:
         from twin.scenario.verdict import Verdict
 
-        said = child.stderr.strip() or "nothing"
-        error = f"the run's process ended with code {child.returncode} and said: {said}"
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "stderr.txt").write_text(child.stderr, encoding="utf-8")
+        last = (child.stderr.strip() or "no message").splitlines()[-1]
+        error = (
+            f"the run's process ended with code {child.returncode}: {last} (all of it: {out / 'stderr.txt'})"
+        )
         return Verdict(scenario=options.scenario.stem, seed=0, error=error).to_dict()
     return verdict

@@ -26,13 +26,13 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("limit", justify="right", no_wrap=True)
     table.add_column("at", justify="right", no_wrap=True)
-    table.add_column("why", style="red", overflow="fold")
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
         value, limit = (_quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
         at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
-        table.add_row(mark, Text(check["name"]), value, limit, at, Text(check["reason"]))
+        table.add_row(mark, Text(check["name"]), value, limit, at)
     lines: list[Table | Text] = [table] if verdict["checks"] else []
+    lines += [Text(reason, style="red") for reason in _reasons(verdict)]
     lines.append(_summary(verdict))
     if folder is not None:
         lines.append(Text(f"written to {folder}", style="dim"))
@@ -50,7 +50,6 @@ def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
         table.add_column(name, no_wrap=True)
     for name in ("seed", "simulated", "wall", "digest"):
         table.add_column(name, no_wrap=True, justify="right")
-    table.add_column("why", style="red", overflow="fold")
     for verdict in verdicts:
         metrics = verdict["metrics"]
         table.add_row(
@@ -60,11 +59,15 @@ def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
             _seconds(metrics.get("sim_time_s")),
             _seconds(metrics.get("wall_time_s")),
             (verdict["digest"] or "")[:12],
-            Text("\n".join(_reasons(verdict))),
         )
+    reasons = [
+        Text(f"{verdict['scenario']}: {reason}", style="red")
+        for verdict in verdicts
+        for reason in _reasons(verdict)
+    ]
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
     style = _STYLE["pass" if passed == len(verdicts) else "fail"]
-    return Group(table, Text(f"{passed} of {len(verdicts)} passed", style=style))
+    return Group(table, *reasons, Text(f"{passed} of {len(verdicts)} passed", style=style))
 
 
 def _reasons(verdict: Mapping[str, Any]) -> list[str]:
@@ -97,7 +100,7 @@ def _quantity(value: float | bool | None, unit: str, limit: float | bool | None)
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if unit == "m" and limit is not None and abs(limit) < 0.1:
+    if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
         value, unit = value * 1e3, "mm"
     return f"{round(value, 3):.5g} {unit}".rstrip()
 

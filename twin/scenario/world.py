@@ -33,7 +33,7 @@ class GoodOverride(StrictModel):
     mass: Annotated[Kilograms, Positive] | None = None
     """Mass [kg]."""
     friction: Annotated[float, NotNegative] | None = None
-    """Coulomb coefficient: what a gripper can hold by."""
+    """Coulomb coefficient against what declares none of its own (a gripper's pads do)."""
 
 
 class WorldConfig(StrictModel):
