@@ -153,7 +153,7 @@ class Amcl:
         self.estimate = Estimate(pose=pose, covariance=covariance, T_map_odom=pose @ odom.inverse())
         self._updates += 1
         if self._updates % config.resample_interval == 0:
-            self._resample()
+            self._resample(ends)
         return self.estimate
 
     def _restart(self, particles: Array) -> None:
@@ -170,6 +170,16 @@ class Amcl:
         place = self._random.random((count, 3))
         xy = self._map.cell_to_world(cells + place[:, :2] - 0.5)
         return np.column_stack([xy, (2.0 * place[:, 2] - 1.0) * math.pi])
+
+    def _where_it_fits(self, count: int, ends: Array) -> Array:
+        """Return poses from all over the map that explain a scan, shape (count, 3).
+
+        Source: Lenser and Veloso, Sensor Resetting Localization, ICRA 2000; amcl draws them blindly.
+        """
+        candidates = self._anywhere(max(count, self.config.global_particles // 5))
+        fit = self._field.log_likelihood(candidates, ends)
+        weights = tempered_weights(self.config.beam_weight * fit, self.config.least_effective)
+        return candidates[systematic_resample(weights, count, float(self._random.random()))]
 
     def _beam_ends(self, ranges: Array, angles: Array, T_base_lidar: Pose2) -> Array:
         """Return the ends of at most max_beams evenly spread beams in the base frame, shape (b, 2)."""
@@ -192,7 +202,7 @@ class Amcl:
         least = min(config.least_effective, 0.5 * len(self.particles))
         self.weights = tempered_weights(prior + config.beam_weight * fit, least)
 
-    def _resample(self) -> None:
+    def _resample(self, ends: Array) -> None:
         """Draw as many particles as the spread of the belief asks for (KLD sampling)."""
         config = self.config
         offset, again = self._random.random(2)
@@ -206,5 +216,5 @@ class Amcl:
         fresh = round(lost * count)
         if fresh:
             replaced = np.linspace(0, count - 1, fresh).astype(np.int64)
-            self.particles[replaced] = self._anywhere(fresh)
+            self.particles[replaced] = self._where_it_fits(fresh, ends)
             self._w_slow = self._w_fast = 0.0

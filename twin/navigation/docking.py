@@ -125,7 +125,7 @@ def _total_least_squares(points: Array) -> tuple[Array, float, float]:
 
 
 def _split_at_corners(points: Array, first: int, last: int) -> list[tuple[int, int]]:
-    """Cut a chain where it leaves its chord by more than `CORNER` (Ramer 1972); return first and last indices."""
+    """Cut a chain where it leaves its chord by more than `CORNER` (Ramer 1972); return index ranges."""
     chord = points[last] - points[first]
     length = math.hypot(chord[0], chord[1])
     if last - first < 4 or length == 0.0:
