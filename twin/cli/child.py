@@ -10,7 +10,6 @@ from typing import Any
 
 from twin.cli.options import RunOptions
 
-
 COMMAND = (sys.executable, "-m", "twin.cli")
 """How to start another `twin`."""
 
