@@ -33,6 +33,11 @@ class Costmap:
     cost_scaling_factor: float = 10.0
     """Of the inflation [1/m]."""
 
+    @property
+    def frame(self) -> tuple[float, float, float]:
+        """Origin x, y and resolution [m], as floats: what compiled functions take."""
+        return float(self.origin[0]), float(self.origin[1]), float(self.resolution)
+
     def world_to_cell(self, x: float, y: float) -> tuple[int, int]:
         """Return the cell (column, row) of a point [m]; possibly outside."""
         return (
@@ -63,7 +68,7 @@ def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
     Source: nav2_costmap_2d FootprintCollisionChecker. 254 is a collision; 255 touches unknown space.
     """
     corners = np.array(footprint, dtype=np.float64, order="C")
-    return outline_cost(costmap.costs, corners, *pose, *costmap.origin, costmap.resolution)
+    return outline_cost(costmap.costs, corners, *map(float, pose), *costmap.frame)
 
 
 def inflation_costs(

@@ -92,14 +92,13 @@ class _Behavior:
         hit = steps_to_collision(
             costmap.costs,
             self._footprint,
-            *pose,
-            v,
-            w,
+            *map(float, pose),
+            float(v),
+            float(w),
             time / steps,
             math.inf,
             steps,
-            *costmap.origin,
-            costmap.resolution,
+            *costmap.frame,
         )
         return hit > 0  # 0 is the present pose: a robot that touches something may still move away
 

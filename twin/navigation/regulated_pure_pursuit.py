@@ -207,14 +207,13 @@ class RegulatedPurePursuit:
         hit = steps_to_collision(
             costmap.costs,
             self.footprint,
-            *pose,
-            v,
-            w,
+            *map(float, pose),
+            float(v),
+            float(w),
             step,
             carrot_dist,
             int(allowed / step),
-            *costmap.origin,
-            costmap.resolution,
+            *costmap.frame,
         )
         if hit >= 0:
             raise NoValidControl(f"collision in {hit * step:.2f} s at {v:.2f} m/s, {w:.2f} rad/s")

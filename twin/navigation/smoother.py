@@ -46,7 +46,7 @@ class SimpleSmoother:
             return path.copy()
         config = self.config
         costs = np.zeros((0, 0), dtype=np.uint8) if costmap is None else costmap.costs
-        origin, resolution = ((0.0, 0.0), 1.0) if costmap is None else (costmap.origin, costmap.resolution)
+        frame = (0.0, 0.0, 1.0) if costmap is None else costmap.frame
         points = np.array(path[:, :2], dtype=np.float64, order="C")
         for _ in range(1 + config.refinement_num):
             points = _relax(
@@ -56,8 +56,7 @@ class SimpleSmoother:
                 config.w_smooth,
                 config.tolerance,
                 config.max_its,
-                *origin,
-                resolution,
+                *frame,
             )
         return with_headings(points, float(path[-1, 2]))
 
