@@ -60,8 +60,8 @@ def test_xacro_error_names_the_included_file(tmp_path: Path) -> None:
 ATTACKS = {
     "reads elsewhere": "${xacro.load_yaml('/etc/hostname')}",
     "includes elsewhere": "<xacro:include filename='/etc/hostname'/>",
-    "runs a program": "${[c for c in ().__class__.__base__.__subclasses__()"
-    " if c.__name__ == 'Popen'][0](['id'])}",
+    "runs a program": "${(lambda: [c for c in ().__class__.__base__.__subclasses__()"
+    " if c.__name__ == 'catch_warnings'][0]()._module.sys.modules['os'].posix_spawn('id', ['id'], {}))()}",
     "runs a shell": "${(lambda: [c for c in ().__class__.__base__.__subclasses__()"
     " if c.__name__ == 'catch_warnings'][0]()._module.sys.modules['os'].system('id'))()}",
     "reads the environment": "$(env HOME)",

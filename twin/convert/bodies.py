@@ -32,8 +32,6 @@ def add_bodies(
     Raises:
         ConversionError: A moving part has no mass.
     """
-    if description.root == "world" and base == "free":
-        base = "fixed"
     _check_masses(description, base)
     root = _add_link(spec.worldbody, description.links[description.root], Pose3.from_xyz_rpy(), geoms)
     root_joint = None

@@ -37,9 +37,9 @@ class Conversion:
     """
 
     description: RobotDescription
+    """As given; only a root link `world` is called `world_link`, as MuJoCo has a body `world` of its own."""
     spec: mujoco.MjSpec
-    """The robot alone, without floor, light or options; copy it before a change. One whose root is
-    named `world` compiles only attached under a prefix, as MuJoCo has a body of that name."""
+    """The robot alone, without floor, light or options; copy it before a change."""
     spawn_height: float
     """Height of the root link at which the lowest collision point, all joints at zero, touches z = 0 [m]."""
     root_joint: str | None

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 
 from twin.convert.actuators import add_actuators
 from twin.convert.bodies import Base, add_bodies
 from twin.convert.contacts import add_excludes, spawn_height
-from twin.convert.conversion import Conversion
+from twin.convert.conversion import Conversion, LedgerEntry
 from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
 from twin.convert.roles import roles_of
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
+
+WORLD = "world"
+"""A root link of this name means a robot that is bolted down."""
 
 
 def convert(description: RobotDescription, *, base: Base = "free", timestep: float = 0.002) -> Conversion:
@@ -28,6 +33,12 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         ConversionError: A moving part has no mass, a mesh has a format that MuJoCo cannot read, or MuJoCo
             refuses the model.
     """
+    renamed = []
+    if description.root == WORLD:
+        base = "fixed" if base == "free" else base
+        description = _with_root_renamed(description, f"{WORLD}_link")
+        note = f"body '{description.root}'; MuJoCo has a body '{WORLD}' of its own"
+        renamed = [LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)]
     roles = roles_of(description)
     spec = mujoco.MjSpec()
     spec.modelname = description.name
@@ -50,18 +61,25 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         spec=spec,
         spawn_height=spawn_height(model),
         root_joint=root_joint,
-        ledger=(*describe_conversion(description, roles, base), *entries),
+        ledger=(*renamed, *describe_conversion(description, roles, base), *entries),
     )
 
 
 def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
-    """Compile a copy, in which a root link named like MuJoCo's world body has another name."""
-    probe = spec.copy()
-    root = probe.worldbody.first_body()
-    if root.name == probe.worldbody.name:
-        root.name = "world_link"
     try:
-        return probe.compile()
+        return spec.copy().compile()
     except ValueError as error:
         message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
         raise ConversionError(Problem(message, description.source)) from error
+
+
+def _with_root_renamed(description: RobotDescription, name: str) -> RobotDescription:
+    old = description.root
+    links = {(name if key == old else key): link for key, link in description.links.items()}
+    links[name] = replace(links[name], name=name)
+    joints = {
+        key: replace(joint, parent=name) if joint.parent == old else joint
+        for key, joint in description.joints.items()
+    }
+    sensors = tuple(replace(s, link=name) if s.link == old else s for s in description.sensors)
+    return replace(description, root=name, links=links, joints=joints, sensors=sensors)

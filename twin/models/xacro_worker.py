@@ -59,7 +59,7 @@ def _expand(request: dict[str, Any]) -> dict[str, Any]:
     except MemoryError:
         message = "the expansion needs more memory than a model file may use"
     except Exception as error:  # every fault of the file, whatever its type, is the user's to read
-        message = str(error) or repr(error)
+        message = " ".join(str(error).split()) or repr(error)
     return {"error": message, "files": [name for name in xacro.filestack or () if name]}
 
 

@@ -1,0 +1,84 @@
+"""Driving truth: a converted robot goes where its wheels' kinematics says, and a broken one does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from twin.models import load
+from twin.models.description import RobotDescription
+
+STRAIGHT_TOLERANCE = 0.005
+SPIN_TOLERANCE = math.radians(0.3)
+
+
+def drives_true(description: RobotDescription, bare_world: Callable, driving: tuple) -> bool:
+    """Check 5 m straight and a full turn on the spot."""
+    straight_error, spin_error = driving
+    return (
+        straight_error(bare_world(description)) < STRAIGHT_TOLERANCE
+        and abs(spin_error(bare_world(description))) < SPIN_TOLERANCE
+    )
+
+
+def with_flipped_axis(description: RobotDescription, joint: str) -> RobotDescription:
+    x, y, z = description.joints[joint].axis
+    flipped = replace(description.joints[joint], axis=(-x, -y, -z))
+    return replace(description, joints={**description.joints, joint: flipped})
+
+
+@pytest.mark.parametrize("robot", ["diff_bot", "warehouse_bot"])
+def test_drives_as_its_kinematics_says(robot: str, bare_world: Callable, driving: tuple) -> None:
+    assert drives_true(load(robot), bare_world, driving)
+
+
+@pytest.mark.parametrize("robot", ["diff_bot", "warehouse_bot"])
+def test_a_mirrored_wheel_does_not(robot: str, bare_world: Callable, driving: tuple) -> None:
+    mirrored = with_flipped_axis(load(robot), "wheel_right_joint")
+    assert not drives_true(mirrored, bare_world, driving)
+
+
+def test_the_tutorials_tumbling_wheel_does_not(bare_world: Callable, driving: tuple) -> None:
+    """The seed's fault: the joint turns about y, the cylinder lies along x."""
+    bot = load("diff_bot")
+    links = dict(bot.links)
+    for wheel in ("wheel_left", "wheel_right"):
+        (collision,) = links[wheel].collisions
+        about_z = replace(
+            collision,
+            T_link_geometry=type(collision.T_link_geometry).from_xyz_rpy((0, 0, 0), (0, math.pi / 2, 0)),
+        )
+        links[wheel] = replace(links[wheel], collisions=(about_z,))
+    assert not drives_true(replace(bot, links=links), bare_world, driving)
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
+def test_skid_steer_turns_as_coulomb_friction_says(speed: float, bare_world: Callable) -> None:
+    """Four equal wheels under Coulomb friction turn as if the track were wider by 1 + (a/b)²."""
+    world = bare_world(load("sp1s"))
+    world.step(0.5)
+    commanded = 4 * math.pi
+    turned = world.travel(commanded / speed, w=speed)
+    assert commanded / turned == pytest.approx(1 + (0.085 / 0.0925) ** 2, rel=0.02)
+
+
+@pytest.mark.parametrize("robot", ["diff_bot", "sp1s", "warehouse_bot"])
+def test_stands_still(robot: str, bare_world: Callable) -> None:
+    world = bare_world(load(robot))
+    world.step(1.0)
+    before = world.pose()
+    world.step(2.0)
+    assert abs(world.pose().xyz - before.xyz).max() < 1e-5
+    assert abs(before.xyz[2]) < 1e-3
+
+
+def test_heavy_robot_follows_a_speed_step_within_its_tyres_grip(bare_world: Callable) -> None:
+    world = bare_world(load("warehouse_bot"))
+    world.step(0.5)
+    for joint in ("wheel_left_joint", "wheel_right_joint"):
+        world.command(joint, 5.0)
+    world.step(0.2)
+    assert world.data.qvel[0] == pytest.approx(0.5, abs=0.01)
