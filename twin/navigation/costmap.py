@@ -68,7 +68,7 @@ def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
     Source: nav2_costmap_2d FootprintCollisionChecker. 254 is a collision; 255 touches unknown space.
     """
     corners = np.array(footprint, dtype=np.float64, order="C")
-    return outline_cost(costmap.costs, corners, *map(float, pose), *costmap.frame)
+    return outline_cost(costmap.costs, corners, float(pose.x), float(pose.y), float(pose.yaw), *costmap.frame)
 
 
 def inflation_costs(

@@ -92,7 +92,9 @@ class _Behavior:
         hit = steps_to_collision(
             costmap.costs,
             self._footprint,
-            *map(float, pose),
+            float(pose.x),
+            float(pose.y),
+            float(pose.yaw),
             float(v),
             float(w),
             time / steps,

@@ -207,7 +207,9 @@ class RegulatedPurePursuit:
         hit = steps_to_collision(
             costmap.costs,
             self.footprint,
-            *map(float, pose),
+            float(pose.x),
+            float(pose.y),
+            float(pose.yaw),
             float(v),
             float(w),
             step,
