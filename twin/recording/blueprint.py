@@ -37,15 +37,14 @@ def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
         row_shares=[5, 2],
     )
     right = rrb.Vertical(
-        rrb.Tabs(
-            _from_above(robots, low, high), *(_close_up(robot, _base(world, robot)) for robot in robots)
-        ),
+        rrb.Tabs(*(_close_up(robot, _base(world, robot)) for robot in robots)),
+        _from_above(robots, low, high),
         rrb.StateTimelineView(name="Mission", origin="/", contents=_mission(robots)),
         rrb.Horizontal(_log(), rrb.TextDocumentView(name="Verdict", origin="/verdict"), column_shares=[3, 2]),
-        row_shares=[5, 1.1, 3],
+        row_shares=[5, 4.2, 1.6, 2.6],
     )
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.Horizontal(left, right, column_shares=[5, 3]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE),
@@ -139,7 +138,7 @@ def _close_up(robot: str, base: str) -> rrb.Spatial3DView:
         line_grid=rrb.LineGrid3D(visible=False),
         spatial_information=rrb.SpatialInformation(target_frame=base),
         eye_controls=rrb.EyeControls3D(
-            kind="Orbital", position=(-1.8, 1.6, 1.4), look_target=(0.2, 0.0, 0.3), eye_up=(0.0, 0.0, 1.0)
+            kind="Orbital", position=(-1.3, 1.7, 1.5), look_target=(0.25, 0.0, 0.5), eye_up=(0.0, 0.0, 1.0)
         ),
     )
 
