@@ -213,6 +213,17 @@ def test_neighbours_do_not_collide_even_with_a_fixed_base() -> None:
             assert data.ncon == 0, (robot, base)
 
 
+def test_overlapping_neighbours_do_not_collide_on_a_fixed_base() -> None:
+    """MuJoCo's own filter lets a link collide with a parent that is welded to the world."""
+    ball = "<collision><geometry><sphere radius='0.1'/></geometry></collision>"
+    text = (
+        f"<robot name='r'><link name='base'>{ball}</link><link name='arm'>{INERTIAL}{ball}</link>"
+        "<joint name='j' type='continuous'><parent link='base'/><child link='arm'/></joint></robot>"
+    )
+    _, data = compiled(convert(parse_urdf(text, Path("r.urdf")), base="fixed"), {})
+    assert data.ncon == 0
+
+
 def test_a_moving_link_without_mass_is_refused_by_name() -> None:
     if not SEEDS.is_dir():
         pytest.skip("the tutorials' files are not beside this checkout")

@@ -33,12 +33,9 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         ConversionError: A moving part has no mass, a mesh has a format that MuJoCo cannot read, or MuJoCo
             refuses the model.
     """
-    renamed = []
-    if description.root == WORLD:
-        base = "fixed" if base == "free" else base
-        description = _with_root_renamed(description, f"{WORLD}_link")
-        note = f"body '{description.root}'; MuJoCo has a body '{WORLD}' of its own"
-        renamed = [LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)]
+    description, renamed = _without_world(description)
+    if renamed and base == "free":
+        base = "fixed"
     roles = roles_of(description)
     spec = mujoco.MjSpec()
     spec.modelname = description.name
@@ -73,13 +70,18 @@ def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjMod
         raise ConversionError(Problem(message, description.source)) from error
 
 
-def _with_root_renamed(description: RobotDescription, name: str) -> RobotDescription:
-    old = description.root
-    links = {(name if key == old else key): link for key, link in description.links.items()}
+def _without_world(description: RobotDescription) -> tuple[RobotDescription, list[LedgerEntry]]:
+    """Return the robot with a root link `world` renamed, and what to note about it."""
+    if description.root != WORLD:
+        return description, []
+    name = f"{WORLD}_link"
+    links = {(name if key == WORLD else key): link for key, link in description.links.items()}
     links[name] = replace(links[name], name=name)
     joints = {
-        key: replace(joint, parent=name) if joint.parent == old else joint
+        key: replace(joint, parent=name) if joint.parent == WORLD else joint
         for key, joint in description.joints.items()
     }
-    sensors = tuple(replace(s, link=name) if s.link == old else s for s in description.sensors)
-    return replace(description, root=name, links=links, joints=joints, sensors=sensors)
+    sensors = tuple(replace(s, link=name) if s.link == WORLD else s for s in description.sensors)
+    note = f"body '{name}'; MuJoCo has a body '{WORLD}' of its own"
+    entry = LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)
+    return replace(description, root=name, links=links, joints=joints, sensors=sensors), [entry]

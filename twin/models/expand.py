@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from twin.errors import ModelError, Problem
 from twin.models.catalogue import ROBOTS
@@ -39,6 +40,14 @@ def expand(
         "packages": {name: str(path.resolve()) for name, path in packages.items()},
         "roots": [str(root.resolve()) for root in (source.parent, *packages.values())],
     }
+    answer = _run_worker(request, source, time_limit_s)
+    if "error" in answer:
+        file = Path(answer["files"][-1]) if answer["files"] else source
+        raise ModelError(Problem(f"xacro: {answer['error']}", source if _same(file, source) else file))
+    return answer["urdf"]
+
+
+def _run_worker(request: Mapping[str, object], source: Path, time_limit_s: float) -> dict[str, Any]:
     # Isolated and with an empty environment: $(env ...) and PYTHON* variables do not reach into a model.
     command = [sys.executable, "-I", "-X", "utf8", str(WORKER)]
     try:
@@ -58,11 +67,7 @@ def expand(
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         raise ModelError(Problem(f"xacro failed: {reason[0]}", source))
-    answer = json.loads(done.stdout)
-    if "error" in answer:
-        file = Path(answer["files"][-1]) if answer["files"] else source
-        raise ModelError(Problem(f"xacro: {answer['error']}", source if _same(file, source) else file))
-    return answer["urdf"]
+    return json.loads(done.stdout)
 
 
 def known_packages(source: Path, given: Mapping[str, Path]) -> dict[str, Path]:
