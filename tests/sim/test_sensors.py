@@ -51,9 +51,13 @@ def test_lidar_sees_where_the_robot_is_now_not_a_substep_ago(room: Scene) -> Non
     world.step(300)
     (lidar,) = world.robots["cart"].sensors
     ahead = lidar.sample(world.time_ns).ranges[LIDAR.samples // 2]
-    laser = world.pose("cart/laser")
-    forward = Pose3(np.zeros(3), laser.quat_wxyz).apply([1.0, 0.0, 0.0])
+    # The state itself, not what MuJoCo derives from it a substep later.
+    start = world.model.jnt_qposadr[world.model.body("cart/base_link").jntadr[0]]
+    base = world.data.qpos[start : start + 7]
+    laser = Pose3(base[:3].copy(), base[3:].copy()) @ Pose3.from_xyz_rpy((0.05, 0.0, 0.13))
+    forward = rotate_wxyz(laser.quat_wxyz, (1.0, 0.0, 0.0))
     assert ahead == pytest.approx((3.0 - laser.xyz[0]) / forward[0], abs=1e-9)
+    np.testing.assert_allclose(world.pose("cart/laser").xyz, laser.xyz, atol=1e-12)
 
 
 def test_lidar_gates_its_range(room: Scene) -> None:

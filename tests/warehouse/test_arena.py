@@ -82,7 +82,7 @@ def test_a_gripper_has_room_on_both_sides_of_every_named_tote(warehouse: Arena, 
                     # 0.12 m is half the tote; turns of at most 0.06 rad move a corner by another centimetre.
                     assert abs(T.xyz[1]) - y >= 0.12 + 0.12
                     checked += 1
-    assert checked >= 5
+    assert checked >= 3
 
 
 def test_the_drive_to_each_shelf_is_long(warehouse: Arena) -> None:

@@ -90,7 +90,7 @@ def _look(spec: mujoco.MjSpec, scene: Scene) -> None:
     spec.worldbody.add_light(
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0.0, 0.0, 25.0],
+        pos=[-7.0, -10.0, 20.0],  # its shadows reach as far around the line through `dir` as `extent` says
         dir=[0.35, 0.5, -1.0],
         diffuse=[0.5, 0.5, 0.48],
         castshadow=True,
