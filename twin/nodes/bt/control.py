@@ -69,21 +69,21 @@ class RecoveryNode(ControlNode):
         self._count = 0
 
     def step(self) -> Step:
-        """Tick the main child, or the recovery after its failure."""
+        """Tick the main child; after its failure the recovery, after whose success the main child again."""
         main, recovery = self.children
-        if not self._recovering:
-            yield from main.tick()
-            if main.status != Status.FAILURE:
-                return main.status
-            if self._count >= self.retries:
-                return Status.FAILURE
-            self._recovering = True
-        yield from recovery.tick()
-        if recovery.status == Status.SUCCESS:
+        while True:
+            if not self._recovering:
+                yield from main.tick()
+                if main.status != Status.FAILURE:
+                    return main.status
+                if self._count >= self.retries:
+                    return Status.FAILURE
+                self._recovering = True
+            yield from recovery.tick()
+            if recovery.status != Status.SUCCESS:
+                return recovery.status
             self._recovering = False
             self._count += 1
-            return Status.RUNNING
-        return recovery.status
 
 
 class RoundRobin(ControlNode):
@@ -106,17 +106,22 @@ class RoundRobin(ControlNode):
             if child.status == Status.SUCCESS:
                 return Status.SUCCESS
             self._failures += 1
+        self._next = 0
         return Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        """Begin with the first child again after a halt while running."""
+        if self.status == Status.RUNNING and new_status == Status.INVALID:
+            self._next = 0
 
 
 class RateController(ControlNode):
-    """Ticks its child at once, then only when `period_ns` of simulated time has passed."""
+    """Ticks its child at once, then only when `period_ns` of simulated time has passed; running in between."""
 
     def __init__(self, name: str, period_ns: int, clock: Callable[[], int], child: Behaviour) -> None:
         super().__init__(name, [child])
         self._period_ns = period_ns
         self._clock = clock
-        self._result = Status.SUCCESS
         self._due: int | None = None
 
     def terminate(self, new_status: Status) -> None:
@@ -125,14 +130,14 @@ class RateController(ControlNode):
             self._due = None
 
     def step(self) -> Step:
-        """Tick the child if it is due or still running; otherwise repeat its last result."""
+        """Tick the child if it is due or still running."""
         (child,) = self.children
-        if self._due is None or self._clock() >= self._due or child.status == Status.RUNNING:
-            yield from child.tick()
-            if child.status != Status.RUNNING:
-                self._due = self._clock() + self._period_ns
-            self._result = child.status
-        return self._result
+        if self._due is not None and self._clock() < self._due and child.status != Status.RUNNING:
+            return Status.RUNNING
+        yield from child.tick()
+        if child.status != Status.RUNNING:
+            self._due = self._clock() + self._period_ns
+        return child.status
 
 
 class Fallback(ControlNode):

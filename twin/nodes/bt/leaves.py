@@ -52,7 +52,7 @@ class CallAction(Behaviour):
         if self._goal is None:
             return self._fail("no goal could be made")
         if self._goal.accepted is False:
-            return self._fail(f"{self._client.name} rejected the goal")
+            return self._fail(self._goal.error or f"{self._client.name} rejected the goal")
         if self._updated is not None and (goal := self._updated()) is not None:
             self._goal = self._client.send_goal(goal)
             return Status.RUNNING
