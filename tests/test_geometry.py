@@ -48,7 +48,9 @@ def test_quaternion_products_and_rotations_agree_with_scipy(a: Pose3, b: Pose3) 
 def test_composing_with_the_inverse_is_the_identity(a: Pose3, b: Pose3) -> None:
     back = a.inverse() @ (a @ b)
     np.testing.assert_allclose(back.xyz, b.xyz, atol=1e-9)
-    np.testing.assert_allclose(matrix_from_quat_wxyz(back.quat_wxyz), matrix_from_quat_wxyz(b.quat_wxyz), atol=1e-9)
+    np.testing.assert_allclose(
+        matrix_from_quat_wxyz(back.quat_wxyz), matrix_from_quat_wxyz(b.quat_wxyz), atol=1e-9
+    )
     np.testing.assert_allclose((a @ b).xyz, a.apply(b.xyz), atol=1e-9)
 
 

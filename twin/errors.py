@@ -5,12 +5,12 @@ TwinError
 ├── ConversionError   a robot description has no faithful MuJoCo model
 ├── ScenarioError     a scenario or arena file is wrong
 ├── MapError          a map file is wrong
-├── BridgeError       the bus: a port in use, an unknown message type, a name that ROS does not allow
+├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── RecordingError    a recording cannot be written or read
 └── SimulationError   the physics cannot go on (diverged)
 
-The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and exits 2;
-anything else that escapes is a bug and keeps its traceback.
+The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and exits
+2; anything else that escapes is a bug and keeps its traceback.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -16,7 +17,7 @@ def test_ramps_up_and_brakes_within_its_limits() -> None:
     for _ in range(60):
         smoother.set_command(1.0, 0.0)
         speeds.append(smoother.update(0.02)[0])
-    assert max(b - a for a, b in zip(speeds, speeds[1:], strict=False)) == pytest.approx(0.02)
+    assert max(b - a for a, b in pairwise(speeds)) == pytest.approx(0.02)
     assert speeds[-1] == pytest.approx(1.0)
     smoother.set_command(-1.0, 0.0)
     assert smoother.update(0.02)[0] == pytest.approx(0.96)

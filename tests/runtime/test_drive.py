@@ -21,7 +21,9 @@ checks: [{odometry_drift: {max: 1 m}}]
 
 
 @pytest.fixture(params=["diff_bot", "sp1s"])
-def run(request: pytest.FixtureRequest, scenario: Callable[[str], Scenario], make_run: Callable[..., Run]) -> Run:
+def run(
+    request: pytest.FixtureRequest, scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
+) -> Run:
     return make_run(scenario(TEXT.replace("MODEL", request.param)))
 
 

@@ -80,7 +80,9 @@ def test_a_run_lasts_its_duration_when_there_is_nothing_to_do(
     assert run.world.time_ns == 2_000_000_000
 
 
-def test_an_unknown_robot_names_the_nearest(scenario: Callable[[str], Scenario], make_run: Callable[..., Run]) -> None:
+def test_an_unknown_robot_names_the_nearest(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
+) -> None:
     with pytest.raises(Exception, match="diff_bot") as caught:
         make_run(scenario(IDLE.replace("diff_bot", "dif_bot")))
     assert isinstance(caught.value, ScenarioError) or "ModelError" in type(caught.value).__name__

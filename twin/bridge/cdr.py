@@ -13,9 +13,20 @@ from struct import Struct, pack, unpack_from
 from typing import Any, Generic, TypeVar
 
 from twin.bridge import types
+from twin.bridge.cdr_packed import (
+    decode_imu,
+    decode_joint_state,
+    decode_odometry,
+    encode_imu,
+    encode_joint_state,
+    encode_odometry,
+)
 from twin.bridge.msgs import (
     Clock,
     Header,
+    Imu,
+    JointState,
+    Odometry,
     Point,
     Pose,
     PoseArray,
@@ -199,9 +210,21 @@ def _decode_poses(payload: bytes) -> PoseArray:
     return PoseArray(Header(Time(sec, nanosec), frame), poses)
 
 
+def _little_endian(cls: type[M], decode: Callable[[bytes], M]) -> Callable[[bytes], M]:
+    """Return a decoder that leaves big-endian payloads to the general codec."""
+
+    def either(payload: bytes) -> M:
+        return decode(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).decode(payload)
+
+    return either
+
+
 _FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {
     Twist.__msgtype__: (_encode_twist, _decode_twist),
     Clock.__msgtype__: (_encode_clock, _decode_clock),
     TFMessage.__msgtype__: (_encode_tf, _decode_tf),
     PoseArray.__msgtype__: (_encode_poses, _decode_poses),
+    Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
+    Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
+    JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),
 }

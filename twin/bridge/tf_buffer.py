@@ -51,6 +51,7 @@ class TransformBuffer:
     def __init__(self, cache_ns: int = 10_000_000_000) -> None:
         self._cache_ns = cache_ns
         self._edges: dict[str, _Edge] = {}
+        self._path_cache: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
 
     @property
     def parents(self) -> dict[str, str]:
@@ -75,6 +76,7 @@ class TransformBuffer:
         edge = self._edges.get(child)
         if edge is None or edge.parent != parent or edge.static != static:
             edge = self._edges[child] = _Edge(parent, static)
+            self._path_cache.clear()
         if static:
             edge.stamps, edge.values = [time_ns], [value]
         else:
@@ -136,6 +138,12 @@ class TransformBuffer:
 
     def _paths(self, target: str, source: str) -> tuple[list[str], list[str]]:
         """Return the frames from source, and from target, up to but without their first common ancestor."""
+        cached = self._path_cache.get((target, source))
+        if cached is None:
+            cached = self._path_cache[target, source] = self._find_paths(target, source)
+        return cached
+
+    def _find_paths(self, target: str, source: str) -> tuple[list[str], list[str]]:
         up, down = self._ancestors(source), self._ancestors(target)
         known = set(self._edges) | {edge.parent for edge in self._edges.values()}
         for frame in (target, source):

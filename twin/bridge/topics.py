@@ -115,7 +115,8 @@ class Publisher(Endpoint, Generic[M]):
             sample = Sample(self.name, time_ns, message, self.codec)
             for tap in self._bus.taps:
                 tap(sample)
-        if self.has_subscribers:
+        # Asking who listens costs more than a put that nobody hears, once the payload is there.
+        if sample is not None or self.has_subscribers:
             payload = self.codec.encode(message) if sample is None else sample.payload
             self._zenoh.put(payload, attachment=pack_attachment(self._sequence, time_ns, self.gid))
 

@@ -34,12 +34,11 @@ class Odometry:
         self.pose = Pose2(0.0, 0.0, 0.0)
         self.velocity = (0.0, 0.0)
         """Linear [m/s] and angular [rad/s] velocity over the last interval."""
-        self.covariance: Array = np.zeros((3, 3))
-        """Of (x, y, yaw) in `odom`."""
+        self._variances = (0.0,) * 6  # of xx, xy, yy, x yaw, y yaw, yaw yaw
         self._last: tuple[float, float] | None = None
 
     def update(self, left: float, right: float, dt: float) -> Pose2:
-        """Take the wheels' angles [rad] (mean of each side), `dt` [s] after the last ones; return the pose."""
+        """Take the mean wheel angle of each side [rad], `dt` [s] after the last; return the pose."""
         if self._last is None:
             self._last = (left, right)
             return self.pose
@@ -50,7 +49,8 @@ class Odometry:
         angle = (step_right - step_left) / self.config.track
         heading = self.pose.yaw + angle / 2.0
         # The chord of an arc is its length times sinc of half the angle.
-        chord = distance * float(np.sinc(angle / (2.0 * math.pi)))
+        half = angle / 2.0
+        chord = distance * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
         self._grow_covariance(distance, angle, heading)
         self.pose = Pose2(
             self.pose.x + chord * math.cos(heading),
@@ -61,11 +61,23 @@ class Odometry:
         return self.pose
 
     def _grow_covariance(self, distance: float, angle: float, heading: float) -> None:
+        """Propagate F P Fᵀ + Q with F = [[1, 0, a], [0, 1, b], [0, 0, 1]], in plain floats for speed."""
         c, s = math.cos(heading), math.sin(heading)
-        jacobian = np.array([[1.0, 0.0, -distance * s], [0.0, 1.0, distance * c], [0.0, 0.0, 1.0]])
+        a, b = -distance * s, distance * c
         along = self.config.distance_variance * abs(distance)
         turn = self.config.angle_variance * abs(angle) + self.config.drift_variance * abs(distance)
-        direction = np.array([c, s, 0.0])
-        noise = along * np.outer(direction, direction)
-        noise[2, 2] += turn
-        self.covariance = jacobian @ self.covariance @ jacobian.T + noise
+        xx, xy, yy, xt, yt, tt = self._variances
+        self._variances = (
+            xx + a * (2.0 * xt + a * tt) + along * c * c,
+            xy + a * yt + b * xt + a * b * tt + along * c * s,
+            yy + b * (2.0 * yt + b * tt) + along * s * s,
+            xt + a * tt,
+            yt + b * tt,
+            tt + turn,
+        )
+
+    @property
+    def covariance(self) -> Array:
+        """Of (x, y, yaw) in `odom`, shape (3, 3)."""
+        xx, xy, yy, xt, yt, tt = self._variances
+        return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])

@@ -1,4 +1,4 @@
-"""What a two-finger gripper can tell from its own joint: moving, stalled on something, or closed on nothing."""
+"""What a two-finger gripper can tell from its own joint: moving, stalled on something, or closed."""
 
 from __future__ import annotations
 

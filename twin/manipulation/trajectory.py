@@ -35,11 +35,11 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Time from the first to the last way-point [s]."""
         return float(self.times[-1])
 
     def sample(self, time: float) -> Array:
-        """Return positions, shape (joints,), at `time` [s]: cubic Hermite between way-points, held outside."""
+        """Return positions, shape (joints,), at `time` [s]: cubic Hermite inside, held outside."""
         if time <= 0.0:
             return np.array(self.positions[0])
         if time >= self.times[-1]:

@@ -69,9 +69,9 @@ class DiffDriveControllerNode:
 
     def _update(self) -> None:
         dt = self.config.period_ns * 1e-9
-        position = self._hardware.read().position
-        left = float(np.mean(position[self._left]))
-        right = float(np.mean(position[self._right]))
+        position = self._hardware.read().position.tolist()
+        left = sum(position[i] for i in self._left) / len(self._left)
+        right = sum(position[i] for i in self._right) / len(self._right)
         pose = self.odometry.update(left, right, dt)
         wheels = self.controller.update(dt)
         for joint in self.config.left_joints:
@@ -114,10 +114,11 @@ _UNUSED_AXIS = 1e6
 
 def planar_covariance(covariance: Array) -> Array:
     """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose."""
-    full = np.zeros((6, 6))
-    full[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
-    full[2, 2] = full[3, 3] = full[4, 4] = _UNUSED_AXIS
-    return full.ravel()
+    full = _UNUSED_AXES.copy()
+    full[_PLANAR] = covariance.ravel()
+    return full
 
 
+_UNUSED_AXES = np.diag([0.0, 0.0, _UNUSED_AXIS, _UNUSED_AXIS, _UNUSED_AXIS, 0.0]).ravel()
+_PLANAR = np.array([6 * row + column for row in (0, 1, 5) for column in (0, 1, 5)])
 _TWIST_COVARIANCE = planar_covariance(np.diag([1e-3, 1e-4, 1e-3]))

@@ -95,10 +95,12 @@ class DockingServerNode:
     # What the sensors say of the dock
 
     def _on_scan(self, message: LaserScan) -> None:
+        if self._dock is None:
+            return
         frames = self._robot_pose.frames
         T_base_lidar = self._robot_pose.at_stamp(frames.base, message.header)
         T_odom_lidar = self._robot_pose.at_stamp(frames.odom, message.header)
-        if self._dock is None or T_base_lidar is None or T_odom_lidar is None:
+        if T_base_lidar is None or T_odom_lidar is None:
             return
         T_odom_base = T_odom_lidar @ T_base_lidar.inverse()
         expected = T_odom_base.inverse() @ self._dock.face

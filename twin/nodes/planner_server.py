@@ -58,7 +58,10 @@ class PlannerServerNode:
         except PlanningFailure as failure:
             handle.abort()
             return new(ComputePathToPose.Result, error_code=failure.error_code, error_msg=str(failure))
-        path = path_msg(self._smoother.smooth(raw, costmap), self._robot_pose.frames.map, self.node.now_ns)
+        smooth = self._smoother.smooth(raw, costmap)
+        # A smooth path needs no point per cell; the message costs by the point.
+        thinned = np.concatenate([smooth[:-1:2], smooth[-1:]])
+        path = path_msg(thinned, self._robot_pose.frames.map, self.node.now_ns)
         self._publisher.publish(path)
         return new(ComputePathToPose.Result, path=path, planning_time=duration(0))
 

@@ -24,7 +24,7 @@ class RobotStatePublisherNode:
         self.node = bus.create_node("robot_state_publisher", namespace)
         self._tf = TransformBroadcaster(self.node)
         self._period_ns = publish_period_ns
-        self._last_ns = -publish_period_ns
+        self._window = -1
         self._joints = {joint.name: joint for joint in description.joints.values() if joint.type != "fixed"}
         self._mimics = [joint for joint in self._joints.values() if joint.mimic is not None]
         description_publisher = self.node.create_publisher(String, "robot_description", LATCHED)
@@ -38,9 +38,11 @@ class RobotStatePublisherNode:
 
     def _on_joint_states(self, message: JointState) -> None:
         now = self.node.now_ns
-        if now - self._last_ns < self._period_ns:
+        # The first state of each period: so its whole multiples, at which sensors sample, are hit exactly.
+        window = now // self._period_ns
+        if window == self._window:
             return
-        self._last_ns = now
+        self._window = window
         positions = dict(zip(message.name, message.position.tolist(), strict=True))
         for joint in self._mimics:
             assert joint.mimic is not None

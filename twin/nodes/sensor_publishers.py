@@ -44,18 +44,21 @@ def _laser_scan(spec: LidarSpec, header: Header, reading: Any) -> LaserScan:
     )
 
 
+_NO_ORIENTATION = np.array([-1.0] + [0.0] * 8)
+"""REP-145: this sensor gives no orientation."""
+_IDENTITY = np.eye(3).ravel()
+
+
 def _imu(spec: ImuSpec, header: Header, reading: Any) -> Imu:
-    unknown = np.zeros(9)
-    unknown[0] = -1.0  # REP-145: this sensor gives no orientation
-    gyro, accel = reading.angular_velocity, reading.linear_acceleration
+    gyro, accel = reading.angular_velocity.tolist(), reading.linear_acceleration.tolist()
     return Imu(
         header=header,
         orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-        orientation_covariance=unknown,
-        angular_velocity=Vector3(x=float(gyro[0]), y=float(gyro[1]), z=float(gyro[2])),
-        angular_velocity_covariance=np.eye(3).ravel() * spec.gyro_noise_stddev**2,
-        linear_acceleration=Vector3(x=float(accel[0]), y=float(accel[1]), z=float(accel[2])),
-        linear_acceleration_covariance=np.eye(3).ravel() * spec.accel_noise_stddev**2,
+        orientation_covariance=_NO_ORIENTATION,
+        angular_velocity=Vector3(*gyro),
+        angular_velocity_covariance=_IDENTITY * spec.gyro_noise_stddev**2,
+        linear_acceleration=Vector3(*accel),
+        linear_acceleration_covariance=_IDENTITY * spec.accel_noise_stddev**2,
     )
 
 

@@ -24,8 +24,10 @@ class ToteDetectorConfig:
     """Width of the face [m]."""
     width_tolerance: float = 0.035
     """[m]"""
-    max_range: float = 1.6
-    """Readings beyond this are not looked at [m]."""
+    max_x: float = 1.6
+    """Points further ahead of the base are not looked at [m]."""
+    max_y: float = 0.45
+    """Points further aside are not looked at [m]."""
 
 
 class ToteDetectorNode:
@@ -50,14 +52,10 @@ class ToteDetectorNode:
         T_base_palm = self._robot_pose.at_stamp(base, message.header)
         if T_base_palm is None:
             return
-        # Without return, or far behind the shelf's front: not this tote.
-        near = message.ranges < config.max_range
+        points = T_base_palm.apply(scan_points(message, math.nan))
+        near = (points[:, 0] < config.max_x) & (np.abs(points[:, 1]) < config.max_y)
         if np.count_nonzero(near) < 5:
             return
-        points = scan_points(message, math.nan)
-        points[~near] = math.nan
-        face = find_box_face(
-            T_base_palm.apply(points), config.tote_width, width_tolerance=config.width_tolerance
-        )
+        face = find_box_face(points[near], config.tote_width, width_tolerance=config.width_tolerance)
         if face is not None:
             self._publisher.publish(pose_stamped(face.pose, base, self.node.now_ns))

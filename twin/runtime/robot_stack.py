@@ -191,7 +191,7 @@ class RobotStack:
             _costmap(
                 "local_costmap",
                 self.frames.odom,
-                replace(layers, rolling_window=True, width=5.0, height=5.0, obstacle_max_range=3.0),
+                replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0),
                 config.local_costmap,
                 200_000_000,
             ),

@@ -1,1 +1,1 @@
-
+"""The capstone's world and mission: arenas, goods, maps, pick and place."""

@@ -116,7 +116,7 @@ class RoundRobin(ControlNode):
 
 
 class RateController(ControlNode):
-    """Ticks its child at once, then only when `period_ns` of simulated time has passed; running in between."""
+    """Ticks its child at once, then when `period_ns` of simulated time has passed; runs in between."""
 
     def __init__(self, name: str, period_ns: int, clock: Callable[[], int], child: Behaviour) -> None:
         super().__init__(name, [child])

@@ -105,6 +105,9 @@ class CallService(Behaviour):
         assert self._future is not None
         if not self._future.done:
             return Status.RUNNING
+        if self._future.error is not None:
+            self.feedback_message = self._future.error
+            return Status.FAILURE
         return Status.SUCCESS if self._accept(self._future.result) else Status.FAILURE
 
 

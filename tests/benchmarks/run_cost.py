@@ -1,0 +1,114 @@
+"""What the whole run costs, as a ratio to the raw limit: the same model, as many steps and rays, no more.
+
+`make bench` prints it. It is CPU time of one process, run and raw limit in turns on the same machine: so the
+ratios hold on a noisy machine, while the absolute figures do not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from twin import runtime
+from twin.models.description import LidarSpec
+from twin.runtime.build import build
+from twin.scenario.schema import Scenario, load
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+def raw_limit(scenario: Scenario, simulated_s: float) -> float:
+    """Return the CPU time [s] of the same physics steps and lidar rays alone."""
+    parts = build(scenario)
+    parts.bus.close()
+    world = parts.world
+    model, data = world.model, world.data
+    substeps = parts.control_period_ns // world.timestep_ns
+    lidars = [
+        sensor
+        for robot in world.robots.values()
+        for sensor in robot.sensors
+        if isinstance(sensor.spec, LidarSpec)
+    ]
+    casts = [
+        _caster(model, data, robot.body(lidar.spec.link), lidar.spec)
+        for robot in world.robots.values()
+        for lidar in robot.sensors
+        if isinstance(lidar.spec, LidarSpec)
+    ]
+    periods = [lidar.period_ns for lidar in lidars]
+    ticks = round(simulated_s * 1e9 / parts.control_period_ns)
+    start = time.process_time()
+    for tick in range(1, ticks + 1):
+        mujoco.mj_step(model, data, substeps)
+        now = tick * parts.control_period_ns
+        for period, cast in zip(periods, casts, strict=True):
+            if now % period == 0:
+                cast()
+    return time.process_time() - start
+
+
+def _caster(model: mujoco.MjModel, data: mujoco.MjData, link: str, spec: LidarSpec) -> Callable[[], None]:
+    body = model.body(link).id
+    angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
+    local = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(spec.samples)])
+    geomid, distance = np.zeros(spec.samples, np.int32), np.zeros(spec.samples)
+    groups = np.array([1, 0, 0, 1, 0, 0], np.uint8)
+
+    def cast() -> None:
+        rays = (local @ data.xmat[body].reshape(3, 3).T).ravel()
+        mujoco.mj_multiRay(
+            model,
+            data,
+            data.xpos[body],
+            rays,
+            groups,
+            1,
+            body,
+            geomid,
+            distance,
+            None,
+            spec.samples,
+            spec.range_max,
+        )
+
+    return cast
+
+
+def measure(scenario: Scenario, *, record: bool) -> tuple[float, float]:
+    """Return simulated time and CPU time [s] of a run."""
+    with tempfile.TemporaryDirectory() as folder:
+        verdict = runtime.run(scenario, out=Path(folder), record=record)
+    return verdict.metrics["sim_time_s"], verdict.metrics["cpu_time_s"]
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scenario", nargs="?", type=Path, default=SCENARIOS / "warehouse.yaml")
+    parser.add_argument("--rounds", type=int, default=2, help="best of so many (default: 2)")
+    options = parser.parse_args()
+    scenario = load(options.scenario)
+    plain = recorded = raw = float("inf")
+    for _ in range(options.rounds):
+        simulated, cpu = measure(scenario, record=False)
+        plain = min(plain, cpu)
+        recorded = min(recorded, measure(scenario, record=True)[1])
+        raw = min(raw, raw_limit(scenario, simulated))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{scenario.name}: {simulated:.1f} s simulated, best of {options.rounds}")
+    print(f"{'':24}{'CPU s':>8}{'x real time':>13}{'x raw limit':>13}")
+    for name, cpu in (("raw: steps and rays", raw), ("run", plain), ("run with recording", recorded)):
+        print(f"{name:24}{cpu:8.2f}{simulated / cpu:13.1f}{cpu / raw:13.2f}")
+    print(f"recording costs {recorded / plain:.2f}x; peak memory {memory:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
