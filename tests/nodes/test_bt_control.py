@@ -8,6 +8,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from twin.bridge.clock import Clock
 from twin.nodes.bt.control import (
     ControlNode,
     Fallback,
@@ -156,22 +157,22 @@ def test_round_robin_begins_with_the_first_child_after_a_halt() -> None:
 
 
 def test_rate_controller_ticks_once_a_period_and_runs_in_between() -> None:
-    now = 0
+    clock = Clock()
     child = Leaf("S")
-    node = RateController("rate", 1000, lambda: now, child)
+    node = RateController("rate", 1000, lambda: clock.now_ns, child)
     seen = ""
-    for now in range(0, 2500, 250):
+    for clock.now_ns in range(0, 2500, 250):
         seen += tick(node, 1)
     assert seen == "SRRRSRRRSR"
     assert child.ticks == 3
 
 
 def test_rate_controller_does_not_throttle_a_running_child() -> None:
-    now = 0
+    clock = Clock()
     child = Leaf("RRRS")
-    node = RateController("rate", 1000, lambda: now, child)
+    node = RateController("rate", 1000, lambda: clock.now_ns, child)
     seen = ""
-    for now in range(0, 2000, 250):
+    for clock.now_ns in range(0, 2000, 250):
         seen += tick(node, 1)
     assert seen == "RRRSRRRS", "the period counts from the child's success"
     assert child.ticks == 5
@@ -187,11 +188,11 @@ def test_rate_controller_ticks_at_once_after_a_halt() -> None:
 
 def test_rate_controller_in_a_pipeline_lets_the_later_child_run() -> None:
     """The navigator's use: the path is followed between two replannings."""
-    now = 0
+    clock = Clock()
     plan, follow = leaves(("S", "RRRRS"))
-    node = PipelineSequence("p", [RateController("rate", 1000, lambda: now, plan), follow])
+    node = PipelineSequence("p", [RateController("rate", 1000, lambda: clock.now_ns, plan), follow])
     seen = ""
-    for now in range(0, 1250, 250):
+    for clock.now_ns in range(0, 1250, 250):
         seen += tick(node, 1)
     assert seen == "RRRRS"
     assert (plan.ticks, follow.ticks) == (2, 5)

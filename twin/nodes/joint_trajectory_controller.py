@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any
 
+import numpy as np
+
 from twin.bridge.action_types import FollowJointTrajectory
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
@@ -12,7 +14,7 @@ from twin.bridge.msgs import new, ns
 from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
-_SUCCESSFUL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -2, -5
+_SUCCESSFUL, _INVALID_GOAL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -1, -2, -5
 
 
 class JointTrajectoryControllerNode:
@@ -38,14 +40,10 @@ class JointTrajectoryControllerNode:
 
     def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
-        unknown = [name for name in names if name not in self._index]
-        if unknown or not goal.request.trajectory.points:
+        fault = self._fault(names, goal.request.trajectory.points)
+        if fault is not None:
             goal.abort()
-            return new(
-                FollowJointTrajectory.Result,
-                error_code=_INVALID_JOINTS,
-                error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
-            )
+            return fault
         trajectory = self._with_start(names, goal.request.trajectory.points)
         start = self.node.now_ns
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
@@ -56,6 +54,24 @@ class JointTrajectoryControllerNode:
             yield
         self._command(names, trajectory.positions[-1])
         return (yield from self._settle(goal, names, trajectory))
+
+    def _fault(self, names: list[str], points: Sequence[Any]) -> Any | None:
+        """Return the result that refuses a goal which cannot be followed, else None."""
+        unknown = [name for name in names if name not in self._index]
+        if unknown:
+            return new(
+                FollowJointTrajectory.Result,
+                error_code=_INVALID_JOINTS,
+                error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
+            )
+        usable = all(len(p.positions) == len(names) and np.isfinite(p.positions).all() for p in points)
+        if not (names and points and usable):
+            return new(
+                FollowJointTrajectory.Result,
+                error_code=_INVALID_GOAL,
+                error_string=f"every point needs {len(names)} finite positions, one per joint; at least one point",
+            )
+        return None
 
     def _settle(
         self, goal: GoalHandle, names: list[str], trajectory: Trajectory
