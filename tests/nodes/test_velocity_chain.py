@@ -107,9 +107,9 @@ def test_drive_turns_wheels_and_reports_where_it_is(bench: Bench) -> None:
     assert math.hypot(pose.position.x, pose.position.y) > 0.4
     in_odom = robot.pose_lookup.in_odom()
     assert in_odom is not None
-    assert in_odom.x == pytest.approx(pose.position.x, abs=0.3 * TICK_S)
+    assert in_odom.x == pytest.approx(pose.position.x, abs=0.4 * TICK_S)
     assert in_odom.yaw == pytest.approx(
-        2.0 * math.atan2(pose.orientation.z, pose.orientation.w), abs=0.6 * TICK_S
+        2.0 * math.atan2(pose.orientation.z, pose.orientation.w), abs=0.7 * TICK_S
     )
 
 

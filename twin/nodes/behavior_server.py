@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -107,4 +108,11 @@ class BehaviorServerNode:
             finally:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
 
-        ActionServer(self.node, action, name, execute)
+        ActionServer(self.node, action, name, execute, _is_finite)
+
+
+def _is_finite(goal: Any) -> bool:
+    """Whether a goal's angle, distance and speed, as far as it has them, are numbers to act on."""
+    target = getattr(goal, "target", None)
+    values = (getattr(goal, "target_yaw", 0.0), getattr(goal, "speed", 0.0), target.x if target else 0.0)
+    return all(map(math.isfinite, values))

@@ -6,6 +6,8 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
@@ -20,7 +22,7 @@ from twin.nodes.costmap import CostmapNode
 from twin.nodes.messages import path_array
 from twin.nodes.robot_pose import RobotPose
 
-_TF_ERROR, _FAILED_TO_MAKE_PROGRESS, _NO_VALID_CONTROL = 102, 105, 106
+_TF_ERROR, _INVALID_PATH, _FAILED_TO_MAKE_PROGRESS, _NO_VALID_CONTROL = 102, 103, 105, 106
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +33,7 @@ class ControllerServerConfig:
     goal_checker: GoalCheckerConfig = field(default_factory=GoalCheckerConfig)
     progress_checker: ProgressCheckerConfig = field(default_factory=ProgressCheckerConfig)
     controller_period_ns: int = 60_000_000
-    failure_tolerance_ns: int = 600_000_000
+    failure_tolerance_ns: int = 300_000_000
     """How long no valid control is accepted before the goal is aborted [ns]."""
 
 
@@ -64,6 +66,11 @@ class ControllerServerNode:
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         path = path_array(handle.request.path)
+        if not len(path) or not np.isfinite(path).all():
+            handle.abort()
+            return new(
+                FollowPath.Result, error_code=_INVALID_PATH, error_msg="the path is empty or not finite"
+            )
         goal_checker = SimpleGoalChecker(config=self.config.goal_checker)
         progress_checker = SimpleProgressChecker(config=self.config.progress_checker)
         dt = self.config.controller_period_ns * 1e-9

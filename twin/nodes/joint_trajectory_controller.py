@@ -69,7 +69,7 @@ class JointTrajectoryControllerNode:
             return new(
                 FollowJointTrajectory.Result,
                 error_code=_INVALID_GOAL,
-                error_string=f"every point needs {len(names)} finite positions, one per joint; at least one point",
+                error_string=f"every point needs {len(names)} finite positions, and there must be a point",
             )
         return None
 

@@ -1,0 +1,292 @@
+"""behavior_server, docking_server and tote_detector on ideal wheels and synthetic scans."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.nodes.conftest import TICK_NS, Bench, Robot, Room, box, open_room, scan
+from twin.bridge.action_types import BackUp, DockRobot, DriveOnHeading, Spin, UndockRobot, Wait
+from twin.bridge.actions import ActionClient
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import GoalStatus, LaserScan, Point, PoseStamped, duration, new
+from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.types import ActionType
+from twin.geometry import Pose2, wrap_angle
+from twin.navigation.layered_costmap import CostmapConfig
+from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.behavior_server import BehaviorServerNode
+from twin.nodes.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.docking_server import DockingServerNode
+from twin.nodes.messages import pose_stamped
+from twin.nodes.tote_detector import ToteDetectorNode
+
+FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
+LONG = duration(30_000_000_000)
+
+
+class Behaviors:
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.robot = Robot(bench, open_room())
+        rolling = CostmapConfig(footprint=FOOTPRINT, rolling_window=True)
+        config = CostmapNodeConfig(name="local_costmap", frame="odom", layers=rolling)
+        costmap = CostmapNode(bench.bus, self.robot.pose_lookup, config)
+        behavior = BehaviorConfig(footprint=FOOTPRINT)
+        BehaviorServerNode(bench.bus, self.robot.pose_lookup, behavior, costmap=costmap)
+        bench.run(0.5)
+
+    def send(self, action: ActionType, name: str, **fields: Any) -> Any:
+        return ActionClient(self.bench.node, action, name).send_goal(new(action.Goal, **fields))
+
+    def do(self, action: ActionType, name: str, **fields: Any) -> Any:
+        goal = self.send(action, name, **fields)
+        self.bench.until(lambda: goal.done)
+        self.bench.run(0.3)
+        return goal
+
+
+@pytest.fixture
+def behaviors(bench: Bench) -> Behaviors:
+    return Behaviors(bench)
+
+
+@pytest.mark.parametrize("angle", [math.pi / 2, -math.pi / 2, 1.5 * math.pi])
+def test_spin_turns_by_the_angle_on_the_spot(behaviors: Behaviors, angle: float) -> None:
+    goal = behaviors.do(Spin, "spin", target_yaw=angle, time_allowance=LONG)
+    assert goal.succeeded
+    pose = behaviors.robot.pose
+    assert abs(wrap_angle(pose.yaw - angle)) < 0.05
+    assert math.hypot(pose.x, pose.y) < 1e-6
+    turned = np.array([w for _, w in behaviors.robot.commands]).sum() * TICK_NS * 1e-9
+    assert turned == pytest.approx(angle, abs=0.1), "the way round that was asked for, all of it"
+
+
+def test_drive_on_heading_and_backup_are_straight(behaviors: Behaviors) -> None:
+    ahead = Point(x=0.5, y=0.0, z=0.0)
+    goal = behaviors.do(DriveOnHeading, "drive_on_heading", target=ahead, speed=0.2, time_allowance=LONG)
+    assert goal.succeeded
+    assert behaviors.robot.pose == pytest.approx((0.5, 0.0, 0.0), abs=0.02)
+    back = Point(x=0.3, y=0.0, z=0.0)
+    assert behaviors.do(BackUp, "backup", target=back, speed=0.1, time_allowance=LONG).succeeded
+    assert behaviors.robot.pose == pytest.approx((0.2, 0.0, 0.0), abs=0.02)
+    assert min(v for v, _ in behaviors.robot.commands) == pytest.approx(-0.1)
+    assert max(v for v, _ in behaviors.robot.commands) == pytest.approx(0.2)
+
+
+def test_driving_into_a_wall_is_refused_before_it(behaviors: Behaviors) -> None:
+    behaviors.robot.room.add_box(0.8, -1.0, 1.0, 1.0)
+    behaviors.bench.run(0.5)
+    ahead = Point(x=2.0, y=0.0, z=0.0)
+    goal = behaviors.do(DriveOnHeading, "drive_on_heading", target=ahead, speed=0.2, time_allowance=LONG)
+    assert goal.status == GoalStatus.STATUS_ABORTED
+    assert (goal.result.error_code, goal.result.error_msg) == (724, "drive_on_heading: collision ahead")
+    assert behaviors.robot.pose.x < 0.8 - 0.15
+    assert behaviors.robot.commands[-1] == (0.0, 0.0)
+
+
+def test_a_behavior_that_takes_too_long_is_aborted(behaviors: Behaviors) -> None:
+    behaviors.robot.stuck = True
+    goal = behaviors.do(Spin, "spin", target_yaw=1.0, time_allowance=duration(1_000_000_000))
+    assert (goal.result.error_code, goal.result.error_msg) == (701, "spin: timeout")
+
+
+def test_wait_waits_without_driving(behaviors: Behaviors) -> None:
+    began = behaviors.bench.now_s
+    goal = behaviors.send(Wait, "wait", time=duration(2_000_000_000))
+    behaviors.bench.until(lambda: goal.done)
+    assert goal.succeeded
+    assert behaviors.bench.now_s - began == pytest.approx(2.0, abs=0.1)
+    assert set(behaviors.robot.commands) <= {(0.0, 0.0)}
+
+
+def test_a_cancelled_behavior_stops_the_robot(behaviors: Behaviors) -> None:
+    goal = behaviors.send(Spin, "spin", target_yaw=3.0, time_allowance=LONG)
+    behaviors.bench.run(1.0)
+    assert behaviors.robot.joints.velocity.any()
+    goal.cancel()
+    behaviors.bench.until(lambda: goal.done, 0.2)
+    assert goal.status == GoalStatus.STATUS_CANCELED
+    behaviors.bench.run(0.3)
+    assert not behaviors.robot.joints.velocity.any()
+
+
+@pytest.mark.parametrize(
+    ("action", "name", "fields"),
+    [
+        (Spin, "spin", {"target_yaw": math.nan}),
+        (BackUp, "backup", {"target": Point(x=math.inf, y=0.0, z=0.0), "speed": 0.1}),
+        (DriveOnHeading, "drive_on_heading", {"target": Point(x=1.0, y=0.0, z=0.0), "speed": math.nan}),
+    ],
+)
+def test_a_goal_that_is_not_finite_is_rejected(
+    behaviors: Behaviors, action: ActionType, name: str, fields: dict[str, Any]
+) -> None:
+    goal = behaviors.do(action, name, **fields)
+    assert goal.accepted is False
+    assert not behaviors.robot.commands
+
+
+# docking_server
+
+
+class Dock:
+    """A shelf's face 2 m ahead, and if `tote` a tote 0.05 m behind it that the tote detector would report."""
+
+    FACE = Pose2(2.0, 0.0, 0.0)
+
+    def __init__(self, bench: Bench, *, start: Pose2, shelf: bool = True) -> None:
+        self.bench = bench
+        room = Room(box(-4.0, -4.0, 4.0, 4.0))
+        if shelf:
+            room.add_box(2.0, -1.5, 2.6, 1.5)
+        self.robot = Robot(bench, room, cmd_vel="cmd_vel_docking", start=start)
+        DockingServerNode(bench.bus, self.robot.pose_lookup)
+        self.dock_client = ActionClient(bench.node, DockRobot, "dock_robot")
+        self.undock_client = ActionClient(bench.node, UndockRobot, "undock_robot")
+        self._tote = bench.node.create_publisher(PoseStamped, "tote_pose", 1)
+        bench.run(0.5)
+
+    def dock(self, kind: str = "table", believed: Pose2 | None = None) -> Any:
+        face = pose_stamped(believed or self.FACE, "map", 0)
+        goal = self.dock_client.send_goal(new(DockRobot.Goal, dock_pose=face, dock_type=kind))
+        self.bench.until(lambda: goal.done, 120.0)
+        self.bench.run(0.5)
+        return goal
+
+    def show_tote(self, y: float) -> None:
+        """Report, at every tick, a tote at lateral position `y` of the face."""
+        tote = Pose2(2.05, y, 0.0)
+
+        def report() -> None:
+            in_base = self.robot.pose.inverse() @ tote
+            self._tote.publish(pose_stamped(in_base, "base_footprint", self.bench.clock.now_ns))
+
+        self.bench.each_tick.append(report)
+
+
+def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.9, 0.03, 0.05))
+    goal = dock.dock(believed=Pose2(2.08, 0.0, 0.06))
+    assert goal.result.success
+    pose = dock.robot.pose
+    assert pose.x == pytest.approx(2.0 - 0.55, abs=0.015), "the distance is the scan's, not the map's"
+    assert abs(pose.yaw) < math.radians(2.0), "and so is the heading"
+    assert not dock.robot.joints.velocity.any()
+
+
+def test_docking_at_a_tote_lines_up_with_it(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
+    dock.show_tote(0.06)
+    assert dock.dock("tote").result.success
+    assert dock.robot.pose.y == pytest.approx(0.06, abs=0.015)
+    assert dock.robot.pose.x == pytest.approx(1.45, abs=0.015)
+
+
+def test_a_tote_of_the_neighbouring_slot_is_not_the_one(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
+    dock.show_tote(0.5)
+    goal = dock.dock("tote")
+    assert (goal.result.success, goal.result.error_code) == (False, 904)
+    assert goal.result.error_msg == "no tote in sight"
+
+
+def test_a_dock_that_is_not_there_is_not_docked_at(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0), shelf=False)
+    goal = dock.dock()
+    assert goal.status == GoalStatus.STATUS_ABORTED
+    assert (goal.result.error_code, goal.result.error_msg) == (904, "no face of the dock in sight")
+    assert dock.robot.pose.x == pytest.approx(0.9)
+
+
+def test_undocking_backs_off_to_where_staging_is(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(1.45, 0.0, 0.0))
+    goal = dock.undock_client.send_goal(new(UndockRobot.Goal))
+    bench.until(lambda: goal.done)
+    assert goal.result.success
+    assert dock.robot.pose.x == pytest.approx(0.9, abs=0.02)
+    assert max(v for v, _ in dock.robot.commands) <= 0.0
+
+
+def test_a_cancelled_docking_stops(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.5, 0.0, 0.0))
+    goal = dock.dock_client.send_goal(new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0)))
+    bench.run(1.5)
+    assert dock.robot.joints.velocity.any()
+    goal.cancel()
+    bench.until(lambda: goal.done, 1.0)
+    assert goal.status == GoalStatus.STATUS_CANCELED
+    bench.run(0.5)
+    assert not dock.robot.joints.velocity.any()
+
+
+# tote_detector
+
+
+class Palm:
+    """Palm scans of what stands before a robot at the origin; the lidar frame serves as the palm's."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.robot = Robot(bench, Room(box(-9, -9, 9, 9)))
+        self.poses = bench.listen(PoseStamped, "tote_pose")
+        ToteDetectorNode(bench.bus, self.robot.pose_lookup)
+        self._publisher = bench.node.create_publisher(LaserScan, "palm_scan", SENSOR_DATA)
+        self.angles = np.radians(np.arange(-45.0, 45.25, 0.5))
+        bench.run(0.2)
+
+    def look(self, segments: np.ndarray, noise: float = 0.0) -> list[PoseStamped]:
+        """Scan and return what was detected."""
+        del self.poses[:]
+        room = Room(segments, angles=self.angles, max_range=4.0)
+        ranges = room.ranges(self.robot.T_base_lidar)
+        ranges += (
+            np.random.Generator(np.random.Philox(key=1)).normal(0.0, noise, len(ranges)) if noise else 0.0
+        )
+        stamp = self.bench.clock.now_ns - TICK_NS
+        self._publisher.publish(scan(ranges, self.angles, stamp, max_range=4.0))
+        self.bench.run(0.1)
+        return self.poses
+
+
+@pytest.fixture
+def palm(bench: Bench) -> Palm:
+    return Palm(bench)
+
+
+def tote(pose: Pose2, width: float = 0.24, depth: float = 0.3) -> np.ndarray:
+    """A box whose front face's centre is at `pose`, x into it."""
+    segments = box(0.0, -width / 2, depth, width / 2)
+    return pose.apply(segments.reshape(-1, 2)).reshape(-1, 2, 2)
+
+
+@pytest.mark.parametrize("pose", [Pose2(0.7, 0.0, 0.0), Pose2(0.8, 0.1, 0.15), Pose2(0.6, -0.08, -0.2)])
+def test_a_tote_is_found_where_it_stands(palm: Palm, pose: Pose2) -> None:
+    (message,) = palm.look(tote(pose), noise=0.003)
+    found = pose2_from_pose(message.pose)
+    assert message.header.frame_id == "base_footprint"
+    assert found.distance(pose) < 0.015
+    assert abs(wrap_angle(found.yaw - pose.yaw)) < 0.06
+
+
+@pytest.mark.parametrize(
+    "segments",
+    [
+        tote(Pose2(0.7, 0.0, 0.0), width=0.40),
+        tote(Pose2(0.7, 0.0, 0.0), width=0.12),
+        tote(Pose2(1.9, 0.0, 0.0)),
+        box(-9.0, -9.0, 9.0, 9.0),
+    ],
+    ids=["too wide", "too narrow", "too far", "nothing"],
+)
+def test_other_things_are_no_tote(palm: Palm, segments: np.ndarray) -> None:
+    assert palm.look(segments) == []
+
+
+def test_of_two_totes_the_one_straight_ahead_counts(palm: Palm) -> None:
+    both = np.concatenate([tote(Pose2(0.8, 0.35, 0.0)), tote(Pose2(0.8, 0.02, 0.0))])
+    (message,) = palm.look(both)
+    assert message.pose.position.y == pytest.approx(0.02, abs=0.015)
