@@ -9,8 +9,8 @@ TwinError
 ├── RecordingError    a recording cannot be written or read
 └── SimulationError   the physics cannot go on (diverged)
 
-The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and exits
-2; anything else that escapes is a bug and keeps its traceback.
+The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and
+exits 2; anything else that escapes is a bug and keeps its traceback.
 """
 
 from __future__ import annotations

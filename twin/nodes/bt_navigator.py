@@ -48,7 +48,7 @@ class BtNavigatorConfig:
     """[m]"""
     backup_speed: float = 0.15
     """[m/s]"""
-    wait_s: float = 3.0
+    wait_s: float = 5.0
     """[s]"""
 
 

@@ -13,11 +13,12 @@ from twin.bridge.clock import Clock
 from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2
 from twin.models import load
 from twin.models.description import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
+from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack, StackContext
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.navigation import AmclLocalisation
@@ -27,7 +28,7 @@ from twin.scenario.schema import Scenario
 from twin.scenario.world import GoodOverride, Obstacle
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.world import World
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
@@ -134,8 +135,9 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
     obstacles = [_obstacle(obstacle) for obstacle in scenario.world.obstacles]
     statics = [o for o in obstacles if isinstance(o, StaticBody)]
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
+    placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
     if arena is None:
-        return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable))
+        return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed)
     totes = (
         {task.tote for task in scenario.mission.tasks}
         if isinstance(scenario.mission, PickAndPlace)
@@ -150,6 +152,7 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
         floor_size=scene.floor_size,
         statics=scene.statics,
         goods=(*goods, *movable),
+        placed=placed,
     )
 
 
@@ -163,9 +166,12 @@ def _overridden(good: FreeBody, override: GoodOverride | None) -> FreeBody:
     )
 
 
-def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody:
-    pose = Pose3.from_pose2(obstacle.pose.pose, obstacle.size[2] / 2.0)
+def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
+    pose = standing_pose(obstacle)
     shapes = (Shape(geometry=Box(size=obstacle.size), rgba=_OBSTACLE_RGBA),)
+    if obstacle.appears_within is not None:
+        hidden = hidden_pose(obstacle)
+        return PlacedBody(name=obstacle.name, T_world_body=hidden, shapes=shapes, friction=obstacle.friction)
     if obstacle.mass is None:
         return StaticBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
     return FreeBody(

@@ -70,7 +70,8 @@ class Observer:
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            power_W=float(np.abs(reading.effort * reading.velocity).sum()),
+            power_W=float(np.maximum(reading.effort * reading.velocity, 0.0).sum()),
+            recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
         )
 
     def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:

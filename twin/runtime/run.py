@@ -17,6 +17,7 @@ from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.observe import Observer
+from twin.runtime.obstacles import ObstacleSchedule
 from twin.scenario.checks import Check
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -58,6 +59,7 @@ class Run:
         self.tick_ns = self._tick_length()
         self._substeps = self.tick_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
 
     def _tick_length(self) -> int:
@@ -98,9 +100,11 @@ class Run:
         self.bus.spin()
 
     def actuate(self) -> None:
-        """3. Actuators take the commands."""
+        """3. Actuators take the commands; obstacles come into the way."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
+        bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
+        self._obstacles.update(bases)
 
     def step(self) -> None:
         """4. Physics."""

@@ -26,8 +26,8 @@ class RobotObservation:
     """True planar speed of the base [m/s]."""
     power_W: float = 0.0
     """Mechanical power of all actuators [W]."""
-    at_stop: tuple[str, ...] = ()
-    """Joints that lie at their limit."""
+    recoveries: int = 0
+    """Recovery behaviours that its navigator has started so far."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

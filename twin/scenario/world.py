@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from pydantic import model_validator
+
 from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName
-from twin.strict_yaml import Hertz, Kilograms, Metres, Seconds, StrictModel
+from twin.strict_yaml import Fault, Faults, Hertz, Kilograms, Metres, Seconds, StrictModel
 
 Length = Annotated[Metres, Positive]
 
@@ -23,6 +25,15 @@ class Obstacle(StrictModel):
     """Mass of a box that can be pushed [kg]; absent: it never moves."""
     friction: Annotated[float, NotNegative] = 0.8
     """Coulomb coefficient."""
+    appears_within: Length | None = None
+    """It comes when a robot's base is this near to its footprint [m]; absent: it is there from the start."""
+
+    @model_validator(mode="after")
+    def _appears_or_moves(self) -> Obstacle:
+        if self.appears_within is not None and self.mass is not None:
+            message = "an obstacle that appears later cannot be pushed; give it no mass"
+            raise Faults([Fault(("appears_within",), message)])
+        return self
 
 
 class GoodOverride(StrictModel):

@@ -12,7 +12,7 @@ from twin.errors import Problem, ScenarioError
 from twin.models.description import Box, Capsule, Cylinder
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
 
 FLOOR = "floor"
 """Name of the floor's geom."""
@@ -45,6 +45,8 @@ def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics)
         _add_static(spec, static, solref)
     for goods in scene.goods:
         _add_goods(spec, goods, solref)
+    for placed in scene.placed:
+        _add_placed(spec, placed, solref)
     for placement in robots:
         _attach(spec, placement)
     return spec
@@ -57,7 +59,13 @@ def static_geom(name: str, index: int) -> str:
 
 def _check_names(scene: Scene, robots: Sequence[RobotPlacement]) -> None:
     names = Counter(
-        [FLOOR, *(s.name for s in scene.statics), *(g.name for g in scene.goods), *(r.name for r in robots)]
+        [
+            FLOOR,
+            *(s.name for s in scene.statics),
+            *(g.name for g in scene.goods),
+            *(p.name for p in scene.placed),
+            *(r.name for r in robots),
+        ]
     )
     problems = [
         Problem(f"{count} things in scene '{scene.name}' have the name '{name}'; give each its own")
@@ -139,6 +147,15 @@ def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> Non
         geom = _add_geom(body, shape, goods.friction, solref)
         geom.name = static_geom(goods.name, index)
         geom.mass = goods.mass * part / sum(volumes)
+
+
+def _add_placed(spec: mujoco.MjSpec, placed: PlacedBody, solref: list[float]) -> None:
+    body = spec.worldbody.add_body(
+        name=placed.name, pos=placed.T_world_body.xyz, quat=placed.T_world_body.quat_wxyz, mocap=True
+    )
+    for index, shape in enumerate(placed.shapes):
+        geom = _add_geom(body, shape, placed.friction, solref)
+        geom.name = static_geom(placed.name, index)
 
 
 def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[float]) -> mujoco.MjsGeom:

@@ -46,6 +46,17 @@ class FreeBody:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlacedBody:
+    """Something that `World.place` puts somewhere while the run goes on; contacts do not move it."""
+
+    name: str
+    T_world_body: Pose3
+    shapes: tuple[Shape, ...]
+    friction: float = 0.8
+    """Coulomb coefficient."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """The floor (plane z = 0) and what stands on it."""
 
@@ -55,3 +66,4 @@ class Scene:
     """Extent to draw along x and y [m]."""
     statics: tuple[StaticBody, ...] = ()
     goods: tuple[FreeBody, ...] = ()
+    placed: tuple[PlacedBody, ...] = ()

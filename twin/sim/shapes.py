@@ -25,8 +25,8 @@ class BodyShape:
 
 
 def shapes(scene: Scene, robots: Sequence[RobotPlacement]) -> Iterator[BodyShape]:
-    """Yield scenery, goods and the robots' visuals, in this order."""
-    for bodies, static in ((scene.statics, True), (scene.goods, False)):
+    """Yield scenery, goods, placed bodies and the robots' visuals, in this order."""
+    for bodies, static in ((scene.statics, True), (scene.goods, False), (scene.placed, False)):
         for body in bodies:
             for shape in body.shapes:
                 yield BodyShape(

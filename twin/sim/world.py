@@ -145,6 +145,19 @@ class World:
             return self._statics[body]
         raise ScenarioError(f"no body '{body}' in the world; {nearest(body, [*self._index, *self._statics])}")
 
+    def place(self, name: str, T_world_body: Pose3) -> None:
+        """Put a placed body of the scene somewhere; takes effect with the next step.
+
+        Raises:
+            ScenarioError: The scene has no such placed body.
+        """
+        placed = [body.name for body in self.scene.placed]
+        if name not in placed:
+            raise ScenarioError(f"no placed body '{name}' in the scene; {nearest(name, placed)}")
+        mocap_id = self.model.body(name).mocapid[0]
+        self.data.mocap_pos[mocap_id] = T_world_body.xyz
+        self.data.mocap_quat[mocap_id] = T_world_body.quat_wxyz
+
     def contacts(self) -> list[Contact]:
         """Return what robots touch except for the floor and themselves, as of the last physics step."""
         if self._contact_step != self.step_count:

@@ -10,6 +10,7 @@ from twin.scenario.checks.localisation import LocalisationErrorConfig, OdometryD
 from twin.scenario.checks.mission import MissionSucceededConfig, TimeLimitConfig
 from twin.scenario.checks.no_collision import NoCollisionConfig
 from twin.scenario.checks.path import ClosedLoopConfig, FinalPoseConfig, PathOnCircleConfig
+from twin.scenario.checks.recoveries import RecoveriesConfig
 from twin.scenario.checks.totals import DrivenDistanceConfig, EnergyConfig
 from twin.scenario.checks.tote_slip import ToteSlipConfig
 from twin.scenario.fields import OneOf
@@ -35,6 +36,8 @@ class CheckEntry(OneOf):
     """Dead reckoning is off by no more than this at the end."""
     driven_distance: DrivenDistanceConfig | None = None
     """The length of the path lies between two bounds."""
+    recoveries: RecoveriesConfig | None = None
+    """The navigator recovers as often as expected."""
     energy: EnergyConfig | None = None
     """The actuators use no more than this."""
     final_pose: FinalPoseConfig | None = None
