@@ -181,6 +181,20 @@ def test_odometry_drift_is_seen_from_the_start() -> None:
     assert fold({"odometry_drift": {"max": 1}}, [at(0, robots=bot())]).reason == "bot published no odometry"
 
 
+def test_recoveries() -> None:
+    def run(*counts: int) -> list[Observation]:
+        robots = [RobotObservation(pose=Pose3.from_xyz_rpy(), recoveries=count) for count in counts]
+        return [
+            Observation(time_ns=i * 10**9, robots={"bot": robot}) for i, robot in enumerate(robots, start=1)
+        ]
+
+    forced = {"recoveries": {"min": 1, "max": 2}}
+    assert fold(forced, run(0, 1, 1)).passed
+    assert fold(forced, run(0, 1, 1)).at_s == 2.0, "when it last recovered"
+    assert fold(forced, run(0, 0)).reason == "bot recovered 0 times"
+    assert fold(forced, run(0, 3)).limit == 2.0
+
+
 def test_driven_distance() -> None:
     run = [at(t, robots=bot(x, 0.0)) for t, x in enumerate((0.0, 1.0, 0.0))]
     assert fold({"driven_distance": {"min": 1.9, "max": 2.1}}, run).value == 2.0
@@ -235,6 +249,7 @@ def test_closed_loop() -> None:
         {"localisation_error": {"rms": 1}},
         {"odometry_drift": {"max": 1}},
         {"driven_distance": {"min": 0}},
+        {"recoveries": {"max": 1}},
         {"energy": {"max": 1}},
         {"final_pose": {"x": 0, "y": 0}},
         {"path_on_circle": {"radius": 1, "tolerance": 1}},

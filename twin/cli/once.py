@@ -15,9 +15,11 @@ from twin.errors import TwinError
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
     from twin import runtime
+    from twin.cli.log import show_warnings
     from twin.scenario import schema
     from twin.scenario.verdict import Verdict
 
+    show_warnings()
     name, seed, folder = options.scenario.stem, 0, out
     try:
         scenario = schema.load(options.scenario, options.overrides)

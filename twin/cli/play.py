@@ -14,13 +14,19 @@ def play(
     recording: Annotated[
         Path, typer.Argument(help="A recording (*.rrd), or the folder of a run.", show_default=False)
     ],
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve the viewer to a browser on this computer.")
+    ] = False,
+    port: Annotated[int, typer.Option(help="Port of the page with --web.")] = 9090,
 ) -> None:
     """Open a recording in the Rerun viewer."""
-    import subprocess
-    import sys
+    from twin.cli.console import stderr
+    from twin.recording import player
 
     file = find_recording(recording)
-    raise typer.Exit(subprocess.run([sys.executable, "-m", "rerun", str(file)], check=False).returncode)
+    raise typer.Exit(
+        player.play(file, web=web, port=port, on_ready=lambda url: stderr().print(f"open {url}"))
+    )
 
 
 def find_recording(path: Path) -> Path:

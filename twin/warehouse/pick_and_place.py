@@ -228,6 +228,7 @@ class PickAndPlaceNode(MissionNode):
                 lambda: self._at(config.place_distance + config.place_depth, set_down + config.lift_off),
                 loaded=True,
             ),
+            self._holding(task),
             self._move_to_height("Lower", set_down, loaded=True),
             self._state(f"{task.tote}: release"),
             self._open(),

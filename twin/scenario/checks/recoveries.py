@@ -52,6 +52,8 @@ class Recoveries(Check):
         low, high = self._config.min, self._config.max
         too_many = high is not None and self._count > high
         reason = f"{self._robot} recovered {self._count} times" if too_many or self._count < low else ""
+        if self._at_s is None:
+            reason = "the run made no step"
         return CheckResult(
             name=self.name,
             passed=not reason,
