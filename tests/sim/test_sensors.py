@@ -87,7 +87,7 @@ def test_lidar_sees_collision_shapes_of_other_robots_not_their_visuals(room: Sce
     other = replace(placed(Pose2(1.05, 0.0, 0.0), sensors=()), name="other")
     beam = replace(LIDAR, samples=1, angle_min=0.0)
     lidar = placed(Pose3.from_xyz_rpy((0.0, 0.0, -0.01)), "kinematic", sensors=(beam,))
-    world = World.compose(room, [lidar, other])
+    world = World.compose(room, [lidar, other], visuals=True)
     # At z = 0.12 the other cart has its visual hull from x = 0.90 on, and its mast from x = 0.93 on.
     ahead = world.robots["cart"].sensors[0].sample(0).ranges[0]
     assert ahead == pytest.approx(0.93 - 0.05, abs=1e-6)

@@ -215,3 +215,12 @@ def test_adding_an_obstacle_is_composing_it(room: Scene) -> None:
     world = World.compose(blocked, [placed()])
     drive(world, 4.0, 8.0, 8.0)
     assert world.pose("cart/base_link").xyz[0] < 0.7
+
+
+def test_visuals_are_for_rendering_and_change_no_motion(room: Scene) -> None:
+    bare = World.compose(room, [placed(sensors=())], seed=1)
+    seen = World.compose(room, [placed(sensors=())], seed=1, visuals=True)
+    assert bare.model.ngeom < seen.model.ngeom
+    for world in (bare, seen):
+        world.step(500)
+    assert bare.state_digest() == seen.state_digest()

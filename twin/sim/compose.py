@@ -52,6 +52,15 @@ def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics)
     return spec
 
 
+def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Return a copy without the robots' visual geoms; it moves in the same way."""
+    bare = spec.copy()
+    for geom in list(bare.geoms):
+        if geom.group == GROUP_VISUAL:
+            bare.delete(geom)
+    return bare
+
+
 def static_geom(name: str, index: int) -> str:
     """Return the name of a static body's i-th geom."""
     return f"{name}#{index}"
