@@ -180,3 +180,11 @@ def test_planar_conversions() -> None:
     message = pose_from_pose2(pose)
     assert pose2_from_pose(message) == pytest.approx(pose)
     _assert_same(pose3_from_pose(message), Pose3.from_pose2(pose))
+
+
+def test_planar_lookup_is_the_projection_of_the_spatial_one() -> None:
+    buffer = TransformBuffer()
+    buffer.set_transform("map", "odom", 0, Pose3.from_xyz_rpy((1, 2, 0), (0.1, -0.2, 2.5)), static=True)
+    buffer.set_transform("odom", "base", 0, Pose3.from_xyz_rpy((-3, 1, 0.5), (0.0, 0.3, -1.0)))
+    spatial = buffer.lookup("map", "base", 0).to_pose2()
+    assert tuple(buffer.lookup_planar("map", "base", 0)) == pytest.approx(tuple(spatial))

@@ -11,7 +11,7 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 
 from twin.errors import BridgeError
-from twin.geometry import Pose3
+from twin.geometry import Pose2, Pose3
 
 _Rigid = tuple[float, float, float, float, float, float, float]
 """x, y, z [m], then the unit quaternion w, x, y, z."""
@@ -96,7 +96,9 @@ class TransformBuffer:
         Raises:
             UnknownFrameError, DisconnectedFramesError: there is no path.
         """
-        up, down = self._paths(target.lstrip("/"), source.lstrip("/"))
+        return self._latest_common_ns(*self._paths(target.lstrip("/"), source.lstrip("/")))
+
+    def _latest_common_ns(self, up: list[str], down: list[str]) -> int | None:
         stamps = [edge.stamps[-1] for edge in map(self._edges.__getitem__, (*up, *down)) if not edge.static]
         return min(stamps, default=None)
 
@@ -113,14 +115,21 @@ class TransformBuffer:
             DisconnectedFramesError: no common root.
             ExtrapolationError: the time is before the first or after the last stamp of a transform between.
         """
+        value = self._lookup(target, source, time_ns)
+        return Pose3(np.array(value[:3]), np.array(value[3:]))
+
+    def lookup_planar(self, target: str, source: str, time_ns: int | None = None) -> Pose2:
+        """Return `lookup` projected to the ground plane; cheaper than to project the result."""
+        x, y, _, w, i, j, k = self._lookup(target, source, time_ns)
+        return Pose2(x, y, math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)))
+
+    def _lookup(self, target: str, source: str, time_ns: int | None) -> _Rigid:
         target, source = target.lstrip("/"), source.lstrip("/")
         up, down = self._paths(target, source)
         if time_ns is None:
-            time_ns = self.latest_common_ns(target, source) or 0
+            time_ns = self._latest_common_ns(up, down) or 0
         T_root_source = self._chain(up, time_ns)
-        T_root_target = self._chain(down, time_ns)
-        value = _compose(_inverse(T_root_target), T_root_source)
-        return Pose3(np.array(value[:3]), np.array(value[3:]))
+        return _compose(_inverse(self._chain(down, time_ns)), T_root_source) if down else T_root_source
 
     def _insert(self, edge: _Edge, time_ns: int, value: _Rigid) -> None:
         stamps, values = edge.stamps, edge.values

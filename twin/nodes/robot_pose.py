@@ -36,7 +36,7 @@ class RobotPose:
     def relative(self, target: str, source: str, time_ns: int | None = None) -> Pose2 | None:
         """Return the planar pose of `source` in `target`, None where the tree does not connect them."""
         try:
-            return self.buffer.lookup(target, source, time_ns).to_pose2()
+            return self.buffer.lookup_planar(target, source, time_ns)
         except TransformError:
             return None
 

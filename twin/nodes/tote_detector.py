@@ -1,15 +1,17 @@
-"""`/tote_detector`: finds the front face of a tote in the palm's scan and publishes it as `tote_pose`."""
+"""`/tote_detector`: while enabled, finds a tote's front face in the palm's scan; publishes `tote_pose`."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import LaserScan, PoseStamped
+from twin.bridge.msgs import LaserScan, PoseStamped, new
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.srvs import SetBool
 from twin.navigation.docking import find_box_face
 from twin.nodes.costmap import scan_points
 from twin.nodes.messages import pose_stamped
@@ -45,9 +47,18 @@ class ToteDetectorNode:
         self.config = config or ToteDetectorConfig()
         self._robot_pose = robot_pose
         self._publisher = self.node.create_publisher(PoseStamped, "tote_pose", 10)
+        self.enabled = False
+        """Whether scans are looked at; only docking and grasping need it, and it costs more than the scan."""
+        self.node.create_service(SetBool, "tote_detector/enable", self._on_enable)
         self.node.create_subscription(LaserScan, "palm_scan", self._on_scan, SENSOR_DATA)
 
+    def _on_enable(self, request: Any) -> Any:
+        self.enabled = bool(request.data)
+        return new(SetBool.Response, success=True)
+
     def _on_scan(self, message: LaserScan) -> None:
+        if not self.enabled:
+            return
         config, base = self.config, self._robot_pose.frames.base
         T_base_palm = self._robot_pose.at_stamp(base, message.header)
         if T_base_palm is None:

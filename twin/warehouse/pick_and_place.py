@@ -33,11 +33,12 @@ from twin.bridge.msgs import (
     header,
     new,
 )
+from twin.bridge.srvs import SetBool
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
 from twin.nodes.bt.control import RecoveryNode, sequence
-from twin.nodes.bt.leaves import CallAction, Condition, Do
+from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.robot_pose import Frames
@@ -136,6 +137,7 @@ class PickAndPlaceNode(MissionNode):
         self._dock = ActionClient(node, DockRobot, "dock_robot")
         self._undock = ActionClient(node, UndockRobot, "undock_robot")
         self._trajectory = ActionClient(node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory")
+        self._detector = node.create_client(SetBool, "tote_detector/enable")
         self._gripper = ActionClient(node, GripperCommand, "gripper_controller/gripper_cmd")
         node.create_subscription(JointState, "joint_states", self._on_joint_states, 10)
         node.create_subscription(PoseStamped, "tote_pose", self._on_tote_pose, 10)
@@ -199,10 +201,12 @@ class PickAndPlaceNode(MissionNode):
                 self._state(f"{task.tote}: dock at {task.pick.name}"),
                 self._open(),
                 self._move_to_height("RaiseToLook", surface + config.detection_height),
+                self._detect(True),
                 self._dock_at(task.pick, "tote"),
                 self._state(f"{task.tote}: look"),
                 Do("ForgetTotes", self._forget_totes),
                 _Wait(lambda: len(self._memory.totes) >= config.tote_samples, self._clock, 3_000_000_000),
+                self._detect(False),
                 self._state(f"{task.tote}: reach"),
                 self._move("Reach", lambda: self._reach_for(grasp_z, task.tote_depth), on_failure=self.note),
                 self._state(f"{task.tote}: grasp"),
@@ -275,6 +279,10 @@ class PickAndPlaceNode(MissionNode):
             lambda: new(UndockRobot.Goal, dock_type=dock_type),
             on_failure=self.note,
         )
+
+    def _detect(self, enabled: bool) -> Behaviour:
+        name = "LookForTotes" if enabled else "StopLooking"
+        return CallService(name, self._detector, lambda: SetBool.Request(data=enabled))
 
     def _open(self) -> Behaviour:
         return CallAction("OpenGripper", self._gripper, lambda: self._gripper_goal(self._gripper_open))
