@@ -78,3 +78,18 @@ def test_odometry_drifts_and_says_so(run: Run) -> None:
     truth, odom = run.world.pose(stack.handle.base).to_pose2(), stack.robot_pose.in_odom()
     assert odom is not None
     assert 1e-5 < truth.distance(odom) < 0.1, "encoders never know the truth exactly"
+
+
+def test_each_seed_draws_wheels_of_its_own(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
+) -> None:
+    errors = []
+    for seed in (1, 2, 3):
+        run = make_run(scenario(TEXT.replace("MODEL", "diff_bot") + f"seed: {seed}\n"))
+        (stack,) = run.parts.stacks.values()
+        drive(run, 10.0, 0.3, 0.0)
+        truth, odom = run.world.pose(stack.handle.base).to_pose2(), stack.robot_pose.in_odom()
+        assert odom is not None
+        errors.append(odom.y - truth.y)
+    assert max(map(abs, errors)) < 0.1, "3 m straight"
+    assert len({round(error, 4) for error in errors}) == 3, "the heading drifts differently with each pair"

@@ -21,6 +21,9 @@ class HardwareConfig:
 
     encoder_ticks: int = 4096
     """Ticks per turn of the encoders of wheels and other continuous joints."""
+    wheel_scale_stddev: float = 1e-3
+    """Of the error by which a wheel's travel is misjudged, drawn once a run for each wheel: no tyre is of
+    the size that odometry reckons with. It is why dead reckoning drifts even without slip."""
     position_noise_stddev: float = 1e-4
     """Of all other joints [rad] or [m]."""
     velocity_noise_stddev: float = 1e-3
@@ -68,6 +71,13 @@ class Hardware:
         )
         self._tick = 2.0 * math.pi / self.config.encoder_ticks
         self._noise = NoiseStream(seed, f"{robot}/joints")
+        scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
+        wheels = (
+            set(description.drive.left_joints + description.drive.right_joints)
+            if description.drive
+            else set()
+        )
+        self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
         self._counts = self._count()
         self._step = 0
         n = len(self.joint_names)
@@ -129,4 +139,4 @@ class Hardware:
         self._data.ctrl[self._actuators] = self._commands
 
     def _count(self) -> Array:
-        return np.round(self._data.qpos[self._qpos] / self._tick)
+        return np.round(self._data.qpos[self._qpos] * self._scale / self._tick)

@@ -18,7 +18,7 @@ class CallAction(Behaviour):
     Args:
         name: Shown in logs and in the recording.
         client: Of the action.
-        goal: Makes the goal at the start; None means that it cannot be made, and the leaf fails.
+        goal: Makes the goal at the start; returns None if it cannot, after saying why, and the leaf fails.
         on_result: Takes the result of a goal that succeeded; a returned text is a reason to fail after all.
         on_failure: Takes the text that says why it failed.
         updated: Makes a new goal while the old one runs, or None; the server preempts the old one.
@@ -50,7 +50,8 @@ class CallAction(Behaviour):
     def update(self) -> Status:
         """Look whether the result is there."""
         if self._goal is None:
-            return self._fail("no goal could be made")
+            self.feedback_message = "no goal could be made"
+            return Status.FAILURE
         if self._goal.accepted is False:
             return self._fail(self._goal.error or f"{self._client.name} rejected the goal")
         if self._updated is not None and (goal := self._updated()) is not None:
