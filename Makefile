@@ -4,9 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test check bench scenarios smoke clean
+.PHONY: run test check bench scenarios smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
+	@echo "Installing into $(VENV); the first time this takes some minutes."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
@@ -14,8 +16,9 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 run: $(VENV)/.ready  ## the environment, then the warehouse scenario to its verdict
 	$(BIN)/twin run $(SCENARIO)
 
-test: $(VENV)/.ready  ## the whole test suite
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+test: $(VENV)/.ready  ## the whole test suite, fast tests first
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not bench"
 
 check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/ruff format --check .
@@ -35,6 +38,9 @@ smoke: constraints.txt  ## the wheel alone, in a fresh environment without the d
 	build/smoke/venv/bin/python -m pip wheel --quiet --no-deps --wheel-dir build/smoke .
 	build/smoke/venv/bin/python -m pip install --quiet --constraint constraints.txt build/smoke/*.whl
 	cd build/smoke && venv/bin/twin run ../../scenarios/diff_bot_figure8.yaml --out run
+
+docs: $(VENV)/.ready  ## the tables of the documentation, from schemas and code
+	$(BIN)/python docs/reference.py
 
 clean:
 	rm -rf $(VENV) build runs .mypy_cache .ruff_cache .pytest_cache

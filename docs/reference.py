@@ -1,0 +1,326 @@
+"""Writes the tables of docs/scenarios.md, arenas.md and navigation.md: `python docs/reference.py`.
+
+Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. With `--check`
+nothing is written; the exit code is 1 if a page is not up to date.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import gc
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from twin.bridge.bus import Bus
+from twin.bridge.services import Client, Service
+from twin.bridge.topics import Publisher, Subscription
+from twin.navigation.amcl import AmclConfig
+from twin.navigation.goal_checker import GoalCheckerConfig
+from twin.navigation.planner import PlannerConfig
+from twin.navigation.progress_checker import ProgressCheckerConfig
+from twin.navigation.recovery import BehaviorConfig
+from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.nodes.bt_navigator import BtNavigatorConfig
+from twin.nodes.costmap import CostmapNodeConfig
+from twin.nodes.docking_server import DockingConfig
+from twin.runtime.build import build
+from twin.scenario.schema import json_schema, load
+from twin.warehouse.arena_file import ArenaFile
+
+DOCS = Path(__file__).parent
+BEGIN, END = "<!-- {name}: written by docs/reference.py -->\n", "<!-- end of {name} -->"
+
+QUANTITIES = {
+    "s": "time",
+    "m": "length",
+    "rad": "angle",
+    "kg": "mass",
+    "m/s": "speed",
+    "rad/s": "turn rate",
+    "N": "force",
+    "Hz": "frequency",
+    "J": "energy",
+}
+"""SI unit, the first of a pattern -> what the tables call it."""
+
+ARENA_MEANING = {
+    "name": "Name of the arena.",
+    "hall": "The outer walls.",
+    "partitions": "Inner walls by name.",
+    "pillars": "Pillars by name.",
+    "racks": "Racks by name.",
+    "pallets": "Loaded pallets by name.",
+    "obstacles": "Boxes by name; they are on the map.",
+    "tote": "What all totes have in common.",
+    "totes": "Totes that a mission can name.",
+    "stock": "Scenery totes; absent: none.",
+    "zones": "Painted rectangles by name.",
+    "poses": "Named poses, such as a start.",
+    "x": "From low to high.",
+    "y": "From low to high.",
+    "pose": "x, y, yaw in the map frame.",
+    "start": "x, y of one end.",
+    "end": "x, y of the other end.",
+    "size": "Full edge lengths along the pose's axes.",
+    "colour": "Colour of the picture.",
+    "table": "A table in the zone, onto which totes are set.",
+    "slot_spacing": "Distance between the middles of two slots.",
+    "rack": "Name of its rack.",
+    "mass": "Mass.",
+    "friction": "Coulomb coefficient.",
+    "height": "Height.",
+    "wall_height": "Height.",
+    "wall_thickness": "Thickness, outwards.",
+    "thickness": "Thickness.",
+}
+"""Meaning of keys that the arena schema does not describe."""
+
+
+def tables(schema: Mapping[str, Any], meanings: Mapping[str, str]) -> str:
+    """Return one table per kind of mapping in a schema, in the order in which a file nests them."""
+    parts = []
+    sections = list(_sections(schema))
+    homes = {node["title"]: path for path, node in sections}
+    for path, node in sections:
+        if set(node["properties"]) == {"type"}:
+            continue
+        heading = f"### `{path}`" if path else "### The file"
+        parts += [heading, "", _flow(node.get("description", "")), ""]
+        parts += ["| Key | Value | Default | Meaning |", "|---|---|---|---|"]
+        required = node.get("required", ())
+        for key, item in node["properties"].items():
+            meaning = item.get("description") or meanings.get(key) or _described(schema, item)
+            default = "required" if key in required else _default(item)
+            elsewhere = [homes.get(name, "") for _, name in _references(item)]
+            if (
+                len(elsewhere) == 1
+                and elsewhere[0]
+                and not elsewhere[0].startswith(f"{path}.{key}".strip("."))
+            ):
+                meaning += f" Keys as in `{elsewhere[0]}`."
+            parts.append(f"| `{key}` | {_value(schema, item)} | {default} | {_flow(meaning)} |")
+        parts.append("")
+    return "\n".join(parts)
+
+
+def _sections(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield dotted path and mapping, outer ones first; a mapping that comes again is not repeated."""
+    seen: set[str] = set()
+
+    def walk(path: str, node: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        if node.get("properties"):
+            yield path, node
+        for key, item in node.get("properties", {}).items():
+            for suffix, name in _references(item):
+                if name not in seen:
+                    seen.add(name)
+                    yield from walk(f"{path}.{key}{suffix}".lstrip("."), schema["$defs"][name])
+
+    return walk("", schema)
+
+
+def _references(item: Mapping[str, Any], suffix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield (suffix of the path, name of the definition) for everything that an item may hold."""
+    if "$ref" in item:
+        yield suffix, item["$ref"].rpartition("/")[2]
+    if "discriminator" in item:
+        for kind, reference in item["discriminator"]["mapping"].items():
+            yield f"{suffix} (type: {kind})", reference.rpartition("/")[2]
+        return
+    for choice in item.get("anyOf", ()):
+        yield from _references(choice, suffix)
+    if isinstance(item.get("items"), Mapping):
+        yield from _references(item["items"], f"{suffix}[]")
+    if isinstance(item.get("additionalProperties"), Mapping):
+        yield from _references(item["additionalProperties"], f"{suffix}.<name>")
+
+
+def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
+    """Return what a key takes, in words."""
+    choices = [choice for choice in item.get("anyOf", (item,)) if choice.get("type") != "null"]
+    units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice), None)
+    if units is not None:
+        number = next(choice for choice in choices if "pattern" not in choice)
+        return QUANTITIES[units] + _bounds(number)
+    (choice,) = choices
+    if "prefixItems" in choice:
+        return "list of " + ", ".join(_value(schema, part) for part in choice["prefixItems"])
+    if "enum" in choice:
+        return ", ".join(f"`{value}`" for value in choice["enum"])
+    if "const" in choice:
+        return f"`{choice['const']}`"
+    if choice.get("type") == "array":
+        return f"list of {_value(schema, choice['items'])}"
+    if "discriminator" in choice:
+        return "mapping with `type`: " + ", ".join(f"`{kind}`" for kind in choice["discriminator"]["mapping"])
+    if "additionalProperties" in choice and isinstance(choice["additionalProperties"], Mapping):
+        return f"mapping of name to {_value(schema, choice['additionalProperties'])}"
+    words = {"string": "text", "integer": "whole number", "number": "number", "boolean": "`true`, `false`"}
+    kind = choice.get("type", "object")
+    if isinstance(kind, list):
+        return "text, number or boolean"
+    return words.get(kind, "mapping") + _bounds(choice)
+
+
+def _bounds(choice: Mapping[str, Any]) -> str:
+    """Return the limits of a number as a suffix."""
+    texts = {"gt": "> {}", "exclusiveMinimum": "> {}", "ge": "≥ {}", "minimum": "≥ {}", "le": "≤ {}"}
+    texts["maximum"] = "≤ {}"
+    found = [text.format(f"{choice[key]:g}") for key, text in texts.items() if key in choice]
+    return f" {', '.join(found)}" if found else ""
+
+
+def _unit(pattern: str) -> str:
+    """Return the first unit of a pattern: SI."""
+    match = re.search(r"\\s\*\(([^|)]+)", pattern)
+    assert match is not None, pattern
+    return match[1].replace("\\", "")
+
+
+def _default(item: Mapping[str, Any]) -> str:
+    default = item.get("default")
+    if default in (None, [], {}, "") or isinstance(default, dict):
+        return "–"
+    return f"`{str(default).lower() if isinstance(default, bool) else _plain(default)}`"
+
+
+def _plain(default: Any) -> str:
+    return f"{default:.6g}" if isinstance(default, float) else str(default)
+
+
+def _described(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
+    for _, name in _references(item):
+        return str(schema["$defs"][name].get("description", ""))
+    return ""
+
+
+def _flow(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+PARAMETERS: Mapping[str, type[Any]] = {
+    "/amcl": AmclConfig,
+    "/planner_server": PlannerConfig,
+    "/controller_server, regulated pure pursuit": RegulatedPurePursuitConfig,
+    "/controller_server, goal checker": GoalCheckerConfig,
+    "/controller_server, progress checker": ProgressCheckerConfig,
+    "/behavior_server": BehaviorConfig,
+    "/bt_navigator": BtNavigatorConfig,
+    "/docking_server": DockingConfig,
+}
+
+
+def stack() -> tuple[str, str]:
+    """Return the tables of nodes and of parameters, as the warehouse scenario builds them."""
+    parts = build(load(DOCS.parent / "scenarios" / "warehouse.yaml"))
+    try:
+        return _nodes(parts.bus), _parameters()
+    finally:
+        parts.bus.close()
+
+
+def _nodes(bus: Bus) -> str:
+    lines = ["| Node | Publishes | Subscribes | Serves | Calls |", "|---|---|---|---|---|"]
+    for node in bus.nodes:
+        cells = []
+        for kind in (Publisher, Subscription):
+            topics = [endpoint.name for endpoint in node._endpoints if type(endpoint) is kind]
+            cells.append(_names(name for name in topics if "/_action/" not in name and name != "/rosout"))
+        cells += [
+            _names(endpoint.name for endpoint in node._endpoints if type(endpoint) is kind)
+            for kind in (Service, Client)
+        ]
+        lines.append(f"| `{node.fully_qualified_name}` | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _names(names: Iterator[str]) -> str:
+    """Return names as a cell; the five endpoints of an action are one name."""
+    found = dict.fromkeys(
+        f"`{name.partition('/_action/')[0]}`" + (" (action)" if "/_action/" in name else "") for name in names
+    )
+    return ", ".join(found)
+
+
+def _parameters() -> str:
+    gc.collect()
+    alive = gc.get_objects()
+    lines = []
+    for title, kind in PARAMETERS.items():
+        (config,) = [item for item in alive if type(item) is kind]
+        lines += _table(title, config, skip=())
+    costmaps = {item.name: item.layers for item in alive if type(item) is CostmapNodeConfig}
+    for name, layers in sorted(costmaps.items()):
+        lines += _table(f"/{name}/{name}", layers, skip=("footprint", "robot_radius"))
+    return "\n".join(lines)
+
+
+def _table(title: str, config: Any, skip: tuple[str, ...]) -> list[str]:
+    lines = [f"### `{title}`", "", "| Parameter | Value | Meaning |", "|---|---|---|"]
+    meanings = _field_docs(type(config))
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if field.name not in skip and isinstance(value, bool | int | float | str):
+            meaning = _flow(meanings.get(field.name, ""))
+            text = str(value).lower() if isinstance(value, bool) else _plain(value)
+            if field.name.endswith("_ns"):
+                text = f"{float(value) / 1e6:g} ms"
+            lines.append(f"| `{field.name}` | {text} | {meaning} |")
+    return [*lines, ""]
+
+
+def _field_docs(kind: type[Any]) -> dict[str, str]:
+    """Return the string below each field of a dataclass."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    assert isinstance(body, ast.ClassDef)
+    found = {}
+    for item, following in zip(body.body, body.body[1:], strict=False):
+        if isinstance(item, ast.AnnAssign) and isinstance(following, ast.Expr):
+            assert isinstance(item.target, ast.Name)
+            found[item.target.id] = str(ast.literal_eval(following.value))
+    return found
+
+
+def updated(page: str, name: str, content: str) -> str:
+    """Return a page with the part between the two marks of `name` replaced."""
+    begin, end = BEGIN.format(name=name), END.format(name=name)
+    head, found, rest = page.partition(begin)
+    _, closed, tail = rest.partition(end)
+    assert found, f"the page has no mark {begin!r}"
+    assert closed, f"the page has no mark {end!r}"
+    return f"{head}{begin}\n{content}\n{end}{tail}"
+
+
+def pages() -> dict[Path, str]:
+    """Return the pages as they should be."""
+    scenarios, arenas, navigation = (DOCS / f"{name}.md" for name in ("scenarios", "arenas", "navigation"))
+    nodes, parameters = stack()
+    text = updated(navigation.read_text("utf-8"), "nodes", nodes)
+    return {
+        navigation: updated(text, "parameters", parameters),
+        scenarios: updated(scenarios.read_text("utf-8"), "scenario keys", tables(json_schema(), {})),
+        arenas: updated(
+            arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)
+        ),
+    }
+
+
+def main() -> int:
+    """Write the pages, or with --check only compare them."""
+    stale = [path for path, text in pages().items() if path.read_text("utf-8") != text]
+    if "--check" in sys.argv[1:]:
+        sys.stderr.writelines(f"{path}: not up to date, run python docs/reference.py\n" for path in stale)
+        return 1 if stale else 0
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,222 @@
+"""What holds for the whole repository: layers, light imports, no machine paths, few readers of the clock."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "twin").rglob("*.py"))
+
+HEAVY = (
+    "mujoco",
+    "zenoh",
+    "rerun",
+    "numpy",
+    "scipy",
+    "numba",
+    "pydantic",
+    "rosbags",
+    "yourdfpy",
+    "xacro",
+    "py_trees",
+)
+
+WALL_CLOCK = {
+    "twin/runtime/run.py": {"perf_counter", "process_time", "sleep"},  # pacing, and how long the run took
+    "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
+    "twin/cli/folders.py": {"now"},  # the name of a run's folder
+}
+"""Where the wall clock may be read, and by which function."""
+
+CLOCKS = {
+    "time": {
+        "time",
+        "time_ns",
+        "sleep",
+        "perf_counter",
+        "perf_counter_ns",
+        "monotonic",
+        "monotonic_ns",
+        "process_time",
+    },
+    "datetime": {"now", "utcnow", "today"},
+}
+
+
+def tracked() -> list[Path]:
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    done = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [path for name in done.stdout.split("\0") if name and (path := ROOT / name).is_file()]
+
+
+def texts() -> Iterator[tuple[str, str]]:
+    """Yield path and text of every tracked text file but this one."""
+    for path in tracked():
+        if path == Path(__file__) or path.suffix in (".png", ".pgm"):
+            continue
+        yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
+
+
+MACHINE_PATH = re.compile(r"(?<![\w.>})/-])/(home|root|work|tmp|opt|Users|mnt|workspace)/\w")
+ADDRESS = re.compile(r"(--index-url|--extra-index-url|--find-links|/simple\b|pypi\.|git\+)", re.IGNORECASE)
+
+
+def test_no_file_knows_the_machine_it_was_written_on() -> None:
+    found = [f"{name}: {match[0]}" for name, text in texts() for match in MACHINE_PATH.finditer(text)]
+    assert found == []
+
+
+def test_no_file_names_a_package_registry() -> None:
+    found = [f"{name}: {match[0]}" for name, text in texts() for match in ADDRESS.finditer(text)]
+    assert [item for item in found if not item.startswith("tests/")] == []
+
+
+def test_layers_hold() -> None:
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("statement", ["import twin", "import twin.cli; twin.cli.main()"])
+def test_a_light_start(statement: str) -> None:
+    code = (
+        "import sys; sys.argv = ['twin', '--help']\n"
+        f"try: {statement}\n"
+        "except SystemExit: pass\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def clocks_read(tree: ast.AST) -> set[str]:
+    """Return the functions of `time` and `datetime` that a module calls, whatever they are imported as."""
+    names: dict[str, str] = {}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.asname or alias.name: alias.name for alias in node.names if alias.name in CLOCKS}
+        if isinstance(node, ast.ImportFrom) and node.module in CLOCKS:
+            found |= {alias.name for alias in node.names if alias.name in CLOCKS[node.module]}
+            names |= {alias.asname or alias.name: node.module for alias in node.names}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            owner = node.value
+            while isinstance(owner, ast.Attribute):
+                owner = owner.value
+            module = names.get(owner.id) if isinstance(owner, ast.Name) else None
+            if module is not None and node.attr in CLOCKS[module]:
+                found.add(node.attr)
+    return found
+
+
+def test_the_wall_clock_is_read_in_few_places() -> None:
+    found = {}
+    for path in SOURCES:
+        clocks = clocks_read(ast.parse(path.read_text("utf-8")))
+        if clocks:
+            found[path.relative_to(ROOT).as_posix()] = clocks
+    assert found == WALL_CLOCK
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("import time\ntime.sleep(1)", {"sleep"}),
+        ("import time as t\nt.time()", {"time"}),
+        ("from time import monotonic as m", {"monotonic"}),
+        ("from datetime import datetime\ndatetime.now()", {"now"}),
+        ("import datetime\ndatetime.datetime.now()", {"now"}),
+        ("world.time()\nnode.now_ns", set()),
+    ],
+)
+def test_the_search_for_clocks_finds_them(code: str, expected: set[str]) -> None:
+    assert clocks_read(ast.parse(code)) == expected
+
+
+def test_only_the_command_line_prints() -> None:
+    prints = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in SOURCES
+        if not path.is_relative_to(ROOT / "twin" / "cli")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+    ]
+    assert prints == []
+
+
+def test_no_global_random_state() -> None:
+    """Numbers come from seeded generators: no `random`, none of numpy's functions with hidden state."""
+    allowed = {"Philox", "Generator", "SeedSequence", "BitGenerator"}
+    found = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            where = f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
+            if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
+                found.append(where)
+            if isinstance(node, ast.Attribute) and ast.unparse(node).startswith(
+                ("np.random.", "numpy.random.")
+            ):
+                found += [] if node.attr in allowed else [where]
+    assert found == []
+
+
+def pins() -> dict[str, str]:
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    return {canonicalize_name(name): version for name, _, version in (line.partition("==") for line in lines)}
+
+
+def test_constraints_are_pins_and_nothing_else() -> None:
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    assert [line for line in lines if not re.fullmatch(r"[\w.\-]+==[\w.!+\-]+", line)] == []
+    assert lines == sorted(lines, key=lambda line: line.partition("==")[0].lower())
+
+
+def needed() -> Iterator[str]:
+    """Yield everything that `pip install .[dev]` installs, as far as it is installed here."""
+    todo = [("twin", frozenset({"", "dev"}))]
+    seen: set[tuple[str, frozenset[str]]] = set()
+    while todo:
+        name, extras = todo.pop()
+        if (name, extras) in seen:
+            continue
+        seen.add((name, extras))
+        try:
+            requirements = metadata.requires(name) or ()
+        except metadata.PackageNotFoundError:
+            continue
+        if name != "twin":
+            yield name
+        for text in requirements:
+            requirement = Requirement(text)
+            marker = requirement.marker
+            if marker is None or any(marker.evaluate({"extra": extra}) for extra in extras):
+                todo.append((canonicalize_name(requirement.name), frozenset({"", *requirement.extras})))
+
+
+def test_constraints_pin_every_package_of_the_project() -> None:
+    assert sorted(set(needed()) - set(pins())) == []
+    assert {"mujoco", "numpy", "eclipse-zenoh", "rerun-sdk", "pytest"} <= set(pins())
+
+
+def test_data_files_of_the_package_ship_in_the_wheel() -> None:
+    """Every kind of file in the package is named in pyproject's package-data."""
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    kinds = {path.suffix for path in tracked() if path.is_relative_to(ROOT / "twin")} - {".py"}
+    assert [kind for kind in sorted(kinds) if f"*{kind}" not in text and f"py{kind}" not in text] == []
