@@ -14,6 +14,7 @@ from twin.bridge.actions import ActionClient
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import GoalStatus, LaserScan, Point, PoseStamped, duration, new
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.srvs import SetBool
 from twin.bridge.types import ActionType
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.layered_costmap import CostmapConfig
@@ -237,6 +238,10 @@ class Palm:
         self._publisher = bench.node.create_publisher(LaserScan, "palm_scan", SENSOR_DATA)
         self.angles = np.radians(np.arange(-45.0, 45.25, 0.5))
         bench.run(0.2)
+        self.enable(True)
+
+    def enable(self, on: bool) -> None:
+        assert self.bench.call(SetBool, "tote_detector/enable", SetBool.Request(data=on)).success
 
     def look(self, segments: np.ndarray, noise: float = 0.0) -> list[PoseStamped]:
         """Scan and return what was detected."""
@@ -284,6 +289,13 @@ def test_a_tote_is_found_where_it_stands(palm: Palm, pose: Pose2) -> None:
 )
 def test_other_things_are_no_tote(palm: Palm, segments: np.ndarray) -> None:
     assert palm.look(segments) == []
+
+
+def test_it_looks_only_while_it_is_asked_to(palm: Palm) -> None:
+    palm.enable(False)
+    assert palm.look(tote(Pose2(0.7, 0.0, 0.0))) == []
+    palm.enable(True)
+    assert len(palm.look(tote(Pose2(0.7, 0.0, 0.0)))) == 1
 
 
 def test_of_two_totes_the_one_straight_ahead_counts(palm: Palm) -> None:

@@ -1,0 +1,251 @@
+"""The mission's tree, with servers that answer as the test says: order, retries, and reasons to give up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from twin.bridge.action_types import (
+    DockRobot,
+    FollowJointTrajectory,
+    GripperCommand,
+    NavigateToPose,
+    UndockRobot,
+)
+from twin.bridge.actions import ActionServer, GoalHandle
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import JointState, PoseStamped, String, header, new
+from twin.bridge.srvs import SetBool
+from twin.bridge.types import ActionType
+from twin.geometry import Pose2
+from twin.manipulation.telescopic_arm import GraspPose
+from twin.models import load
+from twin.nodes.messages import pose_stamped
+from twin.nodes.robot_pose import Frames
+from twin.runtime import derive
+from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask, Station
+
+SHELF = Station(name="shelf", face=Pose2(5.0, 2.0, np.pi / 2), surface_z=0.8)
+TABLE = Station(name="table", face=Pose2(8.0, 0.0, 0.0), surface_z=0.4)
+TOTE_IN_BASE = Pose2(0.6, 0.02, 0.05)
+TASK = {"tote_width": 0.24, "tote_depth": 0.30, "tote_height": 0.18, "pick": SHELF, "place": TABLE}
+
+Answer = Callable[[GoalHandle], Any]
+
+
+class Robot:
+    """Servers for everything the mission asks of a robot; each action ends after a tick, as `answers` say."""
+
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self.bus, self.clock = bus, clock
+        description = load("warehouse_bot")
+        manipulator = derive.manipulator(description)
+        assert manipulator is not None
+        self.manipulator = manipulator
+        self.positions = dict.fromkeys((*manipulator.arm_joints, manipulator.gripper_joint), 0.0)
+        self.sees_tote = True
+        self.grips = True
+        self.log: list[str] = []
+        self.at_closing: list[GraspPose] = []
+        self.failures: dict[str, list[str]] = {}
+        """Action -> reasons with which its next goals fail."""
+        self.node = bus.create_node("robot")
+        self._serve("navigate_to_pose", NavigateToPose, self._navigate)
+        self._serve("dock_robot", DockRobot, lambda goal: f"dock {goal.dock_type}")
+        self._serve("undock_robot", UndockRobot, lambda goal: f"undock {goal.dock_type}")
+        self._serve("arm_controller/follow_joint_trajectory", FollowJointTrajectory, self._move)
+        self._serve("gripper_controller/gripper_cmd", GripperCommand, self._grip)
+        self.node.create_service(SetBool, "tote_detector/enable", self._enable)
+        self._detecting = False
+        self._joints = self.node.create_publisher(JointState, "joint_states", 1)
+        self._tote = self.node.create_publisher(PoseStamped, "tote_pose", 1)
+        self.states: list[str] = []
+        bus.create_node("watcher").create_subscription(
+            String, "mission/state", lambda message: self.states.append(message.data)
+        )
+
+    def run(self, tasks: list[PickAndPlaceTask] | None = None, seconds: float = 120.0) -> PickAndPlaceNode:
+        """Run a mission to its end."""
+        mission = PickAndPlaceNode(
+            self.bus,
+            tasks or [PickAndPlaceTask(tote="tote_a", **TASK)],
+            self.manipulator.arm,
+            gripper_joint=self.manipulator.gripper_joint,
+            gripper_open=self.manipulator.gripper_open,
+            frames=Frames(),
+        )
+        while not mission.done:
+            assert self.clock.now_ns < seconds * 1e9, f"no end; it is at {mission.state!r}"
+            self.clock.now_ns += 20_000_000
+            names = list(self.positions)
+            zeros, values = np.zeros(len(names)), np.array(list(self.positions.values()))
+            self._joints.publish(
+                JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=zeros)
+            )
+            if self.sees_tote and self._detecting and self.clock.now_ns % 100_000_000 == 0:
+                self._tote.publish(pose_stamped(TOTE_IN_BASE, "base_footprint", self.clock.now_ns))
+            self.bus.spin()
+        self.bus.spin()  # the last words arrive
+        return mission
+
+    def _serve(self, name: str, action: ActionType, perform: Callable[[Any], Any]) -> None:
+        def execute(handle: GoalHandle) -> Generator[None, None, Any]:
+            yield
+            if self.failures.get(name):
+                handle.abort()
+                key = "error_string" if action is FollowJointTrajectory else "error_msg"
+                return new(action.Result, **{key: self.failures[name].pop(0)})
+            done = perform(handle.request)
+            if not isinstance(done, str):
+                return done
+            self.log.append(done)
+            return new(action.Result)
+
+        ActionServer(self.node, action, name, execute)
+
+    def _enable(self, request: Any) -> Any:
+        self._detecting = request.data
+        return new(SetBool.Response, success=True)
+
+    def _navigate(self, goal: Any) -> str:
+        pose = pose2_from_pose(goal.pose.pose)
+        return f"go {pose.x:.2f} {pose.y:.2f} {pose.yaw:.2f}"
+
+    def _move(self, goal: Any) -> str:
+        target = dict(zip(goal.trajectory.joint_names, goal.trajectory.points[-1].positions, strict=True))
+        self.positions |= {name: float(value) for name, value in target.items()}
+        return "move"
+
+    def _grip(self, goal: Any) -> Any:
+        wanted = float(goal.command.position)
+        closing = wanted == 0.0
+        if closing:
+            self.at_closing.append(self.grasp)
+        holds = closing and self.grips
+        position = 0.12 if holds else wanted
+        self.positions[self.manipulator.gripper_joint] = position
+        self.log.append("close" if closing else "open")
+        return new(GripperCommand.Result, position=position, stalled=holds, reached_goal=not holds)
+
+    @property
+    def grasp(self) -> GraspPose:
+        """Where the gripper is now."""
+        return self.manipulator.arm.forward(self.positions)[0]
+
+
+@pytest.fixture
+def robot() -> Iterator[Robot]:
+    clock = Clock()
+    with Bus.open(clock) as bus:
+        yield Robot(bus, clock)
+
+
+def steps(robot: Robot) -> list[str]:
+    return [entry for entry in robot.log if entry != "move"]
+
+
+def test_one_tote_is_fetched_and_set_down(robot: Robot) -> None:
+    mission = robot.run()
+    assert mission.succeeded
+    assert mission.reason == ""
+    assert steps(robot) == [
+        "go 5.00 0.90 1.57",  # the staging pose 1.1 m before the shelf's face, looking at it
+        "open",
+        "dock tote",
+        "close",
+        "undock shelf",
+        "go 6.90 0.00 0.00",
+        "dock table",
+        "open",
+        "undock table",
+    ]
+    assert robot.states[-1] == "done"
+    words = ["drive to shelf", "dock at shelf", "look", "reach", "grasp", "retract", "back off",
+             "carry to table", "dock at table", "set down", "release", "back off"]  # fmt: skip
+    assert robot.states[:-1] == [f"tote_a: {word}" for word in words]
+
+
+def test_it_reaches_for_where_the_tote_is_seen_not_for_where_the_plan_says(robot: Robot) -> None:
+    robot.run()
+    centre = TOTE_IN_BASE @ Pose2(0.15, 0.0, 0.0)
+    at = robot.at_closing[0]
+    assert at.x == pytest.approx(centre.x, abs=0.02)
+    assert at.z == pytest.approx(0.8 + 0.09), "the middle of the tote's height"
+    assert at.yaw == pytest.approx(TOTE_IN_BASE.yaw)
+
+
+def test_two_totes_come_one_after_the_other(robot: Robot) -> None:
+    tasks = [PickAndPlaceTask(tote=name, **TASK) for name in ("tote_a", "tote_b")]
+    assert robot.run(tasks).succeeded
+    assert steps(robot).count("close") == 2
+    first_b = next(i for i, state in enumerate(robot.states) if state.startswith("tote_b"))
+    assert all(state.startswith("tote_a") for state in robot.states[:first_b])
+
+
+def test_a_gripper_closed_on_nothing_tries_again_and_then_gives_up(robot: Robot) -> None:
+    robot.grips = False
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert steps(robot).count("close") == 3
+    assert "closed on nothing of 0.24 m width: finger at 0.000 m" in mission.reason
+    assert "tote_a: grasp" in mission.reason
+    assert "go 6.90 0.00 0.00" not in robot.log, "nothing is carried away"
+    assert robot.states[-1] == "failed"
+
+
+def test_between_two_attempts_it_lets_go_and_backs_off(robot: Robot) -> None:
+    robot.failures["dock_robot"] = ["no tote in sight"]
+    assert robot.run().succeeded
+    at = steps(robot)
+    assert at[1:6] == ["open", "open", "undock shelf", "open", "dock tote"]
+
+
+def test_without_a_tote_in_sight_it_does_not_reach(robot: Robot) -> None:
+    robot.sees_tote = False
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert "close" not in robot.log
+    assert not any(state.endswith("reach") for state in robot.states)
+
+
+def test_a_tote_lost_on_the_way_is_noticed(robot: Robot) -> None:
+    def lose() -> None:
+        if robot.states and robot.states[-1] == "tote_a: carry to table":
+            robot.positions[robot.manipulator.gripper_joint] = 0.0
+
+    robot.node.create_timer(20_000_000, lose)
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert "lost tote_a: finger at 0.000 m instead of 0.120 m" in mission.reason
+    assert "dock table" not in robot.log
+
+
+def test_navigation_that_fails_ends_the_mission_with_its_reason(robot: Robot) -> None:
+    robot.failures["navigate_to_pose"] = ["no path from (0.00, 0.00) to (5.00, 0.90)"]
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert mission.reason == (
+        "tote_a: drive to shelf: NavigateTo[shelf]: no path from (0.00, 0.00) to (5.00, 0.90)"
+    )
+
+
+def test_an_arm_that_is_blocked_is_named(robot: Robot) -> None:
+    reason = "'lift_joint' is +0.2000 away from its goal, 0.005 is allowed"
+    robot.failures["arm_controller/follow_joint_trajectory"] = [reason]
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert reason in mission.reason
+
+
+def test_a_tote_out_of_reach_is_said_before_anything_is_grasped(robot: Robot) -> None:
+    high = Station(name="roof", face=SHELF.face, surface_z=3.0)
+    task = PickAndPlaceTask(tote="tote_a", **{**TASK, "pick": high})
+    mission = robot.run([task])
+    assert mission.succeeded is False
+    assert "cannot reach" in mission.reason
+    assert "close" not in robot.log
