@@ -28,7 +28,8 @@ from twin.models import load
 from twin.nodes.messages import pose_stamped
 from twin.nodes.robot_pose import Frames
 from twin.runtime import derive
-from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask, Station
+from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+from twin.warehouse.skills import Station
 
 SHELF = Station(name="shelf", face=Pose2(5.0, 2.0, np.pi / 2), surface_z=0.8)
 TABLE = Station(name="table", face=Pose2(8.0, 0.0, 0.0), surface_z=0.4)

@@ -25,7 +25,8 @@ from twin.scenario.missions import (
     VelocityProfile,
 )
 from twin.warehouse.arena import Arena
-from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask, Station
+from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+from twin.warehouse.skills import Station
 
 
 class MissionHandle(Protocol):

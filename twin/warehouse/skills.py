@@ -1,0 +1,291 @@
+"""What a mobile manipulator can do, as leaves of a behaviour tree: drive, dock, look, reach, grasp, release.
+
+Every leaf is an action or service of the robot's nodes, or a look at what its sensors publish.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from twin.bridge.action_types import (
+    DockRobot,
+    FollowJointTrajectory,
+    GripperCommand,
+    NavigateToPose,
+    UndockRobot,
+)
+from twin.bridge.actions import ActionClient
+from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import (
+    GripperCommandMsg,
+    JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
+    PoseStamped,
+    duration,
+    header,
+    new,
+)
+from twin.bridge.srvs import SetBool
+from twin.geometry import Pose2
+from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
+from twin.manipulation.trajectory import plan_joint_move
+from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
+from twin.nodes.messages import pose_stamped
+from twin.nodes.mission_nodes import MissionNode
+from twin.nodes.robot_pose import Frames
+
+
+@dataclass(frozen=True, kw_only=True)
+class Station:
+    """A place to dock at: the front face of a shelf slot or of a table, as the warehouse's plan gives it."""
+
+    name: str
+    face: Pose2
+    """Point on the front face in `map`; its x axis points into the shelf, as a docked robot looks."""
+    surface_z: float
+    """Height of the surface that goods stand on [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkillsConfig:
+    """How gently, and how sure, the robot handles goods."""
+
+    staging_distance: float = 1.1
+    """From the face to the base's origin before docking [m]."""
+    gripper_effort: float = 160.0
+    """[N]"""
+    grip_tolerance: float = 0.012
+    """Largest deviation of the finger from half the good's width for a grip [m]."""
+    loaded_speed: float = 0.5
+    """Fraction of the arm's speed while it carries something."""
+    samples: int = 5
+    """Detections of a tote that are averaged before reaching."""
+    look_timeout_ns: int = 3_000_000_000
+    """For these detections [ns]."""
+
+
+class MobileManipulationNode(MissionNode):
+    """`/mission` of a robot with navigation, docking, a telescopic arm and a gripper."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        arm: TelescopicArm,
+        *,
+        gripper_joint: str,
+        gripper_open: float,
+        frames: Frames,
+        skills: SkillsConfig | None = None,
+        namespace: str = "",
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        self.skills = skills or SkillsConfig()
+        self._arm = arm
+        self._gripper_joint = gripper_joint
+        self._gripper_open = gripper_open
+        self._frames = frames
+        self._totes: list[Pose2] = []
+        self._joints: dict[str, float] = {}
+        node = self.node
+        self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
+        self._dock = ActionClient(node, DockRobot, "dock_robot")
+        self._undock = ActionClient(node, UndockRobot, "undock_robot")
+        self._trajectory = ActionClient(node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory")
+        self._gripper = ActionClient(node, GripperCommand, "gripper_controller/gripper_cmd")
+        self._detector = node.create_client(SetBool, "tote_detector/enable")
+        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+        node.create_subscription(PoseStamped, "tote_pose", self._on_tote_pose, self.skills.samples)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        self._joints = dict(zip(message.name, message.position.tolist(), strict=True))
+
+    def _on_tote_pose(self, message: PoseStamped) -> None:
+        self._totes.append(pose2_from_pose(message.pose))
+        del self._totes[: -self.skills.samples]
+
+    # Driving
+
+    def report(self, state: str) -> Behaviour:
+        """Go on to a state of the mission."""
+        return Do(f"State[{state}]", lambda: self.enter(state))
+
+    def drive_to(self, station: Station) -> Behaviour:
+        """Navigate to the staging pose before a station."""
+        staging = station.face @ Pose2(-self.skills.staging_distance, 0.0, 0.0)
+        return CallAction(
+            f"NavigateTo[{station.name}]",
+            self._navigate,
+            lambda: new(NavigateToPose.Goal, pose=pose_stamped(staging, self._frames.map, self.node.now_ns)),
+            on_failure=self.note,
+        )
+
+    def dock_at(self, station: Station, dock_type: str) -> Behaviour:
+        """Dock at a station; `tote` centres the robot on the tote there, `table` on the plan's point."""
+        return CallAction(
+            f"Dock[{station.name}]",
+            self._dock,
+            lambda: new(
+                DockRobot.Goal,
+                use_dock_id=False,
+                dock_pose=pose_stamped(station.face, self._frames.map, self.node.now_ns),
+                dock_type=dock_type,
+                navigate_to_staging_pose=False,
+            ),
+            on_failure=self.note,
+        )
+
+    def undock_from(self, dock_type: str) -> Behaviour:
+        """Back off to the staging distance."""
+        goal = new(UndockRobot.Goal, dock_type=dock_type)
+        return CallAction("Undock", self._undock, lambda: goal, on_failure=self.note)
+
+    # Looking
+
+    def start_looking(self) -> Behaviour:
+        """Switch the detection of totes on."""
+        return self._detect("StartLooking", True)
+
+    def stop_looking(self) -> Behaviour:
+        """Switch the detection of totes off."""
+        return self._detect("StopLooking", False)
+
+    def _detect(self, name: str, enabled: bool) -> Behaviour:
+        return CallService(name, self._detector, lambda: SetBool.Request(data=enabled))
+
+    def look(self) -> Behaviour:
+        """Wait for fresh detections of the tote ahead."""
+        return _Look(self)
+
+    # The arm
+
+    def move_to_height(self, name: str, z: float, *, loaded: bool = False) -> Behaviour:
+        """Bring the grasp frame to height z [m]."""
+        config = self._arm.config
+        return self.move(name, lambda: {config.lift_joint: z - config.grasp_z}, loaded=loaded)
+
+    def retract(self, *, loaded: bool = False) -> Behaviour:
+        """Bring the gripper back over the deck."""
+        config = self._arm.config
+        target = {config.extension_joint: 0.0, config.wrist_joint: 0.0}
+        return self.move("Retract", lambda: target, loaded=loaded)
+
+    def stow(self, z: float) -> Behaviour:
+        """Retract the arm and bring the grasp frame to height z [m]."""
+        config = self._arm.config
+        target = {config.extension_joint: 0.0, config.wrist_joint: 0.0, config.lift_joint: z - config.grasp_z}
+        return self.move("Stow", lambda: target)
+
+    def reach(self, name: str, x: float, z: float, *, loaded: bool = False) -> Behaviour:
+        """Bring the grasp frame to x, z [m] in the base frame, straight ahead."""
+        return self.move(name, lambda: self._arm.inverse(GraspPose(x=x, z=z)), loaded=loaded)
+
+    def reach_for_tote(self, z: float, depth: float) -> Behaviour:
+        """Bring the grasp frame to the middle, `depth` / 2 [m] behind the face, of the tote that was seen."""
+
+        def target() -> dict[str, float]:
+            x, _, yaw = np.mean(self._totes, axis=0)
+            return self._arm.inverse(GraspPose(x=float(x) + depth / 2.0, z=z, yaw=float(yaw)))
+
+        return self.move("ReachForTote", target)
+
+    def move(self, name: str, target: Callable[[], dict[str, float]], *, loaded: bool = False) -> Behaviour:
+        """Move joints to `target()`; fails, saying why, where a joint cannot."""
+
+        def goal() -> Any | None:
+            try:
+                return self._trajectory_goal(target(), self.skills.loaded_speed if loaded else 1.0)
+            except ValueError as error:
+                self.note(str(error))
+                return None
+
+        return CallAction(name, self._trajectory, goal, on_failure=self.note)
+
+    def _trajectory_goal(self, target: dict[str, float], speed: float) -> Any:
+        trajectory = plan_joint_move(self._joints, target, self._arm.limits, speed=speed)
+        way = zip(trajectory.times, trajectory.positions, trajectory.velocities, strict=True)
+        points = [
+            new(
+                JointTrajectoryPoint,
+                positions=positions,
+                velocities=velocities,
+                time_from_start=duration(int(time * 1e9)),
+            )
+            for time, positions, velocities in way
+        ]
+        names = list(trajectory.joint_names)
+        message = JointTrajectory(header=header(self.node.now_ns, ""), joint_names=names, points=points)
+        return new(FollowJointTrajectory.Goal, trajectory=message)
+
+    # The gripper
+
+    def open_gripper(self) -> Behaviour:
+        """Open the fingers fully."""
+        return CallAction(
+            "OpenGripper",
+            self._gripper,
+            lambda: self._gripper_goal(self._gripper_open),
+            on_failure=self.note,
+        )
+
+    def close_on(self, width: float) -> Behaviour:
+        """Close the fingers; fails unless they stall on something of this width [m]."""
+
+        def judge(result: Any) -> str | None:
+            if result.stalled and abs(result.position - width / 2.0) < self.skills.grip_tolerance:
+                return None
+            finger = f"finger at {result.position:.3f} m"
+            return f"gripper closed on nothing of {width:.2f} m width: {finger}"
+
+        return CallAction(
+            "CloseGripper",
+            self._gripper,
+            lambda: self._gripper_goal(0.0),
+            on_result=judge,
+            on_failure=self.note,
+        )
+
+    def holding(self, what: str, width: float) -> Behaviour:
+        """Succeeds while the fingers are held apart by something of this width [m]."""
+
+        def held() -> bool:
+            finger = self._joints.get(self._gripper_joint, 0.0)
+            if abs(finger - width / 2.0) < self.skills.grip_tolerance:
+                return True
+            self.note(f"lost {what}: finger at {finger:.3f} m instead of {width / 2.0:.3f} m")
+            return False
+
+        return Condition(f"Holding[{what}]", held)
+
+    def _gripper_goal(self, position: float) -> Any:
+        command = new(GripperCommandMsg, position=position, max_effort=self.skills.gripper_effort)
+        return new(GripperCommand.Goal, command=command)
+
+
+class _Look(Behaviour):
+    """Waits for detections made after it began."""
+
+    def __init__(self, robot: MobileManipulationNode) -> None:
+        super().__init__("Look")
+        self._robot = robot
+
+    def initialise(self) -> None:
+        """Forget what was seen on the way."""
+        self._robot._totes.clear()
+        self._deadline = self._robot.node.now_ns + self._robot.skills.look_timeout_ns
+
+    def update(self) -> Status:
+        """Count."""
+        if len(self._robot._totes) >= self._robot.skills.samples:
+            return Status.SUCCESS
+        if self._robot.node.now_ns < self._deadline:
+            return Status.RUNNING
+        self._robot.note("no tote in sight")
+        return Status.FAILURE
