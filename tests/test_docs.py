@@ -224,6 +224,12 @@ def test_every_scenario_key_is_documented() -> None:
     assert [key for key in sorted(keys) if f"| `{key}` |" not in text] == []
 
 
+def test_every_scenario_that_ships_is_listed() -> None:
+    text = PAGES["docs/scenarios.md"].read_text("utf-8")
+    files = [file.relative_to(ROOT).as_posix() for file in (ROOT / "scenarios").rglob("*.yaml")]
+    assert [file for file in sorted(files) if f"(../{file})" not in text] == []
+
+
 def test_every_check_says_what_it_means() -> None:
     meanings = PAGES["docs/scenarios.md"].read_text("utf-8").partition("## Checks")[2].partition("\n## ")[0]
     assert [check for check in CheckEntry.model_fields if f"\n| `{check}` |" not in meanings] == []
