@@ -221,6 +221,7 @@ class Robot:
         StaticTransformBroadcaster(bench.node).send_transform(static)
         self.localised = True
         self.stuck = False
+        self.blind = False
         self.commands: list[tuple[float, float]] = []
         bench.each_tick.append(self._tick)
 
@@ -239,7 +240,7 @@ class Robot:
         now = self.bench.clock.now_ns
         if self.localised:
             self._tf.send_transform(transform_stamped("map", "odom", now, Pose3.from_pose2(self.start)))
-        if now % 100_000_000 == 0:
+        if now % 100_000_000 == 0 and not self.blind:
             # Stamped a tick back, where odometry is known already.
             self._scan.publish(self.room.scan(self.pose @ self.T_base_lidar, now - TICK_NS))
 

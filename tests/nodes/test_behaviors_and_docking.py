@@ -158,12 +158,12 @@ class Dock:
         self.bench.run(0.5)
         return goal
 
-    def show_tote(self, y: float) -> None:
-        """Report, at every tick, a tote at lateral position `y` of the face."""
-        tote = Pose2(2.05, y, 0.0)
+    def show_tote(self, y: float, *, first_y: float | None = None) -> None:
+        """Report, at every tick, a tote at lateral position `y` of the face; at first at `first_y`."""
+        seen = [y if first_y is None else first_y]
 
         def report() -> None:
-            in_base = self.robot.pose.inverse() @ tote
+            in_base = self.robot.pose.inverse() @ Pose2(2.05, seen.pop() if seen else y, 0.0)
             self._tote.publish(pose_stamped(in_base, "base_footprint", self.bench.clock.now_ns))
 
         self.bench.each_tick.append(report)
@@ -185,6 +185,18 @@ def test_docking_at_a_tote_lines_up_with_it(bench: Bench) -> None:
     assert dock.dock("tote").result.success
     assert dock.robot.pose.y == pytest.approx(0.06, abs=0.015)
     assert dock.robot.pose.x == pytest.approx(1.45, abs=0.015)
+
+
+def test_a_wrong_first_sight_of_the_tote_is_corrected_on_the_way(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
+    goal = dock.dock_client.send_goal(
+        new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0), dock_type="tote")
+    )
+    bench.run(0.1)
+    dock.show_tote(0.0, first_y=0.12)
+    bench.until(lambda: goal.done, 60.0)
+    assert goal.result.success
+    assert dock.robot.pose.y == pytest.approx(0.0, abs=0.015)
 
 
 def test_a_tote_of_the_neighbouring_slot_is_not_the_one(bench: Bench) -> None:

@@ -166,9 +166,25 @@ def test_a_map_of_the_wrong_size_is_refused_with_both_extents(scenario: MakeScen
     assert "x -10 … 10, y -7 … 7 m" in message
 
 
-def test_a_map_a_little_larger_than_the_arena_is_fine(
-    scenario: MakeScenario, make_run: MakeRun, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("side", ["west", "east", "south", "north"])
+def test_a_map_that_lacks_one_side_is_refused(side: str, scenario: MakeScenario, tmp_path: Path) -> None:
+    whole = map_of_arena(arenas.load("warehouse"))
+    cut = round(3.0 / whole.resolution)
+    x, y = whole.origin[:2]
+    data, origin = {
+        "west": (whole.data[:, cut:], Pose2(x + 3.0, y, 0.0)),
+        "east": (whole.data[:, :-cut], whole.origin),
+        "south": (whole.data[cut:], Pose2(x, y + 3.0, 0.0)),
+        "north": (whole.data[:-cut], whole.origin),
+    }[side]
+    path = tmp_path / "cut.yaml"
+    OccupancyMap(data=data, resolution=whole.resolution, origin=origin).save(path)
+    text = NAVIGATE.replace("{type: amcl}", f"{{type: amcl, map: {path}}}")
+    with pytest.raises(MapError, match="covers"):
+        runtime.run(scenario(text.replace("GOAL", "{x: 0 m, y: 0 m}")), record=False)
+
+
+def test_a_map_of_the_arenas_size_is_taken(scenario: MakeScenario, make_run: MakeRun, tmp_path: Path) -> None:
     grid = map_of_arena(arenas.load("warehouse"))
     grid.save(tmp_path / "copy.yaml")
     text = NAVIGATE.replace("{type: amcl}", f"{{type: amcl, map: {tmp_path / 'copy.yaml'}}}")

@@ -51,6 +51,7 @@ class Robot:
         self.positions = dict.fromkeys((*manipulator.arm_joints, manipulator.gripper_joint), 0.0)
         self.sees_tote = True
         self.grips = True
+        self.stalls = True
         self.log: list[str] = []
         self.at_closing: list[GraspPose] = []
         self.failures: dict[str, list[str]] = {}
@@ -131,7 +132,9 @@ class Robot:
         position = 0.12 if holds else wanted
         self.positions[self.manipulator.gripper_joint] = position
         self.log.append("close" if closing else "open")
-        return new(GripperCommand.Result, position=position, stalled=holds, reached_goal=not holds)
+        return new(
+            GripperCommand.Result, position=position, stalled=holds and self.stalls, reached_goal=not holds
+        )
 
     @property
     def grasp(self) -> GraspPose:
@@ -197,6 +200,13 @@ def test_a_gripper_closed_on_nothing_tries_again_and_then_gives_up(robot: Robot)
     assert "tote_a: grasp" in mission.reason
     assert "go 6.90 0.00 0.00" not in robot.log, "nothing is carried away"
     assert robot.states[-1] == "failed"
+
+
+def test_fingers_that_stop_at_the_right_width_by_themselves_hold_nothing(robot: Robot) -> None:
+    robot.stalls = False
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert "closed on nothing" in mission.reason
 
 
 def test_between_two_attempts_it_lets_go_and_backs_off(robot: Robot) -> None:
