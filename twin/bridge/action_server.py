@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Execute = Callable[["GoalHandle"], Generator[None, None, Any]]
 """Executes a goal: each yield waits for the next spin, the return value is the result message."""
 
-_KEPT_GOALS = 32
+_KEPT_GOALS = 8
 _ACTIVE = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING)
 
 
