@@ -93,7 +93,7 @@ def save(picture: Image.Image, file: Path, colours: int = 256) -> None:
     picture.convert("RGB").quantize(colours, kmeans=1, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
-def screen(recording: Path, file: Path, *, time_s: float = 29.5, width: int = 1000) -> None:
+def screen(recording: Path, file: Path, *, time_s: float = 45.0, width: int = 1100) -> None:
     """Write the recording's first screen at a time, without the window's own bars."""
     with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder) / "screen.png"
