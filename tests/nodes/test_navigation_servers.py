@@ -114,6 +114,17 @@ def test_the_map_reaches_late_subscribers_and_callers(bench: Bench) -> None:
 # costmap
 
 
+def test_a_map_of_the_wrong_size_is_refused_and_said(bench: Bench, stack: Stack) -> None:
+    said = bench.logs()
+    before = stack.global_costmap.costmap
+    grid = MapServerNode(bench.bus, map_of_room(), namespace="/elsewhere").message
+    wrong = new(OccupancyGrid, header=grid.header, info=grid.info, data=grid.data[:-7])
+    bench.node.create_publisher(OccupancyGrid, "/map", LATCHED).publish(wrong)
+    bench.run(0.2)
+    assert any("map refused" in text and "values is none" in text for text in said)
+    assert stack.global_costmap.costmap is before, "the map it had stays"
+
+
 def test_an_obstacle_on_no_map_is_marked_and_cleared_again(bench: Bench, stack: Stack) -> None:
     walls = stack.room.segments
     assert stack.cost(-1.0, 0.0) == 0

@@ -14,7 +14,6 @@ from twin.errors import TwinError
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
-    from twin import runtime
     from twin.cli.log import show_warnings
     from twin.scenario import schema
     from twin.scenario.verdict import Verdict
@@ -24,6 +23,8 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     try:
         scenario = schema.load(options.scenario, options.overrides)
         name, seed = scenario.name, scenario.seed
+        from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
+
         folder = run_folder(name) if out is None else out
         folder.mkdir(parents=True, exist_ok=True)
         with run_progress(name) as progress:

@@ -22,6 +22,7 @@ from twin.bridge.msgs import (
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
+from twin.errors import MapError
 from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.amcl import Amcl, AmclConfig, Estimate
 from twin.nodes.diff_drive_controller import planar_covariance
@@ -92,7 +93,11 @@ class AmclNode:
         node.create_service(Empty, "reinitialize_global_localization", self._on_global)
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        self._filter = Amcl(self._filter_config, occupancy_map(message), self._seed)
+        try:
+            self._filter = Amcl(self._filter_config, occupancy_map(message), self._seed)
+        except MapError as error:
+            self.node.get_logger().error(f"map refused: {error}")
+            return
         if self._initial is not None:
             self._filter.initialise(self._initial.pose, self._initial.covariance)
 

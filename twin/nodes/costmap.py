@@ -13,6 +13,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import LaserScan, OccupancyGrid, new
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import ClearEntireCostmap
+from twin.errors import MapError
 from twin.geometry import Array, Pose2
 from twin.navigation.costmap import INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.layered_costmap import CostmapConfig, LayeredCostmap
@@ -87,7 +88,10 @@ class CostmapNode:
         return self._layers.costmap if self._layers else None
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
+        try:
+            self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
+        except MapError as error:
+            self.node.get_logger().error(f"map refused: {error}")
 
     def _on_scan(self, message: LaserScan) -> None:
         self._scan = message

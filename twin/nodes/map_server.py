@@ -10,6 +10,7 @@ from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
 from twin.bridge.msgs import MapMetaData, OccupancyGrid, header, stamp
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import GetMap
+from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.navigation.occupancy_map import OccupancyMap
 
@@ -30,8 +31,17 @@ def grid_msg(
 
 
 def occupancy_map(message: OccupancyGrid) -> OccupancyMap:
-    """Return a message as a map."""
+    """Return a message as a map.
+
+    Raises:
+        MapError: The data does not have the size that the message says.
+    """
     info = message.info
+    if len(message.data) != info.width * info.height or not info.resolution > 0.0:
+        raise MapError(
+            f"a map of {info.width} x {info.height} cells of {info.resolution:g} m with {len(message.data)} "
+            "values is none"
+        )
     return OccupancyMap(
         data=message.data.reshape(info.height, info.width),
         resolution=float(info.resolution),

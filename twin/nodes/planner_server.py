@@ -76,4 +76,4 @@ class PlannerServerNode:
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         costs = costmap.costs[rows[inside], columns[inside]]
         blocked = (costs >= INSCRIBED_INFLATED_OBSTACLE) & (costs != NO_INFORMATION)
-        return new(IsPathValid.Response, is_valid=not bool(blocked.any()))
+        return new(IsPathValid.Response, is_valid=bool(inside.all() and not blocked.any()))

@@ -88,7 +88,13 @@ class PickAndPlaceNode(MobileManipulationNode):
 
     def _task(self, task: PickAndPlaceTask) -> Behaviour:
         carry_z = self.config.carry_z
-        give_up = [self.open_gripper(), self.retract(), self.undock_from("shelf"), self.stow(carry_z)]
+        give_up = [
+            self.stop_looking(),
+            self.open_gripper(),
+            self.retract(),
+            self.undock_from("shelf"),
+            self.stow(carry_z),
+        ]
         pick = RecoveryNode(
             "PickWithRetries",
             self.config.pick_attempts - 1,
