@@ -20,6 +20,7 @@ from twin.bridge.cdr_packed import (
     encode_imu,
     encode_joint_state,
     encode_odometry,
+    read_text,
 )
 from twin.bridge.msgs import (
     Clock,
@@ -150,16 +151,6 @@ def _encode_tf(message: TFMessage) -> bytes:
     return b"".join(chunks)
 
 
-def _text(payload: bytes, at: int) -> tuple[str, int]:
-    """Read a string at `at` (payload offset incl. the 4-byte header); return it and where it ends."""
-    at += -at % 4
-    (length,) = _TEXT_LENGTH.unpack_from(payload, at)
-    end = at + 4 + length
-    if length == 0 or end > len(payload):
-        raise ValueError(f"a string of {length} bytes does not fit")
-    return payload[at + 4 : end - 1].decode(), end
-
-
 def _decode_tf(payload: bytes) -> TFMessage:
     if payload[:4] != LITTLE_ENDIAN:
         return general_codec(TFMessage).decode(payload)
@@ -169,8 +160,8 @@ def _decode_tf(payload: bytes) -> TFMessage:
     for _ in range(count):
         at += -at % 4
         sec, nanosec = _STAMP.unpack_from(payload, at)
-        frame, at = _text(payload, at + 8)
-        child, at = _text(payload, at)
+        frame, at = read_text(payload, at + 8)
+        child, at = read_text(payload, at)
         at += (4 - at) % 8  # the header's 4 bytes do not count for alignment
         x, y, z, qx, qy, qz, qw = _POSE.unpack_from(payload, at)
         at += _POSE.size
@@ -194,7 +185,7 @@ def _decode_poses(payload: bytes) -> PoseArray:
     if payload[:4] != LITTLE_ENDIAN:
         return general_codec(PoseArray).decode(payload)
     sec, nanosec = _STAMP.unpack_from(payload, 4)
-    frame, at = _text(payload, 12)
+    frame, at = read_text(payload, 12)
     at += -at % 4
     (n,) = _TEXT_LENGTH.unpack_from(payload, at)
     at += 4

@@ -155,7 +155,7 @@ _joint_names: dict[int, tuple[bytes, str, list[str]]] = {}
 
 
 def _read_names(payload: bytes) -> tuple[str, list[str], int]:
-    frame, at = _read_text(payload, 12)
+    frame, at = read_text(payload, 12)
     at += -at % 4
     (count,) = _U32.unpack_from(payload, at)
     at += 4
@@ -163,7 +163,7 @@ def _read_names(payload: bytes) -> tuple[str, list[str], int]:
         raise ValueError(f"{count} names do not fit")
     names = []
     for _ in range(count):
-        name, at = _read_text(payload, at)
+        name, at = read_text(payload, at)
         names.append(name)
     return frame, names, at
 
@@ -190,7 +190,7 @@ def _doubles(values: NDArray[np.float64], count: int) -> bytes:
     return raw
 
 
-def _read_text(payload: bytes, at: int) -> tuple[str, int]:
+def read_text(payload: bytes, at: int) -> tuple[str, int]:
     """Read a string at `at`; return it and where it ends."""
     at += -at % 4
     (length,) = _U32.unpack_from(payload, at)
@@ -204,6 +204,6 @@ def _read_head(payload: bytes, texts: int) -> tuple[Time, list[str], int]:
     """Read stamp and texts; return them and where the doubles start."""
     stamp, at, found = Time(*_STAMP.unpack_from(payload, 4)), 12, []
     for _ in range(texts):
-        text, at = _read_text(payload, at)
+        text, at = read_text(payload, at)
         found.append(text)
     return stamp, found, at + (4 - at) % 8

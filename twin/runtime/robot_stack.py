@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.controllers.limiter import AxisLimits
-from twin.controllers.twist_mux import MuxInput
-from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Pose2
 from twin.models.description import LidarSpec, RobotDescription
 from twin.navigation.amcl import AmclConfig
-from twin.navigation.goal_checker import GoalCheckerConfig
-from twin.navigation.layered_costmap import CostmapConfig
 from twin.navigation.occupancy_map import OccupancyMap
-from twin.navigation.planner import PlannerConfig
-from twin.navigation.progress_checker import ProgressCheckerConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.nodes.amcl import AmclNode, InitialPose
 from twin.nodes.behavior_server import BehaviorServerNode
 from twin.nodes.bt_navigator import BtNavigatorNode
-from twin.nodes.controller_server import ControllerServerConfig, ControllerServerNode
-from twin.nodes.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.controller_server import ControllerServerNode
+from twin.nodes.costmap import CostmapNode
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
 from twin.nodes.docking_server import DockingServerNode
 from twin.nodes.gripper_controller import GripperControllerNode
@@ -46,12 +36,11 @@ from twin.nodes.transforms import TransformListenerNode
 from twin.nodes.twist_mux import TwistMuxNode
 from twin.nodes.velocity_smoother import VelocitySmootherNode
 from twin.runtime import derive
-from twin.scenario.navigation import AmclLocalisation, NavigationConfig, ParameterGroup
+from twin.runtime.navigation_config import navigation_parameters, overridden
+from twin.scenario.navigation import NavigationConfig
 from twin.scenario.robots import RobotConfig
 from twin.sim.noise import NoiseStream
 from twin.sim.robot import RobotHandle
-
-C = TypeVar("C")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +130,7 @@ class RobotStack:
         AmclNode(
             context.bus,
             self.robot_pose,
-            _with(AmclConfig(), config.parameters.overrides()),
+            overridden(AmclConfig(), config.parameters.overrides()),
             InitialPose.from_error(guess, config.initial_pose_error.xy, config.initial_pose_error.yaw),
             seed=context.seed,
             namespace=context.namespace,
@@ -149,102 +138,30 @@ class RobotStack:
 
     def _build_navigation(self, config: NavigationConfig) -> None:
         context, namespace, bus = self._context, self._context.namespace, self._context.bus
-        drive = self.handle.description.drive
+        drive, pose = self.handle.description.drive, self.robot_pose
         assert drive is not None
-        polygon = tuple(map(tuple, self.footprint.tolist()))
-        linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
-        angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
-        TwistMuxNode(
-            bus,
-            inputs=(
-                MuxInput(name="navigation", topic="cmd_vel_smoothed", priority=10),
-                MuxInput(name="docking", topic="cmd_vel_docking", priority=20),
-                MuxInput(name="teleop", topic="cmd_vel_teleop", priority=100),
-            ),
-            namespace=namespace,
-        )
-        VelocitySmootherNode(
-            bus,
-            VelocitySmootherConfig(
-                linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-                angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
-            ),
-            period_ns=context.control_period_ns,
-            namespace=namespace,
-        )
-        layers = CostmapConfig(
-            footprint=polygon,
-            inflation_radius=0.8,
-            cost_scaling_factor=4.0,
-            obstacle_max_range=4.0,
-            raytrace_max_range=5.0,
-        )
-        global_costmap = CostmapNode(
-            bus,
-            self.robot_pose,
-            _costmap("global_costmap", self.frames.map, layers, config.global_costmap, 500_000_000),
-            namespace=namespace,
-        )
-        local_costmap = CostmapNode(
-            bus,
-            self.robot_pose,
-            _costmap(
-                "local_costmap",
-                self.frames.odom,
-                replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0),
-                config.local_costmap,
-                200_000_000,
-            ),
-            namespace=namespace,
-        )
-        PlannerServerNode(
-            bus,
-            self.robot_pose,
-            global_costmap,
-            config=_with(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
-            namespace=namespace,
-        )
-        controller = config.controller.overrides()
-        period_ns = _period_ns(controller.pop("controller_frequency", None), 60_000_000)
-        goal_checker = _with(GoalCheckerConfig(xy_goal_tolerance=0.08, yaw_goal_tolerance=0.05), controller)
+        parameters = navigation_parameters(config, drive, self.footprint, self.frames)
+        period_ns = context.control_period_ns
+        TwistMuxNode(bus, namespace=namespace)
+        VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
+        global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
+        local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
+        PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
         ControllerServerNode(
-            bus,
-            self.robot_pose,
-            local_costmap,
-            self.footprint,
-            ControllerServerConfig(
-                controller=_with(
-                    RegulatedPurePursuitConfig(
-                        desired_linear_vel=linear,
-                        use_velocity_scaled_lookahead_dist=True,
-                        min_lookahead_dist=0.35,
-                        max_lookahead_dist=1.0,
-                        lookahead_time=1.0,
-                        rotate_to_heading_angular_vel=min(1.2, angular),
-                        max_angular_accel=2.0,
-                        rotate_to_heading_min_angle=0.6,
-                        xy_goal_tolerance=goal_checker.xy_goal_tolerance,
-                    ),
-                    controller,
-                ),
-                goal_checker=goal_checker,
-                progress_checker=_with(ProgressCheckerConfig(), controller),
-                controller_period_ns=period_ns,
-            ),
-            namespace=namespace,
+            bus, pose, local_costmap, self.footprint, parameters.controller_server, namespace=namespace
         )
         BehaviorServerNode(
             bus,
-            self.robot_pose,
-            BehaviorConfig(footprint=polygon),
+            pose,
+            parameters.behaviors,
             costmap=local_costmap,
-            period_ns=context.control_period_ns,
+            period_ns=period_ns,
             namespace=namespace,
         )
-        lidar = self.handle.description.sensors
-        if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in lidar):
-            DockingServerNode(bus, self.robot_pose, namespace=namespace)
-        self.navigator = BtNavigatorNode(bus, self.robot_pose, namespace=namespace)
+        sensors = self.handle.description.sensors
+        if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in sensors):
+            DockingServerNode(bus, pose, namespace=namespace)
+        self.navigator = BtNavigatorNode(bus, pose, namespace=namespace)
 
     def _build_arm(self, description: RobotDescription) -> None:
         bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware
@@ -273,32 +190,3 @@ def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:
         start.y + error.xy * math.sin(direction),
         start.yaw + sign * error.yaw,
     )
-
-
-def _with(config: C, overrides: Mapping[str, Any]) -> C:
-    """Return a config with those overrides that are its own fields and are given."""
-    own = {field.name for field in fields(config)}  # type: ignore[arg-type]
-    return replace(config, **{k: v for k, v in overrides.items() if k in own and v is not None})  # type: ignore[type-var]
-
-
-def _costmap(
-    name: str, frame: str, layers: CostmapConfig, group: ParameterGroup, period_ns: int
-) -> CostmapNodeConfig:
-    overrides = group.overrides()
-    return CostmapNodeConfig(
-        name=name,
-        frame=frame,
-        layers=_with(layers, overrides),
-        update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
-    )
-
-
-def _period_ns(frequency: float | None, default: int) -> int:
-    return default if frequency is None else round(1e9 / frequency)
-
-
-def map_of(config: RobotConfig, arena_map: Path | None) -> Path | None:
-    """Return the map file that a robot localises on; the arena's own unless the scenario names one."""
-    if not isinstance(config.localisation, AmclLocalisation):
-        return None
-    return Path(config.localisation.map) if config.localisation.map is not None else arena_map

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Generator, Iterator, Sequence
 
 from py_trees.behaviour import Behaviour
@@ -27,9 +28,9 @@ class ControlNode(Composite):
             self.stop(status)
         yield self
 
+    @abstractmethod
     def step(self) -> Step:
         """Tick the children that are due and return the own status."""
-        raise NotImplementedError(f"{type(self).__name__} must say how its children run")
 
     def _halt(self, which: Callable[[Behaviour], bool]) -> None:
         for child in self.children:

@@ -1,0 +1,124 @@
+"""A robot's navigation parameters: defaults for its drive and footprint, under the scenario's overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.geometry import Array
+from twin.models.description import DriveSpec
+from twin.navigation.goal_checker import GoalCheckerConfig
+from twin.navigation.layered_costmap import CostmapConfig
+from twin.navigation.planner import PlannerConfig
+from twin.navigation.progress_checker import ProgressCheckerConfig
+from twin.navigation.recovery import BehaviorConfig
+from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.nodes.controller_server import ControllerServerConfig
+from twin.nodes.costmap import CostmapNodeConfig
+from twin.nodes.robot_pose import Frames
+from twin.scenario.navigation import NavigationConfig, ParameterGroup
+
+C = TypeVar("C")
+
+_GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
+_LOCAL_COSTMAP_PERIOD_NS = 200_000_000
+_CONTROLLER_PERIOD_NS = 60_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class NavigationParameters:
+    """What each navigation node is built with."""
+
+    smoother: VelocitySmootherConfig
+    global_costmap: CostmapNodeConfig
+    local_costmap: CostmapNodeConfig
+    planner: PlannerConfig
+    controller_server: ControllerServerConfig
+    behaviors: BehaviorConfig
+
+
+def navigation_parameters(
+    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+) -> NavigationParameters:
+    """Return the parameters for a robot.
+
+    Args:
+        config: What the scenario overrides.
+        drive: Whose limits hold where the scenario gives none.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+        frames: The robot's.
+    """
+    polygon = tuple((float(x), float(y)) for x, y in footprint)
+    linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
+    angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
+    layers = CostmapConfig(
+        footprint=polygon,
+        inflation_radius=0.8,
+        cost_scaling_factor=4.0,
+        obstacle_max_range=4.0,
+        raytrace_max_range=5.0,
+    )
+    rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    return NavigationParameters(
+        smoother=VelocitySmootherConfig(
+            linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
+            angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+        ),
+        global_costmap=_costmap(
+            "global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS
+        ),
+        local_costmap=_costmap(
+            "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
+        ),
+        planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
+        controller_server=_controller_server(config.controller.overrides(), linear, angular),
+        behaviors=BehaviorConfig(footprint=polygon),
+    )
+
+
+def _controller_server(overrides: Mapping[str, Any], linear: float, angular: float) -> ControllerServerConfig:
+    """Return tolerances that docking can start from, and a lookahead that grows with speed."""
+    goal_checker = overridden(GoalCheckerConfig(xy_goal_tolerance=0.08, yaw_goal_tolerance=0.05), overrides)
+    controller = RegulatedPurePursuitConfig(
+        desired_linear_vel=linear,
+        use_velocity_scaled_lookahead_dist=True,
+        min_lookahead_dist=0.35,
+        max_lookahead_dist=1.0,
+        lookahead_time=1.0,
+        rotate_to_heading_angular_vel=min(1.2, angular),
+        max_angular_accel=2.0,
+        rotate_to_heading_min_angle=0.6,
+        xy_goal_tolerance=goal_checker.xy_goal_tolerance,
+    )
+    return ControllerServerConfig(
+        controller=overridden(controller, overrides),
+        goal_checker=goal_checker,
+        progress_checker=overridden(ProgressCheckerConfig(), overrides),
+        controller_period_ns=_period_ns(overrides.get("controller_frequency"), _CONTROLLER_PERIOD_NS),
+    )
+
+
+def _costmap(
+    name: str, frame: str, layers: CostmapConfig, group: ParameterGroup, period_ns: int
+) -> CostmapNodeConfig:
+    overrides = group.overrides()
+    return CostmapNodeConfig(
+        name=name,
+        frame=frame,
+        layers=overridden(layers, overrides),
+        update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
+    )
+
+
+def _period_ns(frequency: float | None, default: int) -> int:
+    return default if frequency is None else round(1e9 / frequency)
+
+
+def overridden(config: C, overrides: Mapping[str, Any]) -> C:
+    """Return a config with those overrides that are fields of its own and are given."""
+    own = {field.name for field in fields(config)}  # type: ignore[arg-type]
+    given = {key: value for key, value in overrides.items() if key in own and value is not None}
+    return replace(config, **given)  # type: ignore[type-var]
