@@ -15,8 +15,10 @@ from twin.bridge.msgs import (
     Imu,
     JointState,
     Odometry,
+    Path,
     Point,
     Pose,
+    PoseStamped,
     PoseWithCovariance,
     Quaternion,
     Time,
@@ -49,6 +51,11 @@ messages = st.one_of(
         st.builds(TwistWithCovariance, st.builds(Twist, vectors, vectors), arrays(36)),
     ),
     st.builds(Imu, headers, quaternions, arrays(9), vectors, arrays(9), vectors, arrays(9)),
+    st.builds(
+        Path,
+        headers,
+        st.lists(st.builds(PoseStamped, headers, st.builds(Pose, points, quaternions)), max_size=4),
+    ),
     st.builds(JointState, headers, st.lists(texts, max_size=4), lists, lists, lists),
 )
 

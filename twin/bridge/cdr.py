@@ -22,12 +22,14 @@ from twin.bridge.cdr_packed import (
     encode_odometry,
     read_text,
 )
+from twin.bridge.cdr_path import decode_path, encode_path
 from twin.bridge.msgs import (
     Clock,
     Header,
     Imu,
     JointState,
     Odometry,
+    Path,
     Point,
     Pose,
     PoseArray,
@@ -217,5 +219,6 @@ _FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {
     PoseArray.__msgtype__: (_encode_poses, _decode_poses),
     Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
     Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
+    Path.__msgtype__: (encode_path, _little_endian(Path, decode_path)),
     JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),
 }

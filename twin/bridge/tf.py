@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from twin.bridge.conversions import pose3_from_transform, transform_from_pose3
+from twin.bridge.conversions import transform_from_pose3
 from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
 from twin.bridge.qos import LATCHED, QoS
 from twin.bridge.tf_buffer import (
@@ -82,11 +82,12 @@ class TransformListener:
     def _on_message(self, message: TFMessage, static: bool) -> None:
         for item in message.transforms:
             try:
-                self._buffer.set_transform(
+                t, q = item.transform.translation, item.transform.rotation
+                self._buffer.set_rigid(
                     item.header.frame_id,
                     item.child_frame_id,
                     ns(item.header.stamp),
-                    pose3_from_transform(item.transform),
+                    (t.x, t.y, t.z, q.w, q.x, q.y, q.z),
                     static=static,
                 )
             except ValueError as error:

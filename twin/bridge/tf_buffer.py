@@ -13,9 +13,9 @@ import numpy as np
 from twin.errors import BridgeError
 from twin.geometry import Pose2, Pose3
 
-_Rigid = tuple[float, float, float, float, float, float, float]
+Rigid = tuple[float, float, float, float, float, float, float]
 """x, y, z [m], then the unit quaternion w, x, y, z."""
-_IDENTITY: _Rigid = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_IDENTITY: Rigid = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _UNIT_TOLERANCE = 1e-3
 
 
@@ -42,7 +42,7 @@ class _Edge:
         self.parent = parent
         self.static = static
         self.stamps: list[int] = []
-        self.values: list[_Rigid] = []
+        self.values: list[Rigid] = []
 
 
 class TransformBuffer:
@@ -66,10 +66,17 @@ class TransformBuffer:
         Raises:
             ValueError: parent and child are the same, a name is empty, or the rotation is no unit quaternion.
         """
+        self.set_rigid(parent, child, time_ns, _rigid(T_parent_child), static=static)
+
+    def set_rigid(self, parent: str, child: str, time_ns: int, value: Rigid, *, static: bool = False) -> None:
+        """Do what `set_transform` does, with the numbers as they are in a message's order of reading.
+
+        Raises:
+            ValueError: as `set_transform`.
+        """
         parent, child = parent.lstrip("/"), child.lstrip("/")
         if not parent or not child or parent == child:
             raise ValueError(f"{child!r} cannot be a child of {parent!r}")
-        value = _rigid(T_parent_child)
         norm = math.sqrt(sum(v * v for v in value[3:]))
         if not abs(norm - 1.0) < _UNIT_TOLERANCE or not all(map(math.isfinite, value)):
             raise ValueError(f"the transform of {child!r} is not finite with a unit quaternion: {value}")
@@ -123,7 +130,7 @@ class TransformBuffer:
         x, y, _, w, i, j, k = self._lookup(target, source, time_ns)
         return Pose2(x, y, math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)))
 
-    def _lookup(self, target: str, source: str, time_ns: int | None) -> _Rigid:
+    def _lookup(self, target: str, source: str, time_ns: int | None) -> Rigid:
         target, source = target.lstrip("/"), source.lstrip("/")
         up, down = self._paths(target, source)
         if time_ns is None:
@@ -131,7 +138,7 @@ class TransformBuffer:
         T_root_source = self._chain(up, time_ns)
         return _compose(_inverse(self._chain(down, time_ns)), T_root_source) if down else T_root_source
 
-    def _insert(self, edge: _Edge, time_ns: int, value: _Rigid) -> None:
+    def _insert(self, edge: _Edge, time_ns: int, value: Rigid) -> None:
         stamps, values = edge.stamps, edge.values
         if not stamps or time_ns > stamps[-1]:
             stamps.append(time_ns)
@@ -175,14 +182,14 @@ class TransformBuffer:
             edge = self._edges.get(edge.parent)
         return frames
 
-    def _chain(self, frames: list[str], time_ns: int) -> _Rigid:
+    def _chain(self, frames: list[str], time_ns: int) -> Rigid:
         """Return T_ancestor_frame of the first frame."""
         value = _IDENTITY
         for frame in frames:
             value = _compose(self._at(frame, time_ns), value)
         return value
 
-    def _at(self, child: str, time_ns: int) -> _Rigid:
+    def _at(self, child: str, time_ns: int) -> Rigid:
         edge = self._edges[child]
         if edge.static:
             return edge.values[0]
@@ -208,13 +215,13 @@ def _extrapolation(edge: _Edge, child: str, time_ns: int) -> ExtrapolationError:
     )
 
 
-def _rigid(pose: Pose3) -> _Rigid:
+def _rigid(pose: Pose3) -> Rigid:
     x, y, z = pose.xyz.tolist()
     w, i, j, k = pose.quat_wxyz.tolist()
     return x, y, z, w, i, j, k
 
 
-def _compose(a: _Rigid, b: _Rigid) -> _Rigid:
+def _compose(a: Rigid, b: Rigid) -> Rigid:
     ax, ay, az, aw, ai, aj, ak = a
     bx, by, bz, bw, bi, bj, bk = b
     tx, ty, tz = _rotate(aw, ai, aj, ak, bx, by, bz)
@@ -229,7 +236,7 @@ def _compose(a: _Rigid, b: _Rigid) -> _Rigid:
     )
 
 
-def _inverse(a: _Rigid) -> _Rigid:
+def _inverse(a: Rigid) -> Rigid:
     x, y, z, w, i, j, k = a
     tx, ty, tz = _rotate(w, -i, -j, -k, x, y, z)
     return -tx, -ty, -tz, w, -i, -j, -k
@@ -247,7 +254,7 @@ def _rotate(
     )
 
 
-def _interpolate(a: _Rigid, b: _Rigid, ratio: float) -> _Rigid:
+def _interpolate(a: Rigid, b: Rigid, ratio: float) -> Rigid:
     """Interpolate linearly in translation and along the shorter great circle in rotation."""
     x, y, z = (p + ratio * (q - p) for p, q in zip(a[:3], b[:3], strict=True))
     dot = sum(p * q for p, q in zip(a[3:], b[3:], strict=True))

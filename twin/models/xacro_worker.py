@@ -53,7 +53,8 @@ def _expand(request: dict[str, Any]) -> dict[str, Any]:
     _close_the_door(request["roots"])
     try:
         document = xacro.process_file(request["file"], mappings=request["args"])
-        return {"urdf": document.toxml()}
+        # Without xacro's banner: it holds the file's path, and the text is published and part of digests.
+        return {"urdf": '<?xml version="1.0"?>' + document.documentElement.toxml()}
     except RecursionError:
         message = "a macro or include calls itself without end"
     except MemoryError:

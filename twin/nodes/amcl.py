@@ -54,7 +54,7 @@ class AmclNodeConfig:
     """map → odom is stamped this far ahead, so that it holds until the next scan [ns]."""
     particles_period_ns: int = 1_000_000_000
     """Time between two particle clouds [ns]."""
-    particles_published: int = 200
+    particles_published: int = 150
     """At most so many particles are shown."""
 
 

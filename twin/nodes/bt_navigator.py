@@ -38,7 +38,7 @@ class BtNavigatorConfig:
 
     bt_loop_duration_ns: int = 100_000_000
     """Time between ticks of the tree."""
-    replanning_period_ns: int = 500_000_000
+    replanning_period_ns: int = 1_000_000_000
     """Time between checks whether the path still holds."""
     number_of_retries: int = 6
     """Recoveries before the goal is given up."""

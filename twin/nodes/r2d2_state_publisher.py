@@ -15,6 +15,7 @@ from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.robot_pose import Frames
 
 _DEGREE = math.pi / 180.0
+_SWEEPS = {"tilt": (-0.5, 0.0), "periscope": (0.0, 0.2)}
 _HEIGHT = 0.7
 """z of `axis` in `odom`, as the tutorial publishes it [m]."""
 
@@ -22,8 +23,8 @@ _HEIGHT = 0.7
 class R2D2StatePublisherNode(MissionNode):
     """Publishes odom → axis and moves the base there; sends the joints' targets to `/position_controller`.
 
-    Each cycle the angle on the circle and swivel grow, tilt sweeps 0 … −0.5 by 1° and periscope by 5 mm. The
-    tutorial sweeps the periscope 0 … 0.2, outside of its own limits of −0.5 … 0; here it sweeps 0 … −0.2.
+    Each cycle the angle on the circle and swivel grow, tilt sweeps 0 … −0.5 by 1°, periscope 0 … 0.2 by
+    5 mm, as in the tutorial; there the periscope's limits were −0.5 … 0, and it never was within them.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class R2D2StatePublisherNode(MissionNode):
         self._end = turns * 2.0 * math.pi
         self._angle = 0.0
         self._positions = {"tilt": 0.0, "swivel": 0.0, "periscope": 0.0}
-        self._rates = {"tilt": -_DEGREE, "swivel": _DEGREE, "periscope": -0.005}
+        self._rates = {"tilt": -_DEGREE, "swivel": _DEGREE, "periscope": 0.005}
         self._tf = TransformBroadcaster(self.node)
         self._commands = self.node.create_publisher(Float64MultiArray, "position_controller/commands", 1)
         self.node.create_timer(round(1e9 / rate_hz), self._cycle)
@@ -76,7 +77,7 @@ class R2D2StatePublisherNode(MissionNode):
         self._angle += self._step
         for joint, rate in self._rates.items():
             self._positions[joint] += rate
-        for joint, lowest in (("tilt", -0.5), ("periscope", -0.2)):
-            if not lowest <= self._positions[joint] <= 0.0:
+        for joint, (low, high) in _SWEEPS.items():
+            if not low <= self._positions[joint] <= high:
                 self._rates[joint] = -self._rates[joint]
                 self._positions[joint] += 2.0 * self._rates[joint]

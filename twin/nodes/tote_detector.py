@@ -60,7 +60,8 @@ class ToteDetectorNode:
         if not self.enabled:
             return
         config, base = self.config, self._robot_pose.frames.base
-        T_base_palm = self._robot_pose.at_stamp(base, message.header)
+        # The arm stands still while it looks: its latest transform will do, though joints come less often.
+        T_base_palm = self._robot_pose.relative(base, message.header.frame_id)
         if T_base_palm is None:
             return
         points = T_base_palm.apply(scan_points(message, math.nan))

@@ -16,7 +16,7 @@ from twin.sim.world import World
 
 
 class Observer:
-    """Fills an `Observation`; names are bound once."""
+    """Gathers what must not be missed at every control tick, and fills an `Observation` now and then."""
 
     def __init__(
         self, world: World, stacks: Sequence[RobotStack], mission: MissionHandle, goods: Sequence[str]
@@ -26,6 +26,9 @@ class Observer:
         self._mission = mission
         self._goods = tuple(goods)
         self._last: dict[str, tuple[int, Pose3]] = {}
+        self._contacts: dict[tuple[str, str], float] = {}
+        self._power = dict.fromkeys((stack.name for stack in stacks), 0.0)
+        self._gathered = 0
         self._fingers = {
             f"{stack.name}/{link}": stack.name
             for stack in stacks
@@ -33,30 +36,41 @@ class Observer:
             for link in stack.manipulator.finger_links
         }
 
+    def gather(self) -> None:
+        """Note contacts and power of the present control tick."""
+        self._gathered += 1
+        for contact in self._world.contacts():
+            pair = contact.body1, contact.body2
+            self._contacts[pair] = max(contact.force_N, self._contacts.get(pair, 0.0))
+        for stack in self._stacks:
+            reading = stack.handle.hardware.read()
+            power = reading.effort * reading.velocity
+            self._power[stack.name] += float(power[power > 0.0].sum())
+
     def observe(self) -> Observation:
-        """Return the present tick's observation."""
+        """Return the present state, with the contacts and the mean power since the last observation."""
         world, mission = self._world, self._mission
-        contacts = world.contacts()
         goods = {name: world.pose(name) for name in self._goods}
-        return Observation(
+        observation = Observation(
             time_ns=world.time_ns,
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
-            held=self._held(contacts, goods),
+            held=self._held(world.contacts(), goods),
             contacts=[
                 ContactObservation(
-                    robot=contact.body1.partition("/")[0],
-                    body=contact.body1.partition("/")[2],
-                    other=contact.body2,
-                    force_N=contact.force_N,
+                    robot=link.partition("/")[0], body=link.partition("/")[2], other=other, force_N=force
                 )
-                for contact in contacts
+                for (link, other), force in self._contacts.items()
             ],
             mission_state=mission.state,
             mission_done=mission.done,
             mission_succeeded=mission.succeeded,
             mission_reason=mission.reason,
         )
+        self._contacts.clear()
+        self._power = dict.fromkeys(self._power, 0.0)
+        self._gathered = 0
+        return observation
 
     def _robot(self, stack: RobotStack) -> RobotObservation:
         pose, now = self._world.pose(stack.handle.base), self._world.time_ns
@@ -64,13 +78,12 @@ class Observer:
         self._last[stack.name] = (now, pose)
         elapsed = (now - then) * 1e-9
         speed = float(np.hypot(*(pose.xyz - before.xyz)[:2])) / elapsed if elapsed else 0.0
-        reading = stack.handle.hardware.read()
         return RobotObservation(
             pose=pose,
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            power_W=float(np.maximum(reading.effort * reading.velocity, 0.0).sum()),
+            power_W=self._power[stack.name] / max(self._gathered, 1),
             recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
         )
 

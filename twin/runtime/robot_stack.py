@@ -76,7 +76,7 @@ class RobotStack:
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
         self.sensors = [SensorPublisher(bus, sensor, namespace=namespace) for sensor in handle.sensors]
         JointStateBroadcasterNode(
-            bus, handle.hardware, period_ns=context.control_period_ns, namespace=namespace
+            bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
         self._build_drive(description)
         RobotStatePublisherNode(bus, description, namespace=namespace)

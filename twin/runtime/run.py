@@ -26,6 +26,8 @@ from twin.scenario.verdict import Verdict
 if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
 
+_OBSERVED_TICKS = 5
+"""Checks see one observation in so many control ticks; contacts and power of the others are in it."""
 _SETTLE_NS = 1_000_000_000
 """The run goes on for so long after its mission has ended, so that the recording shows how it ended."""
 
@@ -57,6 +59,7 @@ class Run:
         self._sink = sink
         self._sensors = [sensor for stack in parts.stacks.values() for sensor in stack.sensors]
         self.tick_ns = self._tick_length()
+        self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = self.tick_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
@@ -123,7 +126,10 @@ class Run:
 
     def sinks(self) -> None:
         """7. Checks and recording."""
-        if self.world.time_ns % self.parts.control_period_ns == 0:
+        now = self.world.time_ns
+        if now % self.parts.control_period_ns == 0:
+            self._observer.gather()
+        if now % self._observation_ns == 0 or self.parts.mission.done:
             observation = self._observer.observe()
             for check in self.checks:
                 check.observe(observation)
@@ -192,7 +198,7 @@ def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    config = RecordingConfig(poses_hz=scenario.recording.poses_hz, block_s=2.0)
+    config = RecordingConfig(poses_hz=scenario.recording.poses_hz, block_s=3.0)
     return RerunSink(
         out / f"{scenario.name}.rrd",
         config=config,

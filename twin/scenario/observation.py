@@ -1,4 +1,4 @@
-"""What the checks see of one control tick: the simulator's truth beside what the robots believe."""
+"""What the checks see every few control ticks: the simulator's truth beside what the robots believe."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RobotObservation:
     speed: float = 0.0
     """True planar speed of the base [m/s]."""
     power_W: float = 0.0
-    """Mechanical power of all actuators [W]."""
+    """Mechanical power that the actuators put in, mean since the last observation [W]."""
     recoveries: int = 0
     """Recovery behaviours that its navigator has started so far."""
 
@@ -56,7 +56,7 @@ class ContactObservation:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Observation:
-    """One control tick."""
+    """One observation."""
 
     time_ns: int
     """Simulated time [ns]."""
@@ -66,6 +66,7 @@ class Observation:
     held: Mapping[str, Held] = field(default_factory=dict)
     """Only the goods that are in a gripper."""
     contacts: Sequence[ContactObservation] = ()
+    """Of all control ticks since the last observation, the hardest of each pair."""
     mission_state: str = ""
     mission_done: bool = False
     mission_succeeded: bool | None = None

@@ -46,7 +46,10 @@ class ContactReader:
         geoms = data.contact.geom
         robots = self._robot[geoms]
         first, second = robots[:, 0], robots[:, 1]
-        kept = (first != second) & (first != -2) & (second != -2) & (data.contact.efc_address >= 0)
+        kept = (first != second) & (np.minimum(first, second) != -2)
+        if not kept.any():  # as on most ticks: wheels on the floor
+            return []
+        kept &= data.contact.efc_address >= 0
         pairs: dict[tuple[str, str], tuple[float, list[tuple[str, str]]]] = {}
         for index in np.flatnonzero(kept):
             a, b = (int(geom) for geom in geoms[index])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
 from pathlib import Path
 
 import mujoco
@@ -31,14 +30,19 @@ class DivergenceGuard:
         self._model = model
         self._data = data
         self._warnings = [data.warning[kind] for kind in _BAD]
-        self._states: deque[Array] = deque(maxlen=capacity)
-        self._size = mujoco.mj_stateSize(model, _STATE)
+        self._ring = np.zeros((capacity, mujoco.mj_stateSize(model, _STATE)))
+        self._count = 0
 
     def remember(self) -> None:
         """Keep the present state."""
-        state = np.empty(self._size)
-        mujoco.mj_getState(self._model, self._data, state, _STATE)
-        self._states.append(state)
+        mujoco.mj_getState(self._model, self._data, self._ring[self._count % len(self._ring)], _STATE)
+        self._count += 1
+
+    @property
+    def _states(self) -> Array:
+        """The states kept, oldest first, shape (n, state size)."""
+        kept, oldest = min(self._count, len(self._ring)), self._count % len(self._ring)
+        return np.roll(self._ring, -oldest, axis=0)[-kept:]
 
     def check(self, folder: Path | None) -> None:
         """Do nothing if the state is finite.
@@ -57,16 +61,16 @@ class DivergenceGuard:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
             file = folder / "diverged.npz"
-            times = np.array([state[0] for state in self._states])
-            np.savez(file, states=np.array(self._states), times=times, state_spec=int(_STATE))
-            message += f"; the last {len(self._states)} states are in {file}"
+            states = self._states
+            np.savez(file, states=states, times=states[:, 0], state_spec=int(_STATE))
+            message += f"; the last {len(states)} states are in {file}"
         hint = "check masses, inertias and commands there, or take a smaller physics step"
         raise SimulationError(f"{message}; {hint}")
 
     def _replay(self) -> tuple[str, str]:
         """Step singly from the last good state to find the first bad number; remembers each step's state."""
         model, data = self._model, self._data
-        mujoco.mj_setState(model, data, self._states[-1], _STATE)
+        mujoco.mj_setState(model, data, np.array(self._states[-1]), _STATE)
         for warning in self._warnings:
             warning.number = 0
         for _ in range(10_000):

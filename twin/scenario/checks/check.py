@@ -28,14 +28,14 @@ class CheckResult:
 
 
 class Check(ABC):
-    """A fold over the observations of a run; `observe` must see every control tick, in order."""
+    """A fold over the observations of a run; `observe` must see all of them, in order."""
 
     def __init__(self, name: str) -> None:
         self.name = name
 
     @abstractmethod
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
 
     @abstractmethod
     def result(self) -> CheckResult:

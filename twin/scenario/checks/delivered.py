@@ -47,7 +47,7 @@ class Delivered(Check):
         self._passed = False
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         tote = self._config.tote
         pose = observation.goods.get(tote)
         if pose is None:

@@ -48,7 +48,7 @@ class LocalisationError(Check):
         self._last: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         self._last = observation.time_s
         robot = observation.robots[self._robot]
         if robot.estimate is None or observation.time_s < self._config.after:
@@ -111,7 +111,7 @@ class OdometryDrift(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         self._at_s = observation.time_s
         robot = observation.robots[self._robot]
         if robot.odometry is None:

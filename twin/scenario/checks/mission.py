@@ -26,7 +26,7 @@ class MissionSucceeded(Check):
         self._last: Observation | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         if self._last is None or not self._last.mission_done:
             self._last = observation
 
@@ -67,7 +67,7 @@ class TimeLimit(Check):
         self._last: Observation | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         if self._last is None or not self._last.mission_done:
             self._last = observation
 

@@ -53,7 +53,7 @@ class NoCollision(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         self._at_s = observation.time_s
         for contact in observation.contacts:
             if self._config.robot not in (None, contact.robot) or self._is_allowed(contact):

@@ -62,7 +62,7 @@ class EndsAt(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         self._end = observation.robots[self._robot].pose.to_pose2()
         self._at_s = observation.time_s
         if self._goal is None:
@@ -123,7 +123,7 @@ class PathOnCircle(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         x, y, _ = observation.robots[self._robot].pose.xyz
         centre = self._config.centre
         off = abs(math.hypot(x - centre[0], y - centre[1]) - self._config.radius)

@@ -42,7 +42,7 @@ class Recoveries(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         count = observation.robots[self._robot].recoveries
         if count != self._count or self._at_s is None:
             self._count, self._at_s = count, observation.time_s

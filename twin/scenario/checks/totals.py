@@ -46,7 +46,7 @@ class DrivenDistance(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         xy = observation.robots[self._robot].pose.xyz[:2].copy()
         if self._previous is not None:
             self._distance += math.dist(xy, self._previous)
@@ -95,7 +95,7 @@ class Energy(Check):
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         if self._previous_ns is not None:
             power = max(0.0, observation.robots[self._robot].power_W)
             self._energy += power * (observation.time_ns - self._previous_ns) / 1e9

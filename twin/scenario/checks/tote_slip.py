@@ -50,7 +50,7 @@ class ToteSlip(Check):
         self._reason = "no tote was carried" if config.tote is None else f"{config.tote} was never carried"
 
     def observe(self, observation: Observation) -> None:
-        """Take one control tick."""
+        """Take one observation."""
         if self._worst is None:
             self._at_s = observation.time_s
         for tote, held in observation.held.items():
