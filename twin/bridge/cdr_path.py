@@ -16,7 +16,7 @@ _POSE = Struct("<7d")
 
 @lru_cache(maxsize=256)
 def _pose_struct(phase: int, frame: str) -> tuple[Struct, bytes]:
-    """Return the layout of a PoseStamped that begins `phase` bytes (mod 8) into the body, and its frame's bytes."""
+    """Return the layout of a PoseStamped that begins at `phase` (mod 8), and its frame's bytes."""
     raw = frame.encode() + b"\0"
     before = -phase % 4
     end = phase + before + 12 + len(raw)
