@@ -35,7 +35,6 @@ def make_run() -> Iterator[MakeRun]:
 
     def make(scenario: Scenario, **options: object) -> Run:
         runs.append(Run(scenario, build(scenario, **options)))  # type: ignore[arg-type]
-        runs[-1].start()
         return runs[-1]
 
     yield make

@@ -64,6 +64,9 @@ class Run:
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
+        self._end_ns = round(scenario.duration * 1e9)
+        self._mission_end_ns: int | None = None
+        self._check()  # where everything starts
 
     def _tick_length(self) -> int:
         """Return the greatest common divisor of all periods [ns]; each is a multiple of the physics step."""
@@ -82,12 +85,6 @@ class Run:
     def over(self) -> bool:
         """Whether the time is up, or the mission has been over for a moment."""
         return self.world.time_ns >= self._end_ns
-
-    _end_ns = 0
-
-    def start(self) -> None:
-        """Set the longest duration; nodes run first at the first tick."""
-        self._end_ns = round(self.scenario.duration * 1e9)
 
     def tick(self) -> None:
         """Advance by one tick."""
@@ -124,26 +121,23 @@ class Run:
         """6. `/clock`."""
         self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)))
 
+    def _check(self) -> None:
+        observation = self._observer.observe()
+        for check in self.checks:
+            check.observe(observation)
+
     def sinks(self) -> None:
         """7. Checks and recording."""
         now = self.world.time_ns
         if now % self.parts.control_period_ns == 0:
             self._observer.gather()
         if now % self._observation_ns == 0 or self.parts.mission.done:
-            observation = self._observer.observe()
-            for check in self.checks:
-                check.observe(observation)
+            self._check()
         if self._sink is not None:
             self._sink.on_tick(self.world)
-        if self.parts.mission.done:
-            self._end_ns = min(self._end_ns, self._mission_end() + _SETTLE_NS)
-
-    _mission_end_ns: int | None = None
-
-    def _mission_end(self) -> int:
-        if self._mission_end_ns is None:
-            self._mission_end_ns = self.world.time_ns
-        return self._mission_end_ns
+        if self.parts.mission.done and self._mission_end_ns is None:
+            self._mission_end_ns = now
+            self._end_ns = min(self._end_ns, now + _SETTLE_NS)
 
 
 def run(
@@ -210,7 +204,6 @@ def _loop(
     simulation: Run, pace: float | None, progress: Callable[[Progress], None] | None
 ) -> tuple[float, float]:
     """Tick to the end; return the wall and CPU time it took [s]. Pacing is the only use of the wall clock."""
-    simulation.start()
     gc.collect()
     gc.freeze()  # the model and the types stay; collections look only at what ticks make
     wall, cpu = time.perf_counter(), time.process_time()
