@@ -100,9 +100,9 @@ def test_a_tote_rests_and_sleeps_where_it_was_put(room: Scene) -> None:
     for _ in range(50):
         world.step(50)
         assert np.linalg.norm(world.pose("tote").xyz - start.xyz) < 1e-4
-    awake = dict(zip(["world", *world.body_names], world.data.body_awake, strict=True))
-    assert awake["tote"] == mujoco.mjtSleepState.mjS_ASLEEP
-    assert awake["cart/base_link"] == mujoco.mjtSleepState.mjS_AWAKE
+    awake = world.data.body_awake
+    assert awake[world.model.body("tote").id] == mujoco.mjtSleepState.mjS_ASLEEP
+    assert awake[world.model.body("cart/base_link").id] == mujoco.mjtSleepState.mjS_AWAKE
 
 
 def test_a_tote_wakes_when_pushed(room: Scene) -> None:

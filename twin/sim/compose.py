@@ -10,12 +10,16 @@ import mujoco
 
 from twin.errors import Problem, ScenarioError
 from twin.models.description import Box, Capsule, Cylinder
+from twin.sim.casters import casters_under_chassis
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
 
 FLOOR = "floor"
 """Name of the floor's geom."""
+
+_SOLID, _ROLLING = 1, 2
+"""Contact bits: of everything that can be touched, and of what only the floor touches."""
 
 GROUP_SOLID = 0
 """Floor, statics and goods: seen and touched."""
@@ -126,9 +130,13 @@ def _floor(spec: mujoco.MjSpec, scene: Scene) -> None:
     )
     material = spec.add_material(name="floor", reflectance=0.0, texrepeat=[0.5, 0.5], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "checker"
-    spec.worldbody.add_geom(
+    # A body of its own (without a name: it is not part of the scene): what touches nothing but the floor need
+    # not be tested against the scenery.
+    spec.worldbody.add_body().add_geom(
         name=FLOOR,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
+        contype=_SOLID | _ROLLING,
+        conaffinity=_SOLID | _ROLLING,
         size=[scene.floor_size[0] / 2.0, scene.floor_size[1] / 2.0, 1.0],
         material="floor",
         friction=[scene.floor_friction, 0.005, 0.0001],
@@ -169,7 +177,7 @@ def _add_placed(spec: mujoco.MjSpec, placed: PlacedBody, solref: list[float]) ->
 
 def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[float]) -> mujoco.MjsGeom:
     kind, size = _primitive(shape)
-    touch = int(shape.solid)
+    touch = _SOLID if shape.solid else 0
     return body.add_geom(
         type=kind,
         size=size,
@@ -213,5 +221,9 @@ def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
     spec.attach(robot, prefix=f"{placement.name}/", frame=spec.worldbody.add_frame())
     root = spec.body(f"{placement.name}/{placement.conversion.description.root}")
     root.pos, root.quat = placement.T_world_root.xyz, placement.T_world_root.quat_wxyz
+    for link in casters_under_chassis(placement.conversion.description):
+        for geom in spec.body(f"{placement.name}/{link}").geoms:
+            if geom.contype:
+                geom.contype = geom.conaffinity = _ROLLING
     if root.joints:  # MuJoCo refuses a policy for a body that cannot move
         root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
