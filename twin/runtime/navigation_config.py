@@ -67,8 +67,10 @@ def navigation_parameters(
             linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
             angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
         ),
-        global_costmap=_costmap(
-            "global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS
+        # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
+        global_costmap=replace(
+            _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
+            publish_period_ns=2_000_000_000,
         ),
         local_costmap=_costmap(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
