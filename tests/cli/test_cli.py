@@ -320,3 +320,19 @@ def test_schema_and_robots(demo: Path, invoke: Invoke) -> None:
     code, out, _ = invoke("robots")
     assert code == 0
     assert {"diff_bot", "warehouse_bot", "r2d2", "sp1s"} <= set(out.split())
+
+
+@pytest.mark.parametrize(
+    "command", [["run", "SCENARIO"], ["run", "SCENARIO", "--repeat", "2"], ["test", "SCENARIO"]]
+)
+def test_a_file_cannot_be_the_folder_of_the_results(tmp_path: Path, command: list[str]) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    scenario = str(Path(__file__).parents[2] / "scenarios" / "diff_bot_figure8.yaml")
+    words = [scenario if word == "SCENARIO" else word for word in command]
+    done = subprocess.run(
+        [sys.executable, "-m", "twin.cli", *words, "--out", str(taken)], capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr == f"error: {taken}: cannot be the folder of the results: File exists\n"
+    assert taken.read_text(encoding="utf-8") == "mine"

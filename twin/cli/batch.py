@@ -32,12 +32,12 @@ def run_batch(
     """
     from twin.cli.child import run_in_child
     from twin.cli.console import stderr, stdout
-    from twin.cli.folders import run_folder
+    from twin.cli.folders import make_folder, run_folder
     from twin.cli.options import RunOptions
     from twin.cli.verdict_table import many_report
 
     files = scenario_files(paths or [Path("scenarios")])
-    folder = out or run_folder("test")
+    folder = make_folder(out) if out else run_folder("test")
     verdicts: list[dict[str, Any]] = []
     with stderr().status("") as status:
         for number, file in enumerate(files, 1):
@@ -48,7 +48,7 @@ def run_batch(
         from twin.scenario.junit import junit_xml
         from twin.scenario.verdict import write_atomically
 
-        junit.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(junit.parent)
         write_atomically(junit, junit_xml(verdicts))
     if json:
         sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")

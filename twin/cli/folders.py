@@ -5,12 +5,13 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
+from twin.errors import RecordingError
+
 
 def run_folder(scenario: str) -> Path:
     """Create and return `runs/<scenario>/<YYYYmmdd-HHMMSS>`, with a counter if that second is taken."""
     name = datetime.now().strftime("%Y%m%d-%H%M%S")
-    parent = Path("runs") / scenario
-    parent.mkdir(parents=True, exist_ok=True)
+    parent = make_folder(Path("runs") / scenario)
     for suffix in ("", *(f"-{count}" for count in range(2, 1000))):
         folder = parent / (name + suffix)
         try:
@@ -19,3 +20,12 @@ def run_folder(scenario: str) -> Path:
             continue
         return folder
     raise FileExistsError(f"{parent / name}: a thousand runs were started in this second")
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder for results, unless it is there; raises RecordingError where that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise RecordingError(f"{path}: cannot be the folder of the results: {fault.strerror}") from fault
+    return path

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from twin.cli.console import print_error, stdout
-from twin.cli.folders import run_folder
+from twin.cli.folders import make_folder, run_folder
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
@@ -19,14 +19,14 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     from twin.scenario.verdict import Verdict
 
     show_warnings()
-    name, seed, folder = options.scenario.stem, 0, out
+    name, seed, folder = options.scenario.stem, 0, None
     try:
+        folder = None if out is None else make_folder(out)
         scenario = schema.load(options.scenario, options.overrides)
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
 
-        folder = run_folder(name) if out is None else out
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = folder or run_folder(name)
         with run_progress(name) as progress:
             verdict = runtime.run(
                 scenario,

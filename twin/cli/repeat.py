@@ -9,7 +9,7 @@ from typing import Any
 
 from twin.cli.child import run_in_child
 from twin.cli.console import stderr, stdout
-from twin.cli.folders import run_folder
+from twin.cli.folders import make_folder, run_folder
 from twin.cli.options import RunOptions
 
 
@@ -19,7 +19,7 @@ def run_repeatedly(
     """Run `runs` times in fresh processes, print the digests, and return the exit code."""
     from twin.scenario import schema
 
-    parent = out or run_folder(schema.load(options.scenario, options.overrides).name)
+    parent = make_folder(out) if out else run_folder(schema.load(options.scenario, options.overrides).name)
     console = stderr()
     verdicts: list[dict[str, Any]] = []
     with console.status("") as status:

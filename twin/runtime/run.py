@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
-from twin.errors import ScenarioError
+from twin.errors import RecordingError, ScenarioError
 from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
@@ -171,7 +171,7 @@ def run(
     parts = build(scenario, taps=taps, listen=listen, crash_folder=out)
     try:
         if save_model is not None:
-            parts.world.save_model(save_model)
+            _save_model(parts, save_model)
         simulation = Run(scenario, parts, sink)
         if sink is not None:
             sink.declare(parts.world)
@@ -185,6 +185,13 @@ def run(
         if sink is not None:
             sink.close()
         parts.bus.close()
+
+
+def _save_model(parts: Parts, folder: Path) -> None:
+    try:
+        parts.world.save_model(folder)
+    except OSError as fault:
+        raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
 def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
