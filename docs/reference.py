@@ -21,6 +21,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
 from twin.navigation.amcl import AmclConfig
+from twin.navigation.dock_estimate import DockEstimateConfig
 from twin.navigation.goal_checker import GoalCheckerConfig
 from twin.navigation.planner import PlannerConfig
 from twin.navigation.progress_checker import ProgressCheckerConfig
@@ -213,6 +214,7 @@ PARAMETERS: Mapping[str, type[Any]] = {
     "/behavior_server": BehaviorConfig,
     "/bt_navigator": BtNavigatorConfig,
     "/docking_server": DockingConfig,
+    "/docking_server, sights of the dock": DockEstimateConfig,
 }
 
 

@@ -11,8 +11,8 @@ import pytest
 from tests.nodes.conftest import TICK_NS, Bench, Robot, Room, box, open_room, scan
 from twin.bridge.action_types import BackUp, DockRobot, DriveOnHeading, Spin, UndockRobot, Wait
 from twin.bridge.actions import ActionClient
-from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import GoalStatus, LaserScan, Point, PoseStamped, duration, new
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
+from twin.bridge.msgs import GoalStatus, LaserScan, Point, PoseArray, duration, header, new
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
 from twin.bridge.types import ActionType
@@ -148,7 +148,7 @@ class Dock:
         DockingServerNode(bench.bus, self.robot.pose_lookup)
         self.dock_client = ActionClient(bench.node, DockRobot, "dock_robot")
         self.undock_client = ActionClient(bench.node, UndockRobot, "undock_robot")
-        self._tote = bench.node.create_publisher(PoseStamped, "tote_pose", 1)
+        self._totes = bench.node.create_publisher(PoseArray, "tote_poses", 1)
         bench.run(0.5)
 
     def dock(self, kind: str = "table", believed: Pose2 | None = None) -> Any:
@@ -158,19 +158,32 @@ class Dock:
         self.bench.run(0.5)
         return goal
 
-    def show_tote(self, y: float, *, first_y: float | None = None) -> None:
-        """Report, at every tick, a tote at lateral position `y` of the face; at first at `first_y`."""
-        seen = [y if first_y is None else first_y]
+    def show_totes(self, *ys: float, first: float | None = None) -> None:
+        """Report, at every tick, totes at lateral positions `ys` of the face; at first one at `first`."""
+        once = [] if first is None else [first]
 
         def report() -> None:
-            in_base = self.robot.pose.inverse() @ Pose2(2.05, seen.pop() if seen else y, 0.0)
-            self._tote.publish(pose_stamped(in_base, "base_footprint", self.bench.clock.now_ns))
+            shown = [once.pop()] if once else ys
+            in_base = [self.robot.pose.inverse() @ Pose2(2.05, y, 0.0) for y in shown]
+            in_base.sort(key=lambda pose: abs(pose.y))
+            poses = [pose_from_pose2(pose) for pose in in_base]
+            stamp = header(self.bench.clock.now_ns - TICK_NS, "base_footprint")
+            self._totes.publish(PoseArray(header=stamp, poses=poses))
 
         self.bench.each_tick.append(report)
 
+    def undock(self) -> float:
+        """Undock; return how far the robot drove back."""
+        before = self.robot.pose
+        goal = self.undock_client.send_goal(new(UndockRobot.Goal))
+        self.bench.until(lambda: goal.done)
+        assert goal.result.success
+        self.bench.run(0.5)
+        return before.distance(self.robot.pose)
+
 
 def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:
-    dock = Dock(bench, start=Pose2(0.9, 0.03, 0.05))
+    dock = Dock(bench, start=Pose2(0.7, 0.03, 0.05))
     goal = dock.dock(believed=Pose2(2.08, 0.0, 0.06))
     assert goal.result.success
     pose = dock.robot.pose
@@ -180,48 +193,81 @@ def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:
 
 
 def test_docking_at_a_tote_lines_up_with_it(bench: Bench) -> None:
-    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
-    dock.show_tote(0.06)
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
+    dock.show_totes(0.06)
     assert dock.dock("tote").result.success
     assert dock.robot.pose.y == pytest.approx(0.06, abs=0.015)
     assert dock.robot.pose.x == pytest.approx(1.45, abs=0.015)
 
 
 def test_a_wrong_first_sight_of_the_tote_is_corrected_on_the_way(bench: Bench) -> None:
-    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
     goal = dock.dock_client.send_goal(
         new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0), dock_type="tote")
     )
     bench.run(0.1)
-    dock.show_tote(0.0, first_y=0.12)
+    dock.show_totes(0.0, first=0.12)
     bench.until(lambda: goal.done, 60.0)
     assert goal.result.success
     assert dock.robot.pose.y == pytest.approx(0.0, abs=0.015)
 
 
 def test_a_tote_of_the_neighbouring_slot_is_not_the_one(bench: Bench) -> None:
-    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0))
-    dock.show_tote(0.5)
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
+    dock.show_totes(0.5)
     goal = dock.dock("tote")
     assert (goal.result.success, goal.result.error_code) == (False, 904)
     assert goal.result.error_msg == "no tote in sight"
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3, -0.3])
+def test_of_two_totes_that_of_the_slot_counts_however_the_robot_is_turned(bench: Bench, yaw: float) -> None:
+    dock = Dock(bench, start=Pose2(0.7, 0.08, yaw))
+    dock.show_totes(-0.5, 0.02, 0.5)
+    assert dock.dock("tote").result.success
+    assert dock.robot.pose.y == pytest.approx(0.02, abs=0.01)
+    assert abs(dock.robot.pose.yaw) < math.radians(1.0)
+
+
+def test_a_dock_that_was_missed_is_approached_again_from_the_staging_distance(bench: Bench) -> None:
+    """At the end the tote turns out to stand further aside: there is no way left to correct that."""
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
+    dock.show_totes(0.0)
+    goal = dock.dock_client.send_goal(
+        new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0), dock_type="tote")
+    )
+    bench.until(lambda: dock.robot.pose.x > 1.4, 60.0)
+    bench.each_tick.pop()
+    dock.show_totes(0.06)
+    furthest_back = []
+    bench.each_tick.append(lambda: furthest_back.append(dock.robot.pose.x))
+    bench.until(lambda: goal.done, 60.0)
+    assert (goal.result.success, goal.result.num_retries) == (True, 1)
+    assert min(furthest_back) == pytest.approx(0.7, abs=0.03)
+    assert dock.robot.pose.y == pytest.approx(0.06, abs=0.01)
+
+
 def test_a_dock_that_is_not_there_is_not_docked_at(bench: Bench) -> None:
-    dock = Dock(bench, start=Pose2(0.9, 0.0, 0.0), shelf=False)
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0), shelf=False)
     goal = dock.dock()
     assert goal.status == GoalStatus.STATUS_ABORTED
     assert (goal.result.error_code, goal.result.error_msg) == (904, "no face of the dock in sight")
-    assert dock.robot.pose.x == pytest.approx(0.9)
+    assert dock.robot.pose.x == pytest.approx(0.7)
 
 
-def test_undocking_backs_off_to_where_staging_is(bench: Bench) -> None:
+def test_undocking_backs_off_straight_to_where_staging_is(bench: Bench) -> None:
     dock = Dock(bench, start=Pose2(1.45, 0.0, 0.0))
-    goal = dock.undock_client.send_goal(new(UndockRobot.Goal))
-    bench.until(lambda: goal.done)
-    assert goal.result.success
-    assert dock.robot.pose.x == pytest.approx(0.9, abs=0.02)
+    assert dock.undock() == pytest.approx(0.75, abs=0.02)
+    assert dock.robot.pose == pytest.approx((0.7, 0.0, 0.0), abs=0.02)
     assert max(v for v, _ in dock.robot.commands) <= 0.0
+    assert not any(w for _, w in dock.robot.commands)
+
+
+def test_undocking_after_no_docking_does_not_back_into_what_is_behind(bench: Bench) -> None:
+    """No tote was in sight: the robot stands where it was staged and has no way to go back."""
+    dock = Dock(bench, start=Pose2(0.72, 0.0, 0.0))
+    assert not dock.dock("tote").result.success
+    assert dock.undock() == pytest.approx(0.02, abs=0.02)
 
 
 def test_a_cancelled_docking_stops(bench: Bench) -> None:
@@ -245,7 +291,7 @@ class Palm:
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
         self.robot = Robot(bench, Room(box(-9, -9, 9, 9)))
-        self.poses = bench.listen(PoseStamped, "tote_pose")
+        self.seen = bench.listen(PoseArray, "tote_poses")
         ToteDetectorNode(bench.bus, self.robot.pose_lookup)
         self._publisher = bench.node.create_publisher(LaserScan, "palm_scan", SENSOR_DATA)
         self.angles = np.radians(np.arange(-45.0, 45.25, 0.5))
@@ -255,9 +301,9 @@ class Palm:
     def enable(self, on: bool) -> None:
         assert self.bench.call(SetBool, "tote_detector/enable", SetBool.Request(data=on)).success
 
-    def look(self, segments: np.ndarray, noise: float = 0.0) -> list[PoseStamped]:
-        """Scan and return what was detected."""
-        del self.poses[:]
+    def look(self, segments: np.ndarray, noise: float = 0.0) -> list[Pose2]:
+        """Scan and return the totes that were detected."""
+        del self.seen[:]
         room = Room(segments, angles=self.angles, max_range=4.0)
         ranges = room.ranges(self.robot.T_base_lidar)
         ranges += (
@@ -266,7 +312,8 @@ class Palm:
         stamp = self.bench.clock.now_ns - TICK_NS
         self._publisher.publish(scan(ranges, self.angles, stamp, max_range=4.0))
         self.bench.run(0.1)
-        return self.poses
+        assert all(message.header.frame_id == "base_footprint" for message in self.seen)
+        return [pose2_from_pose(pose) for message in self.seen for pose in message.poses]
 
 
 @pytest.fixture
@@ -282,9 +329,7 @@ def tote(pose: Pose2, width: float = 0.24, depth: float = 0.3) -> np.ndarray:
 
 @pytest.mark.parametrize("pose", [Pose2(0.7, 0.0, 0.0), Pose2(0.8, 0.1, 0.15), Pose2(0.6, -0.08, -0.2)])
 def test_a_tote_is_found_where_it_stands(palm: Palm, pose: Pose2) -> None:
-    (message,) = palm.look(tote(pose), noise=0.003)
-    found = pose2_from_pose(message.pose)
-    assert message.header.frame_id == "base_footprint"
+    (found,) = palm.look(tote(pose), noise=0.003)
     assert found.distance(pose) < 0.015
     assert abs(wrap_angle(found.yaw - pose.yaw)) < 0.06
 
@@ -310,7 +355,6 @@ def test_it_looks_only_while_it_is_asked_to(palm: Palm) -> None:
     assert len(palm.look(tote(Pose2(0.7, 0.0, 0.0)))) == 1
 
 
-def test_of_two_totes_the_one_straight_ahead_counts(palm: Palm) -> None:
+def test_of_two_totes_the_one_straight_ahead_comes_first(palm: Palm) -> None:
     both = np.concatenate([tote(Pose2(0.8, 0.35, 0.0)), tote(Pose2(0.8, 0.02, 0.0))])
-    (message,) = palm.look(both)
-    assert message.pose.position.y == pytest.approx(0.02, abs=0.015)
+    assert [pose.y for pose in palm.look(both)] == pytest.approx([0.02, 0.35], abs=0.015)

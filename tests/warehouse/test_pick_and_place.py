@@ -18,14 +18,13 @@ from twin.bridge.action_types import (
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import JointState, PoseStamped, String, header, new
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
+from twin.bridge.msgs import JointState, PoseArray, String, header, new
 from twin.bridge.srvs import SetBool
 from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose
 from twin.models import load
-from twin.nodes.messages import pose_stamped
 from twin.nodes.robot_pose import Frames
 from twin.runtime import derive
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
@@ -50,6 +49,7 @@ class Robot:
         self.manipulator = manipulator
         self.positions = dict.fromkeys((*manipulator.arm_joints, manipulator.gripper_joint), 0.0)
         self.sees_tote = True
+        self.totes_in_base = [TOTE_IN_BASE]
         self.grips = True
         self.stalls = True
         self.log: list[str] = []
@@ -65,7 +65,7 @@ class Robot:
         self.node.create_service(SetBool, "tote_detector/enable", self._enable)
         self._detecting = False
         self._joints = self.node.create_publisher(JointState, "joint_states", 1)
-        self._tote = self.node.create_publisher(PoseStamped, "tote_pose", 1)
+        self._totes = self.node.create_publisher(PoseArray, "tote_poses", 1)
         self.states: list[str] = []
         bus.create_node("watcher").create_subscription(
             String, "mission/state", lambda message: self.states.append(message.data)
@@ -90,7 +90,9 @@ class Robot:
                 JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=zeros)
             )
             if self.sees_tote and self._detecting and self.clock.now_ns % 100_000_000 == 0:
-                self._tote.publish(pose_stamped(TOTE_IN_BASE, "base_footprint", self.clock.now_ns))
+                poses = [pose_from_pose2(pose) for pose in self.totes_in_base]
+                stamp = header(self.clock.now_ns, "base_footprint")
+                self._totes.publish(PoseArray(header=stamp, poses=poses))
             self.bus.spin()
         self.bus.spin()  # the last words arrive
         return mission
@@ -158,12 +160,12 @@ def test_one_tote_is_fetched_and_set_down(robot: Robot) -> None:
     assert mission.succeeded
     assert mission.reason == ""
     assert steps(robot) == [
-        "go 5.00 0.90 1.57",  # the staging pose 1.1 m before the shelf's face, looking at it
+        "go 5.00 0.70 1.57",  # the staging pose 1.3 m before the shelf's face, looking at it
         "open",
         "dock tote",
         "close",
         "undock shelf",
-        "go 6.90 0.00 0.00",
+        "go 6.70 0.00 0.00",
         "dock table",
         "open",
         "undock table",
@@ -198,7 +200,7 @@ def test_a_gripper_closed_on_nothing_tries_again_and_then_gives_up(robot: Robot)
     assert steps(robot).count("close") == 3
     assert "closed on nothing of 0.24 m width: finger at 0.000 m" in mission.reason
     assert "tote_a: grasp" in mission.reason
-    assert "go 6.90 0.00 0.00" not in robot.log, "nothing is carried away"
+    assert "go 6.70 0.00 0.00" not in robot.log, "nothing is carried away"
     assert robot.states[-1] == "failed"
 
 
@@ -209,11 +211,48 @@ def test_fingers_that_stop_at_the_right_width_by_themselves_hold_nothing(robot: 
     assert "closed on nothing" in mission.reason
 
 
-def test_between_two_attempts_it_lets_go_and_backs_off(robot: Robot) -> None:
+def test_between_two_attempts_it_lets_go_and_drives_to_the_staging_pose_again(robot: Robot) -> None:
     robot.failures["dock_robot"] = ["no tote in sight"]
     assert robot.run().succeeded
     at = steps(robot)
-    assert at[1:6] == ["open", "open", "undock shelf", "open", "dock tote"]
+    assert at[1:7] == ["open", "open", "undock shelf", "go 5.00 0.70 1.57", "open", "dock tote"]
+
+
+def test_a_table_that_was_missed_is_docked_at_again_with_the_tote_in_the_gripper(robot: Robot) -> None:
+    def miss() -> None:
+        if robot.states and robot.states[-1] == "tote_a: dock at table" and not missed:
+            missed.append(True)
+            robot.failures["dock_robot"] = ["docking failed: missed"]
+
+    missed: list[bool] = []
+    robot.node.create_timer(20_000_000, miss)
+    assert robot.run().succeeded
+    at = steps(robot)
+    tail = ["undock shelf", "go 6.70 0.00 0.00", "undock table", "go 6.70 0.00 0.00", "dock table", "open"]
+    assert at[at.index("close") + 1 :][:6] == tail
+
+
+def test_a_blocked_reach_is_retracted_before_anything_moves(robot: Robot) -> None:
+    def block() -> None:
+        if robot.states and robot.states[-1] == "tote_a: reach" and not blocked:
+            blocked.append(True)
+            robot.log.append("reach")
+            robot.failures["arm_controller/follow_joint_trajectory"] = ["'arm_stage_1_joint' is away"]
+
+    blocked: list[bool] = []
+    robot.node.create_timer(20_000_000, block)
+    assert robot.run().succeeded
+    at = robot.log[robot.log.index("reach") :]
+    assert at[:5] == ["reach", "open", "move", "undock shelf", "move"]
+    assert "go 5.00 0.70 1.57" in at
+
+
+def test_a_neighbours_tote_is_not_reached_for(robot: Robot) -> None:
+    robot.totes_in_base = [Pose2(0.6, 0.2, 0.0), Pose2(0.6, -0.4, 0.0)]
+    mission = robot.run()
+    assert mission.succeeded is False
+    assert "no tote straight ahead" in mission.reason
+    assert "close" not in robot.log
 
 
 def test_without_a_tote_in_sight_it_does_not_reach(robot: Robot) -> None:
@@ -237,11 +276,11 @@ def test_a_tote_lost_on_the_way_is_noticed(robot: Robot) -> None:
 
 
 def test_navigation_that_fails_ends_the_mission_with_its_reason(robot: Robot) -> None:
-    robot.failures["navigate_to_pose"] = ["no path from (0.00, 0.00) to (5.00, 0.90)"]
+    robot.failures["navigate_to_pose"] = ["no path from (0.00, 0.00) to (5.00, 0.70)"]
     mission = robot.run()
     assert mission.succeeded is False
     assert mission.reason == (
-        "tote_a: drive to shelf: NavigateTo[shelf]: no path from (0.00, 0.00) to (5.00, 0.90)"
+        "tote_a: drive to shelf: NavigateTo[shelf]: no path from (0.00, 0.00) to (5.00, 0.70)"
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 
 CORNER = 0.02
 """A chain of points that leaves its chord by more than this has a corner [m]."""
@@ -44,8 +44,15 @@ class BoxFace:
     """1 perfect ... 0: width at the edge of the tolerance, or rms 3 cm."""
 
 
-def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
-    """Return the line that most points lie on, or None if there are fewer than 5 of them.
+def fit_wall(
+    points: ArrayLike,
+    *,
+    tolerance: float = 0.02,
+    facing: float = 0.0,
+    max_yaw: float = math.pi,
+    min_length: float = 0.0,
+) -> WallFit | None:
+    """Return the line that most points lie on, among lines that may be the wall, or None if there is none.
 
     Lines through pairs of points are scored by truncated squared distance (MSAC, Torr and Zisserman 2000),
     in a fixed order; then total least squares over the inliers.
@@ -53,6 +60,9 @@ def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
     Args:
         points: Shape (n, 2), in the base frame [m].
         tolerance: Points within this of the line belong to it [m].
+        facing: Expected direction of the perpendicular in the base frame [rad].
+        max_yaw: A line turned further than this against it is another thing [rad].
+        min_length: So is a line whose points reach less far along it [m].
     """
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     if len(xy) < 5:
@@ -62,11 +72,16 @@ def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
     along = some[j] - some[i]
     length = np.hypot(along[:, 0], along[:, 1])
     apart = length > 2.0 * tolerance
-    if not apart.any():
-        return None
     i, along, length = i[apart], along[apart], length[apart]
     normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     offsets = np.einsum("ij,ij->i", normals, some[i])
+    normals[offsets < 0.0] *= -1.0
+    offsets = np.abs(offsets)
+    turned = wrap_angles(np.arctan2(normals[:, 1], normals[:, 0]) - facing)
+    may_be = np.abs(turned) <= max_yaw
+    if not may_be.any():
+        return None
+    normals, offsets = normals[may_be], offsets[may_be]
     squared = (normals @ some.T - offsets[:, None]) ** 2
     best = int(np.argmin(np.minimum(squared, tolerance**2).sum(axis=1)))
     normal, offset = normals[best], float(offsets[best])
@@ -78,26 +93,27 @@ def fit_wall(points: ArrayLike, *, tolerance: float = 0.02) -> WallFit | None:
     if offset < 0.0:
         normal, offset = -normal, -offset
     yaw = math.atan2(normal[1], normal[0])
+    reach = float(np.ptp(xy[inliers] @ np.array([-normal[1], normal[0]])))
+    if abs(wrap_angle(yaw - facing)) > max_yaw or reach < min_length:
+        return None
     return WallFit(distance=offset, yaw=yaw, rms=rms, inliers=inliers)
 
 
-def find_box_face(
+def find_box_faces(
     points: ArrayLike,
     width: float,
     *,
-    expected_y: float = 0.0,
     width_tolerance: float = 0.03,
     max_gap: float = 0.05,
     max_yaw: float = math.radians(40.0),
-) -> BoxFace | None:
-    """Return the face of a box of known width that is nearest to an expected lateral position, or None.
+) -> list[BoxFace]:
+    """Return the faces of boxes of known width, that nearest to straight ahead first.
 
     The scan is cut where neighbours are far apart and at corners; a piece is a face if its width fits.
 
     Args:
         points: Shape (n, 2), in the base frame, in the order of the beams [m].
         width: Of the face [m].
-        expected_y: Lateral position of its centre in the base frame [m].
         width_tolerance: [m].
         max_gap: Neighbouring points farther apart than this belong to different things [m].
         max_yaw: A face turned away farther than this is not looked at [rad].
@@ -105,7 +121,7 @@ def find_box_face(
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     xy = xy[np.isfinite(xy).all(axis=1)]
     if len(xy) < 5:
-        return None
+        return []
     gaps = np.flatnonzero(np.hypot(*np.diff(xy, axis=0).T) > max_gap) + 1
     faces = []
     for segment in np.split(xy, gaps):
@@ -113,7 +129,7 @@ def find_box_face(
             face = _face(_grown(segment, first, last), width, width_tolerance, max_yaw)
             if face is not None:
                 faces.append(face)
-    return min(faces, key=lambda face: abs(face.pose.y - expected_y), default=None)
+    return sorted(faces, key=lambda face: abs(face.pose.y))
 
 
 def _total_least_squares(points: Array) -> tuple[Array, float, float]:

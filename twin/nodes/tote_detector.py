@@ -1,4 +1,4 @@
-"""`/tote_detector`: while enabled, finds a tote's front face in the palm's scan; publishes `tote_pose`."""
+"""`/tote_detector`: while enabled, finds front faces of totes in the palm's scan; publishes `tote_poses`."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import LaserScan, PoseStamped, new
+from twin.bridge.conversions import pose_from_pose2
+from twin.bridge.msgs import LaserScan, PoseArray, header, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
-from twin.navigation.docking import find_box_face
+from twin.navigation.docking import find_box_faces
 from twin.nodes.costmap import scan_points
-from twin.nodes.messages import pose_stamped
 from twin.nodes.robot_pose import RobotPose
 
 
@@ -26,14 +26,17 @@ class ToteDetectorConfig:
     """Width of the face [m]."""
     width_tolerance: float = 0.035
     """[m]"""
-    max_x: float = 1.6
+    max_x: float = 1.8
     """Points further ahead of the base are not looked at [m]."""
-    max_y: float = 0.45
+    max_y: float = 0.8
     """Points further aside are not looked at [m]."""
 
 
 class ToteDetectorNode:
-    """Takes `palm_scan`; publishes the face's centre in the base frame, x into the tote."""
+    """Takes `palm_scan`; publishes the faces' centres in the base frame, x into the tote.
+
+    Which of several totes is meant, it does not know; that nearest to straight ahead comes first.
+    """
 
     def __init__(
         self,
@@ -46,7 +49,7 @@ class ToteDetectorNode:
         self.node = bus.create_node("tote_detector", namespace)
         self.config = config or ToteDetectorConfig()
         self._robot_pose = robot_pose
-        self._publisher = self.node.create_publisher(PoseStamped, "tote_pose", 10)
+        self._publisher = self.node.create_publisher(PoseArray, "tote_poses", 10)
         self.enabled = False
         """Whether scans are looked at; only docking and grasping need it, and it costs more than the scan."""
         self.node.create_service(SetBool, "tote_detector/enable", self._on_enable)
@@ -68,6 +71,7 @@ class ToteDetectorNode:
         near = (points[:, 0] < config.max_x) & (np.abs(points[:, 1]) < config.max_y)
         if np.count_nonzero(near) < 5:
             return
-        face = find_box_face(points[near], config.tote_width, width_tolerance=config.width_tolerance)
-        if face is not None:
-            self._publisher.publish(pose_stamped(face.pose, base, self.node.now_ns))
+        faces = find_box_faces(points[near], config.tote_width, width_tolerance=config.width_tolerance)
+        if faces:
+            poses = [pose_from_pose2(face.pose) for face in faces]
+            self._publisher.publish(PoseArray(header=header(ns(message.header.stamp), base), poses=poses))

@@ -83,7 +83,7 @@ def navigation_parameters(
 
 def _controller_server(overrides: Mapping[str, Any], linear: float, angular: float) -> ControllerServerConfig:
     """Return tolerances that docking can start from, and a lookahead that grows with speed."""
-    goal_checker = overridden(GoalCheckerConfig(xy_goal_tolerance=0.08, yaw_goal_tolerance=0.05), overrides)
+    goal_checker = overridden(GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.05), overrides)
     controller = RegulatedPurePursuitConfig(
         desired_linear_vel=linear,
         use_velocity_scaled_lookahead_dist=True,
@@ -91,8 +91,9 @@ def _controller_server(overrides: Mapping[str, Any], linear: float, angular: flo
         max_lookahead_dist=1.0,
         lookahead_time=1.0,
         rotate_to_heading_angular_vel=min(1.2, angular),
-        max_angular_accel=2.0,
+        max_angular_accel=1.2,
         rotate_to_heading_min_angle=0.6,
+        approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=goal_checker.xy_goal_tolerance,
     )
     return ControllerServerConfig(

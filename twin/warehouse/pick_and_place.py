@@ -48,7 +48,9 @@ class PickAndPlaceConfig:
     carry_z: float = 0.45
     """Height of the grasp frame while driving with a tote [m]."""
     pick_attempts: int = 3
-    """Docking and grasping is tried this often."""
+    """Docking and grasping is tried this often, each time from the staging pose."""
+    dock_attempts: int = 3
+    """Docking at the table is tried this often."""
 
 
 class PickAndPlaceNode(MobileManipulationNode):
@@ -94,12 +96,14 @@ class PickAndPlaceNode(MobileManipulationNode):
             self.retract(),
             self.undock_from("shelf"),
             self.stow(carry_z),
+            self.report(f"{task.tote}: drive to {task.pick.name} again"),
+            self.drive_to(task.pick),
         ]
         pick = RecoveryNode(
             "PickWithRetries",
             self.config.pick_attempts - 1,
             self._pick(task),
-            sequence("ReleaseAndBackOff", give_up),
+            sequence("ReleaseAndStageAgain", give_up),
         )
         return sequence(
             task.tote,
@@ -151,11 +155,17 @@ class PickAndPlaceNode(MobileManipulationNode):
         set_down = task.place.surface_z + task.tote_height / 2.0 + config.set_down_clearance
         above = set_down + config.lift_off
         x = config.docked_distance + config.place_depth
+        dock = RecoveryNode(
+            "DockWithRetries",
+            config.dock_attempts - 1,
+            self.dock_at(task.place, "table"),
+            sequence("StageAgain", [self.undock_from("table"), self.drive_to(task.place)]),
+        )
         return sequence(
             "Place",
             [
                 self.report(f"{task.tote}: dock at {task.place.name}"),
-                self.dock_at(task.place, "table"),
+                dock,
                 self.report(f"{task.tote}: set down"),
                 self.move_to_height("RaiseToPlace", above, loaded=True),
                 self.reach("ReachToPlace", x, above, loaded=True),

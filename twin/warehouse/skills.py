@@ -28,7 +28,7 @@ from twin.bridge.msgs import (
     JointState,
     JointTrajectory,
     JointTrajectoryPoint,
-    PoseStamped,
+    PoseArray,
     duration,
     header,
     new,
@@ -38,6 +38,7 @@ from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
 from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
+from twin.nodes.docking_server import DockingConfig
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.robot_pose import Frames
@@ -58,7 +59,7 @@ class Station:
 class SkillsConfig:
     """How gently, and how sure, the robot handles goods."""
 
-    staging_distance: float = 1.1
+    staging_distance: float = DockingConfig.staging_distance
     """From the face to the base's origin before docking [m]."""
     gripper_effort: float = 160.0
     """[N]"""
@@ -67,7 +68,9 @@ class SkillsConfig:
     loaded_speed: float = 0.5
     """Fraction of the arm's speed while it carries something."""
     samples: int = 5
-    """Detections of a tote that are averaged before reaching."""
+    """Detections of a tote before reaching; their median counts."""
+    max_aside: float = 0.05
+    """A tote further aside than this is not the one that the robot docked at [m]."""
     look_timeout_ns: int = 3_000_000_000
     """For these detections [ns]."""
 
@@ -102,13 +105,14 @@ class MobileManipulationNode(MissionNode):
         self._gripper = ActionClient(node, GripperCommand, "gripper_controller/gripper_cmd")
         self._detector = node.create_client(SetBool, "tote_detector/enable")
         node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
-        node.create_subscription(PoseStamped, "tote_pose", self._on_tote_pose, self.skills.samples)
+        node.create_subscription(PoseArray, "tote_poses", self._on_tote_poses, self.skills.samples)
 
     def _on_joint_states(self, message: JointState) -> None:
         self._joints = dict(zip(message.name, message.position.tolist(), strict=True))
 
-    def _on_tote_pose(self, message: PoseStamped) -> None:
-        self._totes.append(pose2_from_pose(message.pose))
+    def _on_tote_poses(self, message: PoseArray) -> None:
+        totes = [pose2_from_pose(pose) for pose in message.poses]
+        self._totes += [tote for tote in totes if abs(tote.y) <= self.skills.max_aside][:1]
         del self._totes[: -self.skills.samples]
 
     # Driving
@@ -191,7 +195,7 @@ class MobileManipulationNode(MissionNode):
         """Bring the grasp frame to the middle, `depth` / 2 [m] behind the face, of the tote that was seen."""
 
         def target() -> dict[str, float]:
-            x, _, yaw = np.mean(self._totes, axis=0)
+            x, _, yaw = np.median(self._totes, axis=0)
             return self._arm.inverse(GraspPose(x=float(x) + depth / 2.0, z=z, yaw=float(yaw)))
 
         return self.move("ReachForTote", target)
@@ -287,5 +291,5 @@ class _Look(Behaviour):
             return Status.SUCCESS
         if self._robot.node.now_ns < self._deadline:
             return Status.RUNNING
-        self._robot.note("no tote in sight")
+        self._robot.note("no tote straight ahead")
         return Status.FAILURE
