@@ -29,6 +29,10 @@ class Problem:
     file: Path | None = None
     line: int | None = None
     """1-based line in `file`."""
+    code: str = ""
+    """Stable name of this kind of fault, such as `two-parents`; only robot files have them."""
+    element: str = ""
+    """What it is about, such as `joint 'lift_joint'`."""
 
     def __str__(self) -> str:
         if self.file is None:

@@ -11,6 +11,7 @@ from twin.convert.geoms import GeomBuilder
 from twin.errors import ConversionError, Problem
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.models.description import Inertial, Joint, Link, RobotDescription
+from twin.models.kinematics import rigid_groups
 
 Base = Literal["free", "fixed", "kinematic"]
 
@@ -116,18 +117,6 @@ def _add_planar(body: mujoco.MjsBody, joint: Joint) -> None:
     body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
 
 
-def rigid_groups(description: RobotDescription) -> dict[str, str]:
-    """Return, for every link, the first link of its rigid group (fixed joints do not separate)."""
-    head = {description.root: description.root}
-    pending = [description.root]
-    while pending:
-        link = pending.pop(0)
-        for joint in description.children(link):
-            head[joint.child] = head[link] if joint.type == "fixed" else joint.child
-            pending.append(joint.child)
-    return head
-
-
 def _check_masses(description: RobotDescription, base: Base) -> None:
     heads = rigid_groups(description)
     mass = dict.fromkeys(heads.values(), 0.0)
@@ -139,6 +128,8 @@ def _check_masses(description: RobotDescription, base: Base) -> None:
             f"link '{name}' moves and has no mass, nor has anything fixed to it; give it an <inertial>",
             description.source,
             description.links[name].line or None,
+            code="massless",
+            element=f"link '{name}'",
         )
         for name, total in mass.items()
         if total <= 0.0 and name != still

@@ -7,9 +7,9 @@ from itertools import product
 import mujoco
 import numpy as np
 
-from twin.convert.bodies import rigid_groups
 from twin.convert.geoms import GROUP_COLLISION
 from twin.models.description import RobotDescription
+from twin.models.kinematics import rigid_groups
 
 _TYPE = mujoco.mjtGeom
 

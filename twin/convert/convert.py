@@ -67,7 +67,7 @@ def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjMod
         return spec.copy().compile()
     except ValueError as error:
         message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
-        raise ConversionError(Problem(message, description.source)) from error
+        raise ConversionError(Problem(message, description.source, code="mujoco", element="robot")) from error
 
 
 def _without_world(description: RobotDescription) -> tuple[RobotDescription, list[LedgerEntry]]:

@@ -81,7 +81,7 @@ class GeomBuilder:
         placed = _placed(shape.T_link_geometry)
         if isinstance(shape.geometry, Mesh):
             return {**placed, "type": _TYPE.mjGEOM_MESH, "meshname": self._mesh(shape.geometry, link)}
-        kind, size = _primitive(shape.geometry)
+        kind, size = primitive(shape.geometry)
         return {**placed, "type": kind, "size": size}
 
     def _mesh(self, mesh: Mesh, link: Link) -> str:
@@ -90,7 +90,9 @@ class GeomBuilder:
             message = (
                 f"mesh '{mesh.path.name}' of link '{link.name}' is not of a format MuJoCo reads: {readable}"
             )
-            raise ConversionError(Problem(message, mesh.path))
+            raise ConversionError(
+                Problem(message, mesh.path, code="mesh-format", element=f"link '{link.name}'")
+            )
         key = (mesh.path, mesh.scale)
         if key not in self._meshes:
             name = f"{mesh.path.stem}#{len(self._meshes)}"
@@ -111,7 +113,7 @@ def _placed(pose: Pose3) -> dict[str, Any]:
     return {"pos": pose.xyz, "quat": pose.quat_wxyz}
 
 
-def _primitive(geometry: Geometry) -> tuple[mujoco.mjtGeom, list[float]]:
+def primitive(geometry: Geometry) -> tuple[mujoco.mjtGeom, list[float]]:
     """Return MuJoCo's type and half sizes [m]."""
     if isinstance(geometry, Box):
         return _TYPE.mjGEOM_BOX, [edge / 2.0 for edge in geometry.size]

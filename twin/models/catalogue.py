@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from twin.errors import ModelError, nearest
+from twin.errors import ModelError, Problem, nearest
 
 ROBOTS = Path(__file__).parent / "robots"
 """A ROS package (`$(find twin_robots)`) with one folder per robot."""
@@ -30,8 +30,9 @@ def resolve(name_or_path: str | Path) -> Path:
     if text in robots:
         return robots[text]
     if isinstance(name_or_path, Path) or path.suffix in (".urdf", ".xacro", ".xml") or len(path.parts) > 1:
-        raise ModelError(f"no such model file: {text}")
-    raise ModelError(f"unknown robot '{text}': {nearest(text, robots)}, or the path of a URDF or xacro file")
+        raise ModelError(Problem(f"no such model file: {text}", code="no-file"))
+    message = f"unknown robot '{text}': {nearest(text, robots)}, or the path of a URDF or xacro file"
+    raise ModelError(Problem(message, code="no-file"))
 
 
 def _is_robot(path: Path) -> bool:

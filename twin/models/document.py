@@ -16,6 +16,8 @@ Element = Any
 """An lxml element; the library ships no types."""
 
 MAX_BYTES = 32 * 1024 * 1024
+PLACES = ("link", "joint", "gazebo", "sensor")
+"""Elements that a user knows by name."""
 
 
 @dataclass
@@ -27,9 +29,10 @@ class Report:
     """False for text that xacro wrote: its lines are not the user's."""
     problems: list[Problem] = field(default_factory=list)
 
-    def add(self, element: Element | None, message: str) -> None:
-        """Note a problem of `element`."""
-        self.problems.append(Problem(message, self.source, self.line(element) or None))
+    def add(self, element: Element | None, message: str, *, code: str) -> None:
+        """Note a problem of `element`; its `code` is one of `twin.models.checks.codes`."""
+        line = self.line(element) or None
+        self.problems.append(Problem(message, self.source, line, code=code, element=place(element)))
 
     def line(self, element: Element | None) -> int:
         """Return the 1-based line of an element in the user's file, 0 where that is unknown."""
@@ -50,18 +53,28 @@ class Report:
         text = element.get(name)
         if text is None:
             if default is None:
-                self.add(element, f"{describe(element)} has no {name}=; {_count(count)} needed")
+                self.add(
+                    element,
+                    f"{describe(element)} has no {name}=; {_count(count)} needed",
+                    code="missing-attribute",
+                )
             return fallback
         try:
             values = tuple(float(word) for word in text.split())
         except ValueError:
-            self.add(element, f"{describe(element)}: {name}='{text}' is not {_count(count)}")
+            self.add(
+                element, f"{describe(element)}: {name}='{text}' is not {_count(count)}", code="bad-number"
+            )
             return fallback
         if len(values) != count:
-            self.add(element, f"{describe(element)}: {name}='{text}' has {len(values)} numbers, not {count}")
+            self.add(
+                element,
+                f"{describe(element)}: {name}='{text}' has {len(values)} numbers, not {count}",
+                code="bad-number",
+            )
             return fallback
         if not all(map(math.isfinite, values)):
-            self.add(element, f"{describe(element)}: {name}='{text}' is not finite")
+            self.add(element, f"{describe(element)}: {name}='{text}' is not finite", code="bad-number")
             return fallback
         return values
 
@@ -85,14 +98,18 @@ class Report:
             value = math.nan
         if math.isfinite(value):
             return value
-        self.add(child, f"{describe(element)}: <{child.tag}>{text}</{child.tag}> is not a finite number")
+        self.add(
+            child,
+            f"{describe(element)}: <{child.tag}>{text}</{child.tag}> is not a finite number",
+            code="bad-number",
+        )
         return None
 
     def required(self, element: Element, name: str) -> str:
         """Return a non-empty attribute; its absence is noted."""
         text = (element.get(name) or "").strip()
         if not text:
-            self.add(element, f"{describe(element)} has no {name}=")
+            self.add(element, f"{describe(element)} has no {name}=", code="missing-attribute")
         return text
 
 
@@ -104,7 +121,7 @@ def parse(text: bytes, report: Report) -> Element:
             and no robot needs them).
     """
     if len(text) > MAX_BYTES:
-        report.add(None, f"the file has {len(text)} bytes; at most {MAX_BYTES} are read")
+        report.add(None, f"the file has {len(text)} bytes; at most {MAX_BYTES} are read", code="too-large")
         report.raise_if_any()
     _refuse_doctype(text, report)
     parser = etree.XMLParser(
@@ -114,9 +131,13 @@ def parse(text: bytes, report: Report) -> Element:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         line = error.lineno if report.with_lines else None
-        raise ModelError(Problem(f"not well-formed XML: {error.msg}", report.source, line)) from None
+        raise ModelError(
+            Problem(f"not well-formed XML: {error.msg}", report.source, line, code="bad-xml")
+        ) from None
     if root.tag != "robot":
-        report.add(root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>")
+        report.add(
+            root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>", code="not-urdf"
+        )
         report.raise_if_any()
     return root
 
@@ -142,6 +163,16 @@ def describe(element: Element) -> str:
     return f"{element.tag} '{name}'" if name else f"<{element.tag}>{_of_owner(element)}"
 
 
+def place(element: Element | None) -> str:
+    """Return the link, joint, gazebo element or sensor that an element is or belongs to, else `robot`."""
+    if element is None:
+        return "robot"
+    name = element.get("name") or element.get("reference")
+    if name and element.tag in PLACES:
+        return f"{element.tag} '{name}'"
+    return _of_owner(element).removeprefix(" of ") or "robot"
+
+
 def owner(element: Element) -> str:
     """Return how to call the link, joint, sensor or gazebo element that an element belongs to."""
     return _of_owner(element).removeprefix(" of ") or f"<{element.tag}>"
@@ -150,7 +181,7 @@ def owner(element: Element) -> str:
 def _of_owner(element: Element) -> str:
     for parent in element.iterancestors():
         name = parent.get("name") or parent.get("reference")
-        if name and parent.tag in ("link", "joint", "gazebo", "sensor"):
+        if name and parent.tag in PLACES:
             return f" of {parent.tag} '{name}'"
     return ""
 
@@ -162,7 +193,9 @@ def _refuse_doctype(text: bytes, report: Report) -> None:
     def refuse(*_: object) -> None:
         line = parser.CurrentLineNumber if report.with_lines else None
         raise ModelError(
-            Problem("the file has a DOCTYPE; remove it, a robot needs none", report.source, line)
+            Problem(
+                "the file has a DOCTYPE; remove it, a robot needs none", report.source, line, code="doctype"
+            )
         )
 
     parser.StartDoctypeDeclHandler = refuse
@@ -171,7 +204,9 @@ def _refuse_doctype(text: bytes, report: Report) -> None:
     except expat.ExpatError as error:
         line = error.lineno if report.with_lines else None
         message = expat.ErrorString(error.code)
-        raise ModelError(Problem(f"not well-formed XML: {message}", report.source, line)) from None
+        raise ModelError(
+            Problem(f"not well-formed XML: {message}", report.source, line, code="bad-xml")
+        ) from None
 
 
 def _count(count: int) -> str:

@@ -43,7 +43,9 @@ def expand(
     answer = _run_worker(request, source, time_limit_s)
     if "error" in answer:
         file = Path(answer["files"][-1]) if answer["files"] else source
-        raise ModelError(Problem(f"xacro: {answer['error']}", source if _same(file, source) else file))
+        raise ModelError(
+            Problem(f"xacro: {answer['error']}", source if _same(file, source) else file, code="xacro")
+        )
     return answer["urdf"]
 
 
@@ -62,11 +64,15 @@ def _run_worker(request: Mapping[str, object], source: Path, time_limit_s: float
         )
     except subprocess.TimeoutExpired:
         raise ModelError(
-            Problem(f"xacro did not finish within {time_limit_s:g} s; look for endless recursion", source)
+            Problem(
+                f"xacro did not finish within {time_limit_s:g} s; look for endless recursion",
+                source,
+                code="xacro",
+            )
         ) from None
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        raise ModelError(Problem(f"xacro failed: {reason[0]}", source))
+        raise ModelError(Problem(f"xacro failed: {reason[0]}", source, code="xacro"))
     return json.loads(done.stdout)
 
 
@@ -78,7 +84,9 @@ def known_packages(source: Path, given: Mapping[str, Path]) -> dict[str, Path]:
     """
     missing = [name for name, path in given.items() if not path.is_dir()]
     if missing:
-        raise ModelError(Problem(f"package '{name}': no such folder {given[name]}") for name in missing)
+        raise ModelError(
+            Problem(f"package '{name}': no such folder {given[name]}", code="no-package") for name in missing
+        )
     found = {"twin_robots": ROBOTS}
     for folder in source.resolve().parents:
         if (folder / "package.xml").is_file():

@@ -29,7 +29,11 @@ def read_surfaces(root: Element, report: Report) -> dict[str, Surface]:
         if friction is None:
             continue
         if friction < 0.0:
-            report.add(element, f"mu1 of link '{link}' is {friction:g}; friction is not negative")
+            report.add(
+                element,
+                f"mu1 of link '{link}' is {friction:g}; friction is not negative",
+                code="bad-friction",
+            )
             continue
         surfaces[link] = Surface(friction=friction, line=report.line(element))
     return surfaces
@@ -41,7 +45,7 @@ def read_drive(root: Element, joints: Mapping[str, Joint], report: Report) -> Dr
     if not plugins:
         return None
     if len(plugins) > 1:
-        report.add(plugins[1], "the robot has two drive plugins; one is allowed")
+        report.add(plugins[1], "the robot has two drive plugins; one is allowed", code="bad-drive")
     plugin = plugins[0]
     left, right = (_wheel_joints(plugin, names, joints, report) for names in (LEFT, RIGHT))
     separation = report.child_number(plugin, "wheel_separation", "wheelSeparation")
@@ -51,7 +55,7 @@ def read_drive(root: Element, joints: Mapping[str, Joint], report: Report) -> Dr
         radius = diameter / 2.0
     for what, value in (("wheel_separation", separation), ("wheel_radius", radius)):
         if value is None or value <= 0.0:
-            report.add(plugin, f"the drive plugin needs a positive <{what}> [m]")
+            report.add(plugin, f"the drive plugin needs a positive <{what}> [m]", code="bad-drive")
     torque = report.child_number(plugin, "max_wheel_torque", "wheelTorque", "torque")
     return DriveSpec(
         kind="skid_steer" if len(left) > 1 or _names(plugin, SKID_STEER) else "diff_drive",
@@ -82,20 +86,25 @@ def read_commands(root: Element, joints: Mapping[str, Joint], report: Report) ->
         kind = interface.get("name", "")
         if kind not in INTERFACES:
             report.add(
-                interface, f"command interface '{kind}' of joint '{name}': {nearest(kind, INTERFACES)}"
+                interface,
+                f"command interface '{kind}' of joint '{name}': {nearest(kind, INTERFACES)}",
+                code="bad-command",
             )
             continue
         if name not in joints:
             report.add(
                 element,
                 f"<ros2_control> commands joint '{name}', which does not exist; {nearest(name, joints)}",
+                code="bad-command",
             )
         elif joints[name].mimic is not None:
             report.add(
-                element, f"<ros2_control> commands joint '{name}', which mimics another; command its leader"
+                element,
+                f"<ros2_control> commands joint '{name}', which mimics another; command its leader",
+                code="bad-command",
             )
         elif joints[name].type == "fixed":
-            report.add(element, f"<ros2_control> commands joint '{name}', which is fixed")
+            report.add(element, f"<ros2_control> commands joint '{name}', which is fixed", code="bad-command")
         commands[name] = CommandSpec(joint=name, interface=kind, line=report.line(element))
     return commands
 
@@ -121,15 +130,17 @@ def _wheel_joints(
             report.add(
                 child,
                 f"the drive plugin names joint '{joint}', which does not exist; {nearest(joint, joints)}",
+                code="bad-drive",
             )
         elif joints[joint].type not in ("continuous", "revolute"):
             report.add(
                 child,
                 f"the drive plugin names joint '{joint}', which is {joints[joint].type}, not continuous",
+                code="bad-drive",
             )
         found.append(joint)
     if not found:
-        report.add(plugin, f"the drive plugin has no <{names[0]}>")
+        report.add(plugin, f"the drive plugin has no <{names[0]}>", code="bad-drive")
     return tuple(found)
 
 

@@ -20,7 +20,9 @@ def read_joint(element: Element, report: Report) -> Joint:
     name = report.required(element, "name")
     kind = element.get("type", "")
     if kind not in JOINT_TYPES:
-        report.add(element, f"joint '{name}' has type '{kind}'; {nearest(kind, JOINT_TYPES)}")
+        report.add(
+            element, f"joint '{name}' has type '{kind}'; {nearest(kind, JOINT_TYPES)}", code="joint-type"
+        )
         kind = "fixed"
     dynamics = element.find("dynamics")
     return Joint(
@@ -41,7 +43,7 @@ def read_joint(element: Element, report: Report) -> Joint:
 def _link_of(element: Element, role: str, report: Report) -> str:
     child = element.find(role)
     if child is None:
-        report.add(element, f"{describe(element)} has no <{role} link='...'/>")
+        report.add(element, f"{describe(element)} has no <{role} link='...'/>", code="missing-link")
         return ""
     return report.required(child, "link")
 
@@ -55,7 +57,11 @@ def _read_axis(element: Element, kind: str, report: Report) -> tuple[float, floa
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
         if kind not in ("fixed", "floating") and len(report.problems) == known:
-            report.add(axis, f"{describe(element)} has a zero axis; give a direction such as xyz='0 0 1'")
+            report.add(
+                axis,
+                f"{describe(element)} has a zero axis; give a direction such as xyz='0 0 1'",
+                code="zero-axis",
+            )
         return (1.0, 0.0, 0.0)
     return (x / length, y / length, z / length)
 
@@ -65,17 +71,23 @@ def _read_limit(element: Element, kind: str, report: Report) -> Limit:
     if limit is None:
         if kind in BOUNDED:
             needed = "<limit lower='' upper='' effort='' velocity=''/>"
-            report.add(element, f"{describe(element)} is {kind} and has no {needed}")
+            report.add(element, f"{describe(element)} is {kind} and has no {needed}", code="missing-limit")
         return Limit()
     effort, velocity = report.optional_number(limit, "effort"), report.optional_number(limit, "velocity")
     for what, value in (("effort", effort), ("velocity", velocity)):
         if value is not None and value < 0.0:
-            report.add(limit, f"{describe(element)}: {what} limit {value:g} is negative")
+            report.add(
+                limit, f"{describe(element)}: {what} limit {value:g} is negative", code="negative-limit"
+            )
     if kind not in BOUNDED:
         return Limit(effort=effort, velocity=velocity)
     lower, upper = report.number(limit, "lower", 0.0), report.number(limit, "upper", 0.0)
     if lower > upper:
-        report.add(limit, f"{describe(element)}: lower limit {lower:g} is above the upper limit {upper:g}")
+        report.add(
+            limit,
+            f"{describe(element)}: lower limit {lower:g} is above the upper limit {upper:g}",
+            code="swapped-limits",
+        )
         lower, upper = upper, lower
     return Limit(lower=lower, upper=upper, effort=effort, velocity=velocity)
 
@@ -102,7 +114,11 @@ def unique(
         if item.name in found:
             earlier = found[item.name].line
             where = f" (first at line {earlier})" if earlier else ""
-            report.add(element, f"{kind} '{item.name}' is defined twice{where}; names are unique")
+            report.add(
+                element,
+                f"{kind} '{item.name}' is defined twice{where}; names are unique",
+                code="duplicate-name",
+            )
             continue
         found[item.name] = item
     return found
@@ -125,23 +141,31 @@ def check_tree(
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name and name not in links:
                 missing = f"{role} link '{name}' of joint '{joint.name}' does not exist"
-                report.add(element, f"{missing}; {nearest(name, links)}")
+                report.add(element, f"{missing}; {nearest(name, links)}", code="unknown-link")
         if joint.child in parent_joint:
             other = parent_joint[joint.child].name
             both = f"joints '{other}' and '{joint.name}'"
-            report.add(element, f"link '{joint.child}' has two parents: {both}; a robot is a tree")
+            report.add(
+                element,
+                f"link '{joint.child}' has two parents: {both}; a robot is a tree",
+                code="two-parents",
+            )
         parent_joint.setdefault(joint.child, joint)
     _check_mimics(joints, elements, report)
     roots = [name for name in links if name not in parent_joint]
     if not links:
-        report.add(None, "the robot has no links")
+        report.add(None, "the robot has no links", code="no-links")
     elif not roots:
         report.add(
-            None, f"the joints form a cycle through all links: {_cycle(next(iter(links)), parent_joint)}"
+            None,
+            f"the joints form a cycle through all links: {_cycle(next(iter(links)), parent_joint)}",
+            code="cycle",
         )
     elif len(roots) > 1:
         report.add(
-            None, f"the robot has {len(roots)} root links ({', '.join(roots)}); connect all but one by joints"
+            None,
+            f"the robot has {len(roots)} root links ({', '.join(roots)}); connect all but one by joints",
+            code="several-roots",
         )
     else:
         _check_reachable(links, parent_joint, report)
@@ -157,7 +181,7 @@ def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint
             path.append(link)
             link = parent_joint[link].parent
         if link in path:
-            report.add(None, f"the joints form a cycle: {_cycle(link, parent_joint)}")
+            report.add(None, f"the joints form a cycle: {_cycle(link, parent_joint)}", code="cycle")
             return
         safe.update(path)
 
@@ -177,11 +201,15 @@ def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], 
         while leader is not None:
             if leader.joint not in joints:
                 missing = f"joint '{joint.name}' mimics '{leader.joint}', which does not exist"
-                report.add(elements[joint.name], f"{missing}; {nearest(leader.joint, joints)}")
+                report.add(
+                    elements[joint.name], f"{missing}; {nearest(leader.joint, joints)}", code="unknown-leader"
+                )
                 break
             if leader.joint in seen:
                 loop = " -> ".join([*seen, leader.joint])
-                report.add(elements[joint.name], f"joint '{joint.name}' mimics itself: {loop}")
+                report.add(
+                    elements[joint.name], f"joint '{joint.name}' mimics itself: {loop}", code="mimic-cycle"
+                )
                 break
             seen.append(leader.joint)
             leader = joints[leader.joint].mimic

@@ -53,3 +53,15 @@ def link_poses(
             poses[joint.child] = poses[link] @ joint.T_parent_joint @ motion
             pending.append(joint.child)
     return poses
+
+
+def rigid_groups(description: RobotDescription) -> dict[str, str]:
+    """Return, for every link, the first link of its rigid group (fixed joints do not separate)."""
+    head = {description.root: description.root}
+    pending = [description.root]
+    while pending:
+        link = pending.pop(0)
+        for joint in description.children(link):
+            head[joint.child] = head[link] if joint.type == "fixed" else joint.child
+            pending.append(joint.child)
+    return head

@@ -60,7 +60,11 @@ def read_link(element: Element, context: LinkContext) -> Link:
     name = report.required(element, "name")
     inertials = element.findall("inertial")
     if len(inertials) > 1:
-        report.add(inertials[1], f"link '{name}' has {len(inertials)} <inertial>; one is allowed")
+        report.add(
+            inertials[1],
+            f"link '{name}' has {len(inertials)} <inertial>; one is allowed",
+            code="bad-inertial",
+        )
     return Link(
         name=name,
         inertial=_read_inertial(inertials[0], name, report) if inertials else None,
@@ -94,16 +98,22 @@ def read_origin(element: Element, report: Report) -> Pose3:
 def _read_inertial(element: Element, link: str, report: Report) -> Inertial | None:
     mass_element, inertia_element = element.find("mass"), element.find("inertia")
     if mass_element is None or inertia_element is None:
-        report.add(element, f"<inertial> of link '{link}' needs <mass value=''/> and <inertia ixx='' .../>")
+        report.add(
+            element,
+            f"<inertial> of link '{link}' needs <mass value=''/> and <inertia ixx='' .../>",
+            code="bad-inertial",
+        )
         return None
     mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
     if mass <= 0.0:
-        report.add(mass_element, f"link '{link}' has mass {mass:g} kg; a mass is positive")
+        report.add(mass_element, f"link '{link}' has mass {mass:g} kg; a mass is positive", code="bad-mass")
         return None
     inertia = _read_inertia(inertia_element, report)
     fault = inertia_fault(inertia)
     if fault:
-        report.add(inertia_element, f"link '{link}' has an impossible inertia: {fault}")
+        report.add(
+            inertia_element, f"link '{link}' has an impossible inertia: {fault}", code="impossible-inertia"
+        )
     return Inertial(
         T_link_com=read_origin(element, report), mass=mass, inertia=inertia, line=report.line(element)
     )
@@ -148,7 +158,11 @@ def _read_material(element: Element, context: LinkContext) -> Rgba:
         return context.materials[name]
     if material.find("texture") is None:
         valid = nearest(name, context.materials) if context.materials else "the file defines none"
-        context.report.add(material, f"material '{name}' of {owner(element)} is not defined; {valid}")
+        context.report.add(
+            material,
+            f"material '{name}' of {owner(element)} is not defined; {valid}",
+            code="undefined-material",
+        )
     return DEFAULT_RGBA
 
 
@@ -163,7 +177,9 @@ def _read_geometry(element: Element, context: LinkContext) -> Geometry:
     geometry = element.find("geometry")
     if geometry is None or len(geometry) != 1:
         report.add(
-            element, f"{describe(element)} needs one <geometry> with one shape: {', '.join(GEOMETRIES)}"
+            element,
+            f"{describe(element)} needs one <geometry> with one shape: {', '.join(GEOMETRIES)}",
+            code="bad-geometry",
         )
         return placeholder
     shape = geometry[0]
@@ -171,13 +187,15 @@ def _read_geometry(element: Element, context: LinkContext) -> Geometry:
         return _read_mesh(shape, context) or placeholder
     if shape.tag not in GEOMETRIES:
         report.add(
-            shape, f"unknown geometry <{shape.tag}> in {describe(element)}; {nearest(shape.tag, GEOMETRIES)}"
+            shape,
+            f"unknown geometry <{shape.tag}> in {describe(element)}; {nearest(shape.tag, GEOMETRIES)}",
+            code="bad-geometry",
         )
         return placeholder
     known = len(report.problems)
     read = _read_primitive(shape, report)
     if len(report.problems) == known and min(_dimensions(read)) <= 0.0:
-        report.add(shape, f"{describe(shape)} has a dimension that is not positive")
+        report.add(shape, f"{describe(shape)} has a dimension that is not positive", code="bad-geometry")
     return read
 
 
@@ -212,7 +230,7 @@ def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
         hint = (
             "" if path is not None else f"; known packages: {', '.join(sorted(context.packages)) or 'none'}"
         )
-        report.add(shape, f"mesh '{reference}' of {owner(shape)} does not exist{hint}")
+        report.add(shape, f"mesh '{reference}' of {owner(shape)} does not exist{hint}", code="missing-mesh")
         return None
     return Mesh(path=path, scale=(x, y, z))
 

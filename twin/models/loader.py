@@ -16,6 +16,9 @@ from twin.models.joints import check_tree, read_joint, unique
 from twin.models.links import LinkContext, read_link, read_materials
 from twin.models.sensors import read_sensors
 
+VERSIONS = ("1", "1.0", "1.1", "1.2")
+"""1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
+XACRO = "http://www.ros.org/wiki/xacro"
 NO_ARGS: Mapping[str, str] = MappingProxyType({})
 NO_PACKAGES: Mapping[str, Path] = MappingProxyType({})
 
@@ -39,8 +42,7 @@ def load(
     source = resolve(name_or_path)
     found = known_packages(source, packages)
     raw = source.read_bytes()
-    if source.suffix == ".xacro" or b"http://www.ros.org/wiki/xacro" in raw:
-        parse(raw, Report(source))
+    if _has_xacro(source, raw):
         urdf = expand(source, args=args, packages=found)
         return parse_urdf(urdf, source, packages=found, lines_are_users=False)
     return parse_urdf(raw, source, packages=found)
@@ -67,6 +69,10 @@ def parse_urdf(
     raw = urdf.encode() if isinstance(urdf, str) else urdf
     report = Report(source, lines_are_users)
     root = parse(raw, report)
+    if root.get("version", "1.0") not in VERSIONS:
+        report.add(
+            root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
+        )
     surfaces = read_surfaces(root, report)
     links = _read_links(root, surfaces, packages, report)
     joints, elements = _read_joints(root, report)
@@ -85,6 +91,14 @@ def parse_urdf(
     _sort(report)
     report.raise_if_any()
     return description
+
+
+def _has_xacro(source: Path, raw: bytes) -> bool:
+    """Tell whether there is anything to expand: a file without it keeps its line numbers."""
+    if source.suffix != ".xacro" and XACRO.encode() not in raw:
+        return False
+    root = parse(raw, Report(source))
+    return b"$" in raw or any(element.tag.startswith(f"{{{XACRO}}}") for element in root.iter())
 
 
 def _read_links(

@@ -34,13 +34,15 @@ def read_sensors(root: Element, links: Mapping[str, Link], report: Report) -> tu
             link = gazebo.get("reference", "")
             if link not in links:
                 missing = f"sensor '{element.get('name', '')}' is on link '{link}', which does not exist"
-                report.add(gazebo, f"{missing}; {nearest(link, links)}")
+                report.add(gazebo, f"{missing}; {nearest(link, links)}", code="bad-sensor")
                 continue
             sensor = _read_sensor(element, link, report)
             if sensor is None:
                 continue
             if any(sensor.name == other.name for other in sensors):
-                report.add(element, f"sensor '{sensor.name}' is defined twice; names are unique")
+                report.add(
+                    element, f"sensor '{sensor.name}' is defined twice; names are unique", code="bad-sensor"
+                )
             sensors.append(sensor)
     return tuple(sensors)
 
@@ -74,7 +76,11 @@ def _common(element: Element, link: str, kind: str, report: Report) -> _Common:
     rate = report.child_number(element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate")
     rate = DEFAULT_RATE_HZ[kind] if rate is None else rate
     if rate <= 0.0:
-        report.add(element, f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; it is positive")
+        report.add(
+            element,
+            f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; it is positive",
+            code="bad-sensor",
+        )
         rate = 1.0
     topic = (
         text_of(element, "topic", "plugin/ros/remapping", "plugin/topicName", "plugin/topic") or TOPICS[kind]
@@ -94,14 +100,18 @@ def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
     samples = _need(element, scan, "samples", report)
     if samples != int(samples) or samples < 1:
         report.add(
-            element, f"sensor '{element.get('name', '')}' has {samples:g} samples; a whole number from 1"
+            element,
+            f"sensor '{element.get('name', '')}' has {samples:g} samples; a whole number from 1",
+            code="bad-sensor",
         )
     angle_min, angle_max = (
         _need(element, scan, "min_angle", report),
         _need(element, scan, "max_angle", report),
     )
     if angle_min > angle_max:
-        report.add(element, f"sensor '{element.get('name', '')}': min_angle is above max_angle")
+        report.add(
+            element, f"sensor '{element.get('name', '')}': min_angle is above max_angle", code="bad-sensor"
+        )
     low, high = _read_reach(element, report)
     return LidarSpec(
         **_common(element, link, "lidar", report),
@@ -123,6 +133,7 @@ def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
         report.add(
             element,
             f"sensor '{element.get('name', '')}' has a cone of {field_of_view:g} rad; 0 to pi is valid",
+            code="bad-sensor",
         )
     low, high = _read_reach(element, report)
     return RangeSpec(
@@ -150,7 +161,11 @@ def _read_reach(element: Element, report: Report) -> tuple[float, float]:
         reach = first(element, "sonar")
     low, high = _need(element, reach, "min", report), _need(element, reach, "max", report)
     if not 0.0 <= low < high:
-        report.add(element, f"sensor '{element.get('name', '')}': range {low:g} to {high:g} m is not a range")
+        report.add(
+            element,
+            f"sensor '{element.get('name', '')}': range {low:g} to {high:g} m is not a range",
+            code="bad-sensor",
+        )
     return low, high
 
 
@@ -167,7 +182,9 @@ def _need(sensor: Element, parent: Element | None, name: str, report: Report) ->
     if value is None:
         if parent is None or first(parent, name) is None:
             report.add(
-                sensor, f"sensor '{sensor.get('name', '')}' of type {sensor.get('type')} has no <{name}>"
+                sensor,
+                f"sensor '{sensor.get('name', '')}' of type {sensor.get('type')} has no <{name}>",
+                code="bad-sensor",
             )
         return 1.0
     return value

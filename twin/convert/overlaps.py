@@ -1,0 +1,90 @@
+"""Collision shapes that touch at joint position zero, by MuJoCo's collision detection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from twin.convert.geoms import primitive
+from twin.models.checks.diagnostic import Diagnostic, finding
+from twin.models.checks.wheels import wheels_of
+from twin.models.description import Mesh, RobotDescription
+from twin.models.kinematics import link_poses, rigid_groups
+
+LEAST_DEPTH = 1e-4
+"""Shapes that just touch are meant to [m]."""
+WHEEL_GAP = 5e-4
+"""A wheel closer than this to the part it turns in rubs on it [m]."""
+
+
+def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield parts whose shapes are inside of each other, and wheels that touch the part beside them.
+
+    Parts that a joint connects may overlap, as MuJoCo lets them pass through each other; wheels may not, as a
+    real one would rub. Meshes are left out.
+    """
+    heads = rigid_groups(description)
+    wheels = {wheel.link for wheel in wheels_of(description)}
+    joined = {frozenset((heads[joint.parent], heads[joint.child])) for joint in description.joints.values()}
+    for (a, b), distance in _distances(description, heads).items():
+        neighbours = frozenset((heads[a], heads[b])) in joined
+        line = _line(description, b)
+        if not neighbours and distance < -LEAST_DEPTH:
+            yield finding(
+                description,
+                "overlap",
+                f"link '{b}'",
+                line,
+                message=f"the collision shapes of '{a}' and '{b}' are {-distance:.3g} m inside of each other "
+                "at joint position zero",
+                fix="move or shrink one of them: they push each other apart from the first step on",
+            )
+        elif neighbours and distance < WHEEL_GAP and (a in wheels or b in wheels):
+            wheel, other = (a, b) if a in wheels else (b, a)
+            state = f"is {-distance:.3g} m inside of" if distance < -LEAST_DEPTH else "touches"
+            yield finding(
+                description,
+                "wheel-rubs",
+                f"link '{wheel}'",
+                _line(description, wheel),
+                message=f"wheel '{wheel}' {state} '{other}', in which it turns",
+                fix="leave a gap of some mm: move the wheel outwards, or make one of the shapes narrower",
+            )
+
+
+def _distances(description: RobotDescription, heads: dict[str, str]) -> dict[tuple[str, str], float]:
+    """Return the least distance [m], negative inside, of each pair of links of different rigid parts."""
+    spec = mujoco.MjSpec()
+    owners: list[str] = []
+    for name, pose in link_poses(description).items():
+        for collision in description.links[name].collisions:
+            if isinstance(collision.geometry, Mesh):
+                continue
+            placed = pose @ collision.T_link_geometry
+            kind, size = primitive(collision.geometry)
+            spec.worldbody.add_geom(type=kind, size=size, pos=placed.xyz, quat=placed.quat_wxyz)
+            owners.append(name)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    least: dict[tuple[str, str], float] = {}
+    for i, j in combinations(range(len(owners)), 2):
+        if heads[owners[i]] == heads[owners[j]] or not _may_touch(model, data, i, j):
+            continue
+        distance = mujoco.mj_geomDistance(model, data, i, j, WHEEL_GAP, None)
+        if distance < WHEEL_GAP:
+            pair = (owners[i], owners[j])
+            least[pair] = min(distance, least.get(pair, np.inf))
+    return least
+
+
+def _may_touch(model: mujoco.MjModel, data: mujoco.MjData, i: int, j: int) -> bool:
+    gap = float(np.linalg.norm(data.geom_xpos[i] - data.geom_xpos[j]))
+    return gap < model.geom_rbound[i] + model.geom_rbound[j] + WHEEL_GAP
+
+
+def _line(description: RobotDescription, link: str) -> int:
+    return description.links[link].collisions[0].line

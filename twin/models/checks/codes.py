@@ -1,0 +1,86 @@
+"""Every kind of fault that a robot file can have: its code, its severity and how it is mended in general."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal
+
+Severity = Literal["error", "warning"]
+
+ERRORS: Mapping[str, str] = MappingProxyType(
+    {
+        "no-file": "name an existing file, or a robot of `twin robots`",
+        "no-package": "give an existing folder: --package NAME=PATH",
+        "too-large": "split the file, or keep meshes in files of their own",
+        "bad-xml": "close every tag and quote every attribute",
+        "doctype": "remove the DOCTYPE and its entities",
+        "not-urdf": "make <robot name='...'> the outermost element",
+        "version": "remove the attribute, or set version='1.0'",
+        "xacro": "mend the xacro expression, include or argument that is named",
+        "missing-attribute": "add the attribute",
+        "bad-number": "write plain finite numbers, separated by spaces",
+        "missing-link": "add <parent link='...'/> and <child link='...'/>",
+        "unknown-link": "define the link, or correct the name",
+        "duplicate-name": "rename one of them",
+        "no-links": "add at least one <link name='...'/>",
+        "two-parents": "let one of the joints lead to another link",
+        "cycle": "turn one of the joints around, or remove it",
+        "several-roots": "connect the parts by joints",
+        "joint-type": "use one of the types listed",
+        "zero-axis": "give a direction such as <axis xyz='0 0 1'/>",
+        "missing-limit": "add <limit lower='' upper='' effort='' velocity=''/>",
+        "negative-limit": "give the magnitude, without a sign",
+        "swapped-limits": "exchange lower and upper",
+        "unknown-leader": "name an existing joint in <mimic joint='...'/>",
+        "mimic-cycle": "let one of the joints move on its own",
+        "bad-inertial": "give one <inertial> with <mass value=''/> and <inertia ixx='' iyy='' izz=''/>",
+        "bad-mass": "give a positive mass [kg], or remove <inertial> from a mere frame",
+        "impossible-inertia": "no principal moment exceeds the sum of the others: take it from CAD",
+        "bad-geometry": "give one shape with positive dimensions",
+        "missing-mesh": "correct the path, or give --package NAME=PATH",
+        "undefined-material": "define <material name=''><color rgba=''/></material> under <robot>",
+        "bad-friction": "give a coefficient of at least 0",
+        "bad-drive": "complete the drive plugin",
+        "bad-command": "correct <ros2_control>",
+        "bad-sensor": "complete the <sensor>",
+        "massless": "give it an <inertial>, or make the joint above it fixed",
+        "mesh-format": "export the mesh as binary STL or OBJ",
+        "mujoco": "change what MuJoCo names",
+    }
+)
+"""Faults that keep the file from being used, and how to mend them."""
+
+WARNINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "wheel-axis": "the wheel's cylinder does not lie along its joint's axis: it tumbles",
+        "wheel-fixed": "a wheel that cannot turn",
+        "wheel-rubs": "the wheel's collision shape touches its neighbour's",
+        "base-on-ground": "a part that is no wheel and no caster rests on the ground beside the wheels",
+        "wheels-off-ground": "something reaches lower than a wheel does",
+        "few-supports": "the robot stands on fewer than three points",
+        "overlap": "collision shapes of links that no joint connects overlap at joint position zero",
+        "visual-collision": "what is seen and what is touched are in different places",
+        "inertia-too-large": "no mass distribution inside the link's shapes has this inertia",
+        "inertia-too-small": "less than a tenth of what the shapes would give: simulations get unstable",
+        "inertia-placeholder": "the same moment about every axis, for a shape that is not alike",
+        "massless-base": "the base has no mass and can only stand fixed",
+        "no-collision": "parts that can be seen but not touched",
+        "limits-exclude-zero": "joint position zero, where every simulation starts, is outside of the range",
+        "no-range": "lower and upper limit are equal",
+        "no-effort": "the joint's effort limit is missing or zero",
+        "no-velocity": "the joint's velocity limit is missing or zero",
+        "weak-motor": "the motor cannot hold its load against gravity",
+        "axis-length": "the axis is no unit vector",
+        "rounded-angle": "an angle that is nearly, not exactly, a multiple of 90 degrees",
+        "material-elsewhere": "the material is defined in another link, which other readers do not look into",
+        "ignored-tag": "an element that URDF does not have here; it has no effect",
+        "ignored-attribute": "an attribute that URDF does not have here; it has no effect",
+    }
+)
+"""Faults that a robot can be simulated with, and what they mean."""
+
+
+def severity_of(code: str) -> Severity:
+    """Return the severity of a code."""
+    return "warning" if code in WARNINGS else "error"

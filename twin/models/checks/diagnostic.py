@@ -1,0 +1,69 @@
+"""One finding of a check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from twin.errors import Problem
+from twin.models.checks.codes import ERRORS, Severity, severity_of
+from twin.models.description import RobotDescription
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnostic:
+    """What is wrong with one element of a robot file, and how to mend it."""
+
+    code: str
+    """Stable name of this kind of fault, a key of `ERRORS` or `WARNINGS`."""
+    severity: Severity
+    element: str
+    """Such as `joint 'lift_joint'`, or `robot`."""
+    file: Path
+    line: int | None
+    """1-based; None where the file's own line is unknown, as after xacro."""
+    message: str
+    """What is wrong, with the number found."""
+    fix: str
+    """How to mend it."""
+
+
+def finding(
+    description: RobotDescription, code: str, element: str, line: int, *, message: str, fix: str
+) -> Diagnostic:
+    """Return a diagnostic of an element of `description`; line 0 means unknown."""
+    return Diagnostic(
+        code=code,
+        severity=severity_of(code),
+        element=element,
+        file=description.source,
+        line=line or None,
+        message=message,
+        fix=fix,
+    )
+
+
+def from_problems(problems: Iterable[Problem], source: Path) -> tuple[Diagnostic, ...]:
+    """Return the problems of a `ModelError` or `ConversionError` as diagnostics of `source`."""
+    return tuple(_from_problem(problem, source) for problem in problems)
+
+
+def _from_problem(problem: Problem, source: Path) -> Diagnostic:
+    # Messages have the form "what is wrong; what would be valid".
+    message, _, valid = problem.message.partition("; ")
+    mend = ERRORS[problem.code]
+    return Diagnostic(
+        code=problem.code,
+        severity="error",
+        element=problem.element or "robot",
+        file=problem.file or source,
+        line=problem.line,
+        message=message,
+        fix=f"{mend} ({valid})" if valid and valid != mend else mend,
+    )
+
+
+def in_file_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return them sorted by line, those without a line last, each once; else in the order they were found."""
+    return tuple(sorted(dict.fromkeys(diagnostics), key=lambda found: (found.line is None, found.line or 0)))

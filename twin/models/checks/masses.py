@@ -1,0 +1,43 @@
+"""Parts that weigh nothing, and parts that cannot be touched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from twin.models.checks.diagnostic import Diagnostic, finding
+from twin.models.description import RobotDescription
+from twin.models.kinematics import rigid_groups
+
+WORLD = "world"
+
+
+def masses(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield rigid parts (links on fixed joints) without mass, and visible ones without collision shape."""
+    heads = rigid_groups(description)
+    for head in dict.fromkeys(heads.values()):
+        links = [description.links[name] for name in heads if heads[name] == head]
+        fixed = ", ".join(link.name for link in links if link.name != head)
+        others = f" (nor do the links fixed to it: {fixed})" if fixed else ""
+        line = description.links[head].line
+        if not any(link.inertial for link in links) and head != WORLD:
+            moving = head != description.root
+            yield finding(
+                description,
+                "massless" if moving else "massless-base",
+                f"link '{head}'",
+                line,
+                message=f"link '{head}' moves and weighs nothing{others}"
+                if moving
+                else f"the base '{head}' weighs nothing{others}; it can only be fixed to the ground",
+                fix="give it <inertial> with <mass value='…'/> and <inertia ixx='…' iyy='…' izz='…'/>",
+            )
+        visible = [link.name for link in links if link.visuals]
+        if visible and not any(link.collisions for link in links):
+            yield finding(
+                description,
+                "no-collision",
+                f"link '{visible[0]}'",
+                description.links[visible[0]].line,
+                message=f"{', '.join(visible)}: seen, not touched: there is no collision shape",
+                fix="add <collision> with the same <origin> and a simple <geometry>",
+            )

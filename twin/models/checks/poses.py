@@ -1,0 +1,56 @@
+"""Visual and collision shapes that are not in the same place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from twin.geometry import matrix_from_quat_wxyz
+from twin.models.checks.diagnostic import Diagnostic, finding
+from twin.models.description import Cylinder, Link, RobotDescription
+from twin.models.solids import Shape, bounds, only_primitives
+
+SHARE = 0.1
+"""Of the visual's diagonal by which the centres may differ."""
+LEAST = 5e-3
+"""[m]"""
+AXIS_DEG = 5.0
+
+
+def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield links that are seen and touched in different places; links with meshes are left alone."""
+    for link in description.links.values():
+        if not link.visuals or not link.collisions or not only_primitives((*link.visuals, *link.collisions)):
+            continue
+        message = _moved(link) or _turned(link)
+        if message:
+            yield finding(
+                description,
+                "visual-collision",
+                f"link '{link.name}'",
+                link.collisions[0].line,
+                message=message,
+                fix="give both the same <origin>",
+            )
+
+
+def _moved(link: Link) -> str | None:
+    (low, high), (touch_low, touch_high) = bounds(link.visuals), bounds(link.collisions)
+    seen, touched = (low + high) / 2.0, (touch_low + touch_high) / 2.0
+    distance = float(np.linalg.norm(seen - touched))
+    if distance <= max(LEAST, SHARE * float(np.linalg.norm(high - low))):
+        return None
+    centres = [" ".join(f"{value + 0.0:.3g}" for value in np.round(point, 9)) for point in (seen, touched)]
+    return f"its visual is around {centres[0]}, its collision around {centres[1]}: {distance:.3g} m apart"
+
+
+def _turned(link: Link) -> str | None:
+    shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)
+    if len(shapes) != 2 or not all(isinstance(shape.geometry, Cylinder) for shape in shapes):
+        return None
+    axes = [matrix_from_quat_wxyz(shape.T_link_geometry.quat_wxyz)[:, 2] for shape in shapes]
+    angle = float(np.degrees(np.arccos(min(1.0, abs(float(axes[0] @ axes[1]))))))
+    if angle <= AXIS_DEG:
+        return None
+    return f"the axes of its visual and its collision cylinder differ by {angle:.1f} degrees"
