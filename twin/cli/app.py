@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from twin.cli import batch, play, robots, run, schema
+from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree
 from twin.cli.console import print_error
 from twin.errors import TwinError
 
@@ -24,12 +24,18 @@ _COMMANDS = (
     ("run", run.run, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
     ("test", batch.run_batch, "twin test scenarios --junit results.xml"),
     ("play", play.play, "twin play runs/warehouse/20261121-101500"),
+    ("check", check.check, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
+    ("tree", tree.tree, "twin tree my_robot.urdf"),
+    ("graph", graph.graph, "twin graph my_robot.urdf -o my_robot.svg"),
+    ("convert", convert.convert, "twin convert my_robot.urdf -o my_robot"),
     ("schema", schema.schema, "twin schema -o scenario.schema.json"),
     ("robots", robots.robots, "twin robots"),
 )
 
+_NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert")
+
 for _name, _function, _example in _COMMANDS:
-    app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in ("run", "play"))(
+    app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in _NEED_ARGUMENTS)(
         _function
     )
 

@@ -58,13 +58,13 @@ def _add_link(parent: mujoco.MjsBody, link: Link, T_parent_link: Pose3, geoms: G
     if link.inertial is not None:
         body.mass = link.inertial.mass
         body.ipos = link.inertial.T_link_com.xyz
-        inertia = _inertia_in_link(link.inertial)
+        inertia = inertia_in_link(link.inertial)
         body.fullinertia = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     geoms.add(body, link)
     return body
 
 
-def _inertia_in_link(inertial: Inertial) -> Array:
+def inertia_in_link(inertial: Inertial) -> Array:
     """Return the inertia about the centre of mass, in link axes, shape (3, 3) [kg m²].
 
     A file prints few digits, so that the largest moment of a plate can exceed the sum of the others by the

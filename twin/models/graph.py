@@ -77,7 +77,7 @@ def _layout(description: RobotDescription) -> dict[tuple[str, str], _Box]:
     for joint in joints:
         column["joint", joint.name] = column["link", joint.parent] + 1
         column["link", joint.child] = column["link", joint.parent] + 2
-    text = {("link", description.root): (description.root,)}
+    text: dict[tuple[str, str], tuple[str, ...]] = {("link", description.root): (description.root,)}
     for joint in joints:
         text["joint", joint.name] = (f"{joint.name} ({joint.type})", *_origin(joint))
         text["link", joint.child] = (joint.child,)

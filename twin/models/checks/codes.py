@@ -75,6 +75,7 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "rounded-angle": "an angle that is nearly, not exactly, a multiple of 90 degrees",
         "material-elsewhere": "the material is defined in another link, which other readers do not look into",
         "ignored-tag": "an element that URDF does not have here; it has no effect",
+        "repeated-tag": "an element that stands twice where URDF has it once",
         "ignored-attribute": "an attribute that URDF does not have here; it has no effect",
     }
 )

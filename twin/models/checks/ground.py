@@ -108,8 +108,7 @@ def _resting(description: RobotDescription, floor: float, feet: list[_Foot]) -> 
                 "base-on-ground",
                 f"link '{foot.link}'",
                 foot.line,
-                message=f"link '{foot.link}' rests on the ground: it ends at z = {foot.z:.4g} m, "
-                f"the wheels at {floor:.4g} m",
+                message=f"rests on the ground: it ends at z = {foot.z:.4g} m, the wheels at {floor:.4g} m",
                 fix="raise it by 10 mm or more, or lower the wheels' joints; a caster has <mu1>0</mu1>",
             )
 

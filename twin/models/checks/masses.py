@@ -26,18 +26,19 @@ def masses(description: RobotDescription) -> Iterator[Diagnostic]:
                 "massless" if moving else "massless-base",
                 f"link '{head}'",
                 line,
-                message=f"link '{head}' moves and weighs nothing{others}"
+                message=f"moves and weighs nothing{others}"
                 if moving
                 else f"the base '{head}' weighs nothing{others}; it can only be fixed to the ground",
                 fix="give it <inertial> with <mass value='…'/> and <inertia ixx='…' iyy='…' izz='…'/>",
             )
         visible = [link.name for link in links if link.visuals]
+        also = f" (also of {', '.join(visible[1:])})" if visible[1:] else ""
         if visible and not any(link.collisions for link in links):
             yield finding(
                 description,
                 "no-collision",
                 f"link '{visible[0]}'",
                 description.links[visible[0]].line,
-                message=f"{', '.join(visible)}: seen, not touched: there is no collision shape",
+                message="seen, not touched: there is no collision shape" + also,
                 fix="add <collision> with the same <origin> and a simple <geometry>",
             )

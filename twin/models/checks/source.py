@@ -63,14 +63,22 @@ def read_source(description: RobotDescription) -> tuple[Element, Report]:
     return parse(description.urdf.encode(), report), report
 
 
+def number(text: str | None) -> float:
+    """Return a number of the text; NaN where it is none (of a repeated element, only the first is validated)."""
+    try:
+        return float(text or "")
+    except ValueError:
+        return math.nan
+
+
 def axis_length(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield axes that are no unit vectors."""
     root, report = read_source(description)
     for element in root.iterfind("joint/axis"):
-        x, y, z = (float(word) for word in element.get("xyz", "1 0 0").split())
-        length = math.sqrt(x * x + y * y + z * z)
+        axis = [number(word) for word in element.get("xyz", "").split()]
+        length = math.sqrt(sum(value * value for value in axis))
         if length > 0.0 and abs(length - 1.0) > UNIT_TOLERANCE:
-            unit = " ".join(f"{value / length:.6g}" for value in (x, y, z))
+            unit = " ".join(f"{value / length:.6g}" for value in axis)
             yield finding(
                 description,
                 "axis-length",
@@ -84,10 +92,11 @@ def axis_length(description: RobotDescription) -> Iterator[Diagnostic]:
 def rounded_angle(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield angles of `<origin rpy>` that nearly are multiples of 90 degrees."""
     root, report = read_source(description)
-    for element in root.iter("origin"):
+    origins = ("link/inertial/origin", "link/visual/origin", "link/collision/origin", "joint/origin")
+    for element in (found for path in origins for found in root.iterfind(path)):
         for word in element.get("rpy", "").split():
-            angle = float(word)
-            nearest = round(angle / (math.pi / 2.0)) * math.pi / 2.0
+            angle = number(word)
+            nearest = round(angle / (math.pi / 2.0)) * math.pi / 2.0 if math.isfinite(angle) else 0.0
             if ROUNDING[0] < abs(angle - nearest) < ROUNDING[1] and nearest != 0.0:
                 off = math.degrees(abs(angle - nearest))
                 yield finding(
@@ -127,7 +136,7 @@ def material_elsewhere(description: RobotDescription) -> Iterator[Diagnostic]:
 
 
 def ignored(description: RobotDescription) -> Iterator[Diagnostic]:
-    """Yield elements and attributes that URDF does not know where they stand, each kind once."""
+    """Yield elements and attributes that have no effect where they stand, each kind once."""
     root, report = read_source(description)
     seen: dict[tuple[str, str, str], list[Element]] = {}
     pending = [root]
@@ -137,28 +146,43 @@ def ignored(description: RobotDescription) -> Iterator[Diagnostic]:
             if name not in ATTRIBUTES.get(element.tag, name).split() and not name.startswith("{"):
                 seen.setdefault(("ignored-attribute", element.tag, name), []).append(element)
         for child in element if element.tag in CHILDREN else ():
-            if child.tag.startswith("{"):
-                continue
-            if child.tag in CHILDREN[element.tag].split():
-                pending += [child] if child.tag in (*CHILDREN, *ATTRIBUTES) else []
-            else:
+            if child.tag not in CHILDREN[element.tag].split():
                 seen.setdefault(("ignored-tag", element.tag, child.tag), []).append(child)
+                continue
+            if is_repeated(child):
+                seen.setdefault(("repeated-tag", element.tag, child.tag), []).append(child)
+            if child.tag in CHILDREN or child.tag in ATTRIBUTES:
+                pending.append(child)
     for (code, parent, name), elements in seen.items():
         more = f" and {len(elements) - 1} more" if len(elements) > 1 else ""
-        what = f"<{parent} {name}='…'>" if code == "ignored-attribute" else f"<{name}> in <{parent}>"
-        valid = (ATTRIBUTES if code == "ignored-attribute" else CHILDREN)[parent]
+        valid = (ATTRIBUTES if code == "ignored-attribute" else CHILDREN)[parent].replace(" ", ", ")
+        messages = {
+            "ignored-attribute": f"<{parent} {name}='…'>{more} is not URDF and has no effect",
+            "ignored-tag": f"<{name}> in <{parent}>{more} is not URDF and has no effect{_would_be(elements[0])}",
+            "repeated-tag": f"<{name}> stands here twice{more}; the first one counts",
+        }
         yield finding(
             description,
             code,
             place(elements[0]),
             report.line(elements[0]),
-            message=f"{what}{more} is not URDF and has no effect{_would_be(elements[0])}",
-            fix=f"remove or correct it; here URDF has {valid.replace(' ', ', ')}",
+            message=messages[code],
+            fix="remove one of them"
+            if code == "repeated-tag"
+            else f"remove or correct it; here URDF has {valid}",
         )
+
+
+def is_repeated(element: Element) -> bool:
+    """Tell whether an element stands a second time where URDF has it once."""
+    parent = element.getparent()
+    if parent is None or parent.tag not in ("inertial", "visual", "collision", "joint"):
+        return False
+    return parent.find(element.tag) is not element
 
 
 def _would_be(element: Element) -> str:
     if element.tag == "contact_coefficients" and element.get("mu") is not None:
-        slippery = ", so without any friction" if float(element.get("mu")) == 0.0 else ""
+        slippery = ", so without any friction" if number(element.get("mu")) == 0.0 else ""
         return f" (it would mean mu={element.get('mu')}{slippery}; <gazebo reference=''><mu1> has effect)"
     return ""

@@ -1,0 +1,48 @@
+"""`twin convert`: a robot file as a MuJoCo model."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twin.cli.model_options import Args, Packages, RobotFile, parse_args, parse_packages
+
+
+class Base(StrEnum):
+    """How the root link is held."""
+
+    FREE = "free"
+    FIXED = "fixed"
+
+
+def convert(
+    file: RobotFile,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.", show_default=False)
+    ],
+    base: Annotated[Base, typer.Option(help="fixed: the robot is bolted down.")] = Base.FREE,
+    arg: Args = None,
+    package: Packages = None,
+) -> None:
+    """Write robot.xml and assets/, which plain MuJoCo loads, and report.json: what became of every tag.
+
+    Exit code 0, or 2 for a file that cannot be converted; then nothing is written.
+    """
+    from twin.cli.console import stdout
+    from twin.convert.export import export
+    from twin.models import load
+    from twin.sim.physics import Physics
+
+    description = load(file, args=parse_args(arg), packages=parse_packages(package))
+    report = export(description, output, base=base.value, set_options=Physics(sleep=False).apply)
+    tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
+    links, joints, warnings = (len(report[key]) for key in ("links", "joints", "diagnostics"))
+    stdout().print(
+        f"{output / 'robot.xml'}: {links} links, {joints} joints, {report['mass']:.6g} kg; tags: {tags}; "
+        f"{len(report['guesses'])} guesses"
+    )
+    if warnings:
+        stdout().print(f"{warnings} warnings: see `twin check {file}` or report.json", style="dim")

@@ -1,0 +1,78 @@
+"""Diagnostics as a compiler prints them, and as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+    from twin.convert.inspection import Inspection
+    from twin.models.checks import Diagnostic
+
+EXCERPT = 120
+"""Longest source line that is shown."""
+STYLES = {"error": "bold red", "warning": "bold yellow"}
+
+
+def inspection_text(found: Inspection) -> Text:
+    """Return `file:line: severity[code]: element: message`, the source line, the fix; last a summary."""
+    from rich.text import Text
+
+    text = Text()
+    sources = _Sources()
+    for diagnostic in found.diagnostics:
+        where = str(diagnostic.file) + (f":{diagnostic.line}" if diagnostic.line else "")
+        text.append(f"{where}: ", "bold")
+        text.append(f"{diagnostic.severity}[{diagnostic.code}]: ", STYLES[diagnostic.severity])
+        subject = "" if diagnostic.element in diagnostic.message else f"{diagnostic.element}: "
+        text.append(f"{subject}{diagnostic.message}\n")
+        excerpt = sources.line(diagnostic)
+        if excerpt:
+            text.append(f"    {excerpt}\n", "dim")
+        text.append("    fix: ", "green")
+        text.append(f"{diagnostic.fix}\n")
+    return text.append(_summary(found))
+
+
+def inspection_json(found: Inspection) -> str:
+    """Return the inspection as a JSON document."""
+    document = {
+        "file": str(found.file),
+        "robot": None if found.description is None else found.description.name,
+        "errors": found.count("error"),
+        "warnings": found.count("warning"),
+        "diagnostics": [{**asdict(item), "file": str(item.file)} for item in found.diagnostics],
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _summary(found: Inspection) -> str:
+    counts = [
+        f"{number} {severity}{'' if number == 1 else 's'}"
+        for severity in ("error", "warning")
+        if (number := found.count(severity))
+    ]
+    robot = found.description
+    size = "" if robot is None else f" ({robot.name}: {len(robot.links)} links, {len(robot.joints)} joints)"
+    return f"{found.file}: {', '.join(counts) or 'no faults found'}{size}"
+
+
+class _Sources:
+    """The lines of the files that diagnostics name, each file read once."""
+
+    def __init__(self) -> None:
+        self._lines: dict[str, list[str]] = {}
+
+    def line(self, diagnostic: Diagnostic) -> str:
+        """Return the source line of a diagnostic; empty if it is unknown or long."""
+        if diagnostic.line is None:
+            return ""
+        key = str(diagnostic.file)
+        if key not in self._lines:
+            self._lines[key] = diagnostic.file.read_text("utf-8", errors="replace").splitlines()
+        lines = self._lines[key]
+        text = lines[diagnostic.line - 1].strip() if diagnostic.line <= len(lines) else ""
+        return text if len(text) <= EXCERPT else ""

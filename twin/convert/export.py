@@ -1,0 +1,150 @@
+"""Writing a robot as a folder that plain MuJoCo loads: `robot.xml`, `assets/`, `report.json`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from twin.convert.bodies import Base
+from twin.convert.conversion import Conversion
+from twin.convert.convert import convert
+from twin.convert.exact_xml import exact_xml
+from twin.convert.inspection import inspect_robot
+from twin.convert.roles import roles_of
+from twin.convert.self_check import SelfCheck, self_check
+from twin.convert.tag_ledger import counts, tag_ledger
+from twin.errors import ConversionError
+from twin.models.checks import Diagnostic
+from twin.models.description import RobotDescription
+
+MODEL, REPORT, ASSETS = "robot.xml", "report.json", "assets"
+
+SetOptions = Callable[[mujoco.MjSpec], None]
+
+
+def export(
+    description: RobotDescription, folder: Path, *, base: Base = "free", set_options: SetOptions | None = None
+) -> dict[str, Any]:
+    """Write a robot as MJCF with its meshes and a report, and return the report; on an error, write nothing.
+
+    The same robot gives the same bytes. The robot stands on z = 0 if its base is free.
+
+    Args:
+        description: The robot.
+        folder: Is created; an earlier conversion in it is replaced.
+        base: As for `convert`.
+        set_options: Sets the physics options that the model is meant for; else MuJoCo's defaults hold.
+
+    Raises:
+        ConversionError: As by `convert`; or the folder holds other files; or the model that was written is
+            not what the description says.
+    """
+    _check_folder(folder)
+    conversion = convert(description, base=base)
+    spec = conversion.spec.copy()
+    if set_options is not None:
+        set_options(spec)
+    if conversion.root_joint is not None:
+        spec.body(conversion.description.root).pos = [0.0, 0.0, conversion.spawn_height]
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    try:
+        assets = _write_assets(spec, staging)
+        (staging / MODEL).write_text(exact_xml(spec), encoding="utf-8")
+        model = mujoco.MjModel.from_xml_path(str(staging / MODEL))
+        checked = self_check(model, conversion.description)
+        if not checked.passed:
+            raise ConversionError(f"{description.source}: the model differs from the file: {checked}")
+        report = _report(description, conversion, model, assets, checked)
+        text = json.dumps(report, indent=2, ensure_ascii=False) + "\n"
+        (staging / REPORT).write_text(text, encoding="utf-8")
+        staging.chmod(0o755)  # mkdtemp's 0700 would lock out other users
+        _replace(staging, folder)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return report
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.is_dir():
+        others = sorted(item.name for item in folder.iterdir() if item.name not in (MODEL, REPORT, ASSETS))
+        if others:
+            raise ConversionError(
+                f"{folder}: the folder holds other files ({', '.join(others[:3])}); give a new or empty one"
+            )
+    elif folder.exists():
+        raise ConversionError(f"{folder}: is a file; give a new or empty folder")
+
+
+def _write_assets(spec: mujoco.MjSpec, folder: Path) -> list[str]:
+    """Copy meshes to names made of their content, and let `spec` refer to them."""
+    names: list[str] = []
+    spec.meshdir = ASSETS
+    spec.modelfiledir = str(folder)
+    for mesh in spec.meshes:
+        source = Path(mesh.file)
+        content = source.read_bytes()
+        name = f"{source.stem}-{hashlib.sha256(content).hexdigest()[:8]}{source.suffix.lower()}"
+        target = folder / ASSETS / name
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(content)
+        mesh.file = name
+        names.append(name)
+    return sorted(set(names))
+
+
+def _replace(new: Path, folder: Path) -> None:
+    if not folder.exists():
+        new.rename(folder)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
+    folder.rename(old / folder.name)
+    new.rename(folder)
+    shutil.rmtree(old)
+
+
+def _report(
+    description: RobotDescription,
+    conversion: Conversion,
+    model: mujoco.MjModel,
+    assets: list[str],
+    checked: SelfCheck,
+) -> dict[str, Any]:
+    tags = tag_ledger(description, roles_of(description))
+    return {
+        "robot": description.name,
+        "source": description.source.name,
+        "sha256": hashlib.sha256(description.source.read_bytes()).hexdigest(),
+        "mujoco": mujoco.__version__,
+        "base": "fixed" if conversion.root_joint is None else "free",
+        "spawn_height": conversion.spawn_height,
+        "mass": float(model.body_mass.sum()),
+        "links": [
+            {"name": name, "mass": float(model.body(name).mass[0]), "line": link.line or None}
+            for name, link in conversion.description.links.items()
+        ],
+        "joints": [
+            {"name": name, "type": joint.type, "line": joint.line or None}
+            for name, joint in description.joints.items()
+        ],
+        "actuators": [model.actuator(index).name for index in range(model.nu)],
+        "assets": assets,
+        "self_check": {"passed": checked.passed, **asdict(checked)},
+        "diagnostics": [diagnostic_json(item) for item in inspect_robot(description)],
+        "tags": counts(tags),
+        "ledger": [asdict(entry) for entry in tags],
+        "guesses": [asdict(entry) for entry in conversion.ledger if entry.outcome == "guessed"],
+    }
+
+
+def diagnostic_json(diagnostic: Diagnostic) -> dict[str, Any]:
+    """Return a diagnostic as `twin check --json` prints it, with the file's name alone."""
+    return {**asdict(diagnostic), "file": diagnostic.file.name}

@@ -1,0 +1,228 @@
+"""What became of every single tag of a robot file in the MJCF that is written of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from twin.convert.bodies import inertia_in_link
+from twin.convert.conversion import Outcome
+from twin.convert.convert import WORLD
+from twin.convert.ledger import READ_SENSORS
+from twin.convert.roles import Roles
+from twin.geometry import matrix_from_quat_wxyz
+from twin.models.checks.source import is_repeated, number, read_source
+from twin.models.description import RobotDescription
+from twin.models.document import Element, place
+from twin.models.gazebo import LEFT, RIGHT
+
+Fate = tuple[Outcome, str]
+POSE: Fate = ("kept", "pose")
+SHAPE: Fate = ("kept", "geom")
+TORQUES = ("max_wheel_torque", "wheelTorque", "torque")
+
+FATES: Mapping[str, Fate] = MappingProxyType(
+    {
+        "robot": ("kept", "model"),
+        "link": ("kept", "body"),
+        "link/inertial": ("kept", "inertial"),
+        "link/inertial/origin": POSE,
+        "link/inertial/mass": ("kept", "mass"),
+        "link/inertial/inertia": ("kept", "principal axes and moments"),
+        "link/visual": ("kept", "geom of group 2, without contacts"),
+        "link/visual/origin": POSE,
+        "link/visual/geometry": SHAPE,
+        "link/visual/material": ("kept", "rgba of the geom"),
+        "link/visual/material/color": ("kept", "rgba of the geom"),
+        "link/visual/material/texture": ("dropped", "shapes have one colour"),
+        "link/collision": ("kept", "geom of group 3"),
+        "link/collision/origin": POSE,
+        "link/collision/geometry": SHAPE,
+        "material": ("kept", "rgba of the geoms that use it"),
+        "material/color": ("kept", "rgba of the geoms that use it"),
+        "material/texture": ("dropped", "shapes have one colour"),
+        "joint/origin": ("kept", "pose of the child's body"),
+        "joint/parent": ("kept", "nesting of bodies"),
+        "joint/child": ("kept", "nesting of bodies"),
+        "joint/mimic": ("translated", "joint equality"),
+        "joint/calibration": ("dropped", "a simulated joint needs none"),
+        "joint/safety_controller": ("dropped", "a matter of the controller"),
+    }
+)
+"""By path of tags; what is not listed is dropped, unless a function below knows better."""
+SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TagEntry:
+    """The fate of one tag."""
+
+    line: int | None
+    """1-based; None where the file's own line is unknown, as after xacro."""
+    element: str
+    """Such as `link 'base'/collision/origin`."""
+    outcome: Outcome
+    note: str
+
+
+def tag_ledger(description: RobotDescription, roles: Roles) -> tuple[TagEntry, ...]:
+    """Return one entry for every element of the robot's text, in its order."""
+    root, report = read_source(description)
+    return tuple(
+        TagEntry(line=report.line(element) or None, element=_name(element), outcome=outcome, note=note)
+        for element in root.iter()
+        for outcome, note in [_fate(element, description, roles)]
+    )
+
+
+def _path(element: Element) -> str:
+    tags = [element.tag, *(parent.tag for parent in element.iterancestors())]
+    return "/".join(tags[-2::-1]) or str(tags[0])
+
+
+def _name(element: Element) -> str:
+    if element.getparent() is None:
+        return f"robot '{element.get('name', '')}'"
+    owner = place(element)
+    below = [element.tag]
+    for parent in element.iterancestors():
+        if place(parent) != owner or parent.getparent() is None:
+            break
+        below.append(parent.tag)
+    inside = "/".join(below[::-1] if owner == "robot" else below[-2::-1])
+    return inside if owner == "robot" else (f"{owner}/{inside}" if inside else owner)
+
+
+def _fate(element: Element, description: RobotDescription, roles: Roles) -> Fate:
+    path = _path(element)
+    if is_repeated(element):
+        return "dropped", f"the first <{element.tag}> counts"
+    area = path.partition("/")[0]
+    if area == "gazebo":
+        return _gazebo(element, path, description)
+    if area == "ros2_control":
+        return _ros2_control(element, path, description)
+    if area == "joint" and path in ("joint", "joint/axis", "joint/limit", "joint/dynamics"):
+        return _joint(element, path, description)
+    if path == "link/inertial/inertia":
+        return _inertia(element, description)
+    if path == "link" and element.get("name") == WORLD:
+        return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
+    parent, _, tag = path.rpartition("/")
+    if tag in SHAPES and parent.endswith("/geometry"):
+        return _shape(element, parent, roles)
+    return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
+
+
+def _joint(element: Element, path: str, description: RobotDescription) -> Fate:
+    name = (element if path == "joint" else element.getparent()).get("name")
+    joint = description.joints[name]
+    if path == "joint":
+        kinds = {"fixed": "nested body", "prismatic": "slide"}
+        several = {"planar": "two slides and a hinge", "floating": "three slides and a ball"}
+        if joint.type in several:
+            return "translated", several[joint.type]
+        return "kept", kinds.get(joint.type, "hinge")
+    if joint.type in ("fixed", "floating"):
+        return "dropped", f"a {joint.type} joint has none"
+    if path == "joint/axis":
+        given = np.array([float(word) for word in element.get("xyz").split()])
+        if np.allclose(given, joint.axis, rtol=0.0, atol=1e-12):
+            return "kept", "axis"
+        return "translated", "made a unit vector"
+    if joint.type == "planar":
+        return "dropped", "not for planar joints"
+    if path == "joint/dynamics":
+        return "kept", "damping and frictionloss"
+    return _limit(element, joint.type)
+
+
+def _limit(element: Element, kind: str) -> Fate:
+    parts = []
+    lower, upper = number(element.get("lower", "0")), number(element.get("upper", "0"))
+    if kind != "continuous":
+        parts.append("range" if lower < upper else "no range: lower equals upper")
+    elif element.get("lower") or element.get("upper"):
+        parts.append("no range: a continuous joint has none")
+    parts.append("actuatorfrcrange" if number(element.get("effort", "0")) else "effort left open")
+    if element.get("velocity"):
+        parts.append("velocity bounds the ctrlrange of a wheel, elsewhere it has no counterpart")
+    return "translated", "; ".join(parts)
+
+
+def _inertia(element: Element, description: RobotDescription) -> Fate:
+    inertial = description.links[next(element.iterancestors("link")).get("name")].inertial
+    assert inertial is not None
+    R = matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz)
+    change = np.max(np.abs(inertia_in_link(inertial) - R @ inertial.inertia @ R.T)) / np.max(inertial.inertia)
+    if change < 1e-12:
+        return FATES["link/inertial/inertia"]
+    return (
+        "translated",
+        f"nearest inertia that a body can have; changed by {change:.1e} of the largest moment",
+    )
+
+
+def _shape(element: Element, parent: str, roles: Roles) -> Fate:
+    link = next(element.iterancestors("link")).get("name")
+    if parent == "link/collision/geometry" and element.tag == "cylinder" and link in roles.wheels:
+        return "translated", "ellipsoid: a wheel touches in a point"
+    return SHAPE if element.tag != "mesh" else ("kept", "mesh in assets/")
+
+
+def _gazebo(element: Element, path: str, description: RobotDescription) -> Fate:
+    container = element if element.tag == "gazebo" else next(element.iterancestors("gazebo"))
+    link = description.links.get(container.get("reference", ""))
+    if path in ("gazebo/mu1", "gazebo/collision/surface/friction/ode/mu"):
+        if link is not None and link.collisions and link.surface.friction is not None:
+            return "kept", f"friction {link.surface.friction:g}, whatever it touches"
+        return "dropped", "its link has no collision shape"
+    if path == "gazebo/mu2":
+        return "dropped", "friction is the same in every direction"
+    sensors = [element, *element.iterancestors()]
+    sensor = next((item for item in sensors if item.tag == "sensor"), None)
+    if sensor is not None:
+        known = sensor.get("type") in READ_SENSORS
+        return "dropped", "not part of the MJCF; twin simulates it itself" if known else "not simulated"
+    if path.startswith("gazebo/plugin") and description.drive is not None:
+        return _plugin(element, path)
+    if path == "gazebo" and any(
+        _gazebo(child, _path(child), description)[0] != "dropped" for child in element
+    ):
+        return "translated", "see what is inside"
+    return "dropped", "no counterpart in MuJoCo"
+
+
+def _plugin(element: Element, path: str) -> Fate:
+    if path == "gazebo/plugin":
+        drives = any(child.tag in (*LEFT, *RIGHT) for child in element)
+        return ("translated", "velocity actuators") if drives else ("dropped", "not simulated")
+    if element.tag in (*LEFT, *RIGHT):
+        return "translated", "velocity actuator of the joint's name"
+    if element.tag in TORQUES:
+        return "translated", "forcerange of the wheels' actuators"
+    return "dropped", "the drive controller's; not part of the MJCF"
+
+
+def _ros2_control(element: Element, path: str, description: RobotDescription) -> Fate:
+    if path == "ros2_control":
+        return ("translated", "actuators") if description.commands else ("dropped", "commands no joint")
+    if path == "ros2_control/joint":
+        commanded = element.get("name") in description.commands
+        return ("translated", "actuator") if commanded else ("dropped", "it is not commanded")
+    if path == "ros2_control/joint/command_interface":
+        if element.getparent().find("command_interface") is element:
+            return "translated", f"actuator for {element.get('name')}"
+        return "dropped", "the first command interface of a joint counts"
+    return "dropped", "a matter of the hardware"
+
+
+def counts(entries: Iterable[TagEntry]) -> dict[str, int]:
+    """Return how many tags had each outcome."""
+    result = {"kept": 0, "translated": 0, "guessed": 0, "dropped": 0}
+    for entry in entries:
+        result[entry.outcome] += 1
+    return result
