@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sized
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -56,8 +57,12 @@ def _summary(found: Inspection) -> str:
         if (number := found.count(severity))
     ]
     robot = found.description
-    size = "" if robot is None else f" ({robot.name}: {len(robot.links)} links, {len(robot.joints)} joints)"
+    size = "" if robot is None else f" ({_number(robot.links, 'link')}, {_number(robot.joints, 'joint')})"
     return f"{found.file}: {', '.join(counts) or 'no faults found'}{size}"
+
+
+def _number(items: Sized, name: str) -> str:
+    return f"{len(items)} {name}{'' if len(items) == 1 else 's'}"
 
 
 class _Sources:

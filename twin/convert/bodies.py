@@ -125,7 +125,8 @@ def _check_masses(description: RobotDescription, base: Base) -> None:
     still = description.root if base != "free" else None
     problems = [
         Problem(
-            f"link '{name}' moves and has no mass, nor has anything fixed to it; give it an <inertial>",
+            f"link '{name}' moves and has no mass, nor has anything fixed to it; give it an <inertial>"
+            + (", or fix the base" if name == description.root else ""),
             description.source,
             description.links[name].line or None,
             code="massless",

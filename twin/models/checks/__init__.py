@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from twin.models.checks.angles import rounded_angle
+from twin.models.checks.axes import axis_length
 from twin.models.checks.codes import ERRORS, WARNINGS
 from twin.models.checks.diagnostic import Diagnostic, from_problems, in_file_order
 from twin.models.checks.ground import ground
+from twin.models.checks.ignored import ignored
 from twin.models.checks.inertia import inertia
 from twin.models.checks.limits import limits
 from twin.models.checks.masses import masses
+from twin.models.checks.materials import material_elsewhere
 from twin.models.checks.motors import weak_motor
 from twin.models.checks.poses import visual_collision
-from twin.models.checks.source import axis_length, ignored, material_elsewhere, rounded_angle
 from twin.models.checks.wheels import wheel_axis, wheel_fixed
 from twin.models.description import RobotDescription
 
