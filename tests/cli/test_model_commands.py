@@ -161,8 +161,8 @@ def test_svg_boxes_do_not_overlap(invoke: Invoke, tmp_path: Path) -> None:
 def test_convert(invoke: Invoke, urdf: Callable[..., Path], tmp_path: Path) -> None:
     code, out, _ = invoke("convert", urdf("0 0 1.57"), "-o", "out", "--base", "fixed")
     assert code == 0
-    assert out.startswith("out/robot.xml: 2 links, 1 joints, 0.6 kg; tags: ")
-    assert "1 warnings: see `twin check r.urdf`" in out
+    assert out.startswith("out/robot.xml: 2 links, 1 joint, 0.6 kg; tags: ")
+    assert "1 warning: see `twin check r.urdf`" in out
     assert sorted(path.name for path in Path("out").iterdir()) == ["report.json", "robot.xml"]
     report = json.loads(Path("out/report.json").read_text("utf-8"))
     assert (report["base"], report["diagnostics"][0]["code"]) == ("fixed", "rounded-angle")

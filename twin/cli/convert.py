@@ -32,6 +32,7 @@ def convert(
     Exit code 0, or 2 for a file that cannot be converted; then nothing is written.
     """
     from twin.cli.console import stdout
+    from twin.cli.diagnostics import counted
     from twin.convert.export import export
     from twin.models import load
     from twin.sim.physics import Physics
@@ -39,10 +40,11 @@ def convert(
     description = load(file, args=parse_args(arg), packages=parse_packages(package))
     report = export(description, output, base=base.value, set_options=Physics(sleep=False).apply)
     tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
-    links, joints, warnings = (len(report[key]) for key in ("links", "joints", "diagnostics"))
+    size = ", ".join(counted(len(report[noun + "s"]), noun) for noun in ("link", "joint"))
+    guesses, warnings = (len(report[key]) for key in ("guesses", "diagnostics"))
     stdout().print(
-        f"{output / 'robot.xml'}: {links} links, {joints} joints, {report['mass']:.6g} kg; tags: {tags}; "
-        f"{len(report['guesses'])} guesses"
+        f"{output / 'robot.xml'}: {size}, {report['mass']:.6g} kg; tags: {tags}; "
+        f"{guesses} guess{'' if guesses == 1 else 'es'}"
     )
     if warnings:
-        stdout().print(f"{warnings} warnings: see `twin check {file}` or report.json", style="dim")
+        stdout().print(f"{counted(warnings, 'warning')}: see `twin check {file}` or report.json", style="dim")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sized
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -50,19 +49,21 @@ def inspection_json(found: Inspection) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return such as `1 link` or `2 links`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def _summary(found: Inspection) -> str:
-    counts = [
-        f"{number} {severity}{'' if number == 1 else 's'}"
-        for severity in ("error", "warning")
-        if (number := found.count(severity))
-    ]
+    numbers = {severity: found.count(severity) for severity in ("error", "warning")}
+    faults = ", ".join(counted(number, severity) for severity, number in numbers.items() if number)
     robot = found.description
-    size = "" if robot is None else f" ({_number(robot.links, 'link')}, {_number(robot.joints, 'joint')})"
-    return f"{found.file}: {', '.join(counts) or 'no faults found'}{size}"
-
-
-def _number(items: Sized, name: str) -> str:
-    return f"{len(items)} {name}{'' if len(items) == 1 else 's'}"
+    size = (
+        ""
+        if robot is None
+        else f" ({counted(len(robot.links), 'link')}, {counted(len(robot.joints), 'joint')})"
+    )
+    return f"{found.file}: {faults or 'no faults found'}{size}"
 
 
 class _Sources:

@@ -83,7 +83,7 @@ FOUND = {
     "wheel-fixed": (cart(left_joint=FIXED_WHEEL).replace("'left'", "'wheel'"), 4, "to 'base' at 0 0.15 0 m"),
     "base-on-ground": (cart().replace("0.3 0.2 0.06", "0.3 0.2 0.1"), 2, "it ends at z = -0.05 m"),
     "wheels-off-ground": (cart().replace("0 -0.03", "0 -0.04"), 7, "10 mm lower"),
-    "few-supports": (cart().replace("0 -0.03", "0 -0.01"), 2, "2 wheels and"),
+    "few-supports": (cart().replace("0 -0.03", "0 -0.01"), 2, "only 2 on the ground"),
     "visual-collision": (arm(AXIS + LIMIT, RAISED), 4, "0.05 m apart"),
     "inertia-too-large": (cart(left=wheel("left", "0", inertial=HEAVY)[0]), 3, "0.812 m from the axis"),
     "inertia-too-small": (cart(left=wheel("left", "0", inertial=LIGHT)[0]), 3, "0.01 times"),
@@ -185,3 +185,9 @@ def test_all_codes_of_the_loader_and_the_converter_are_registered() -> None:
             used |= set(re.findall(r"code=\"([a-z-]+)\"", file.read_text("utf-8")))
     assert used <= set(ERRORS)
     assert set(ERRORS) - used == set(), "codes that nothing uses"
+
+
+def test_every_code_is_documented_with_its_meaning() -> None:
+    page = (SOURCES.parent / "docs" / "checking.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| (.*) \|$", page, re.MULTILINE))
+    assert rows == {**WARNINGS, **ERRORS}

@@ -59,7 +59,7 @@ DEFECTS = {
 """Elements by code, the whole output; the source is shared/facts/conversion.md, section 2."""
 
 NUMBERS = {
-    "simple_robot.urdf.xacro": ("90.0 degrees", "z = -0.05 m", "2.40 times", "has 2 wheels"),
+    "simple_robot.urdf.xacro": ("90.0 degrees", "z = -0.05 m", "2.40 times", "only 2 on the ground"),
     "r2d2.urdf": (
         "needs mass 10 m from the axis",
         "0.31 m inside of each other",

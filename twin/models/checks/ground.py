@@ -124,7 +124,7 @@ def _few_supports(
             "few-supports",
             "robot",
             description.links[description.root].line,
-            message=f"the robot has {len(supports)} wheels and casters on the ground "
-            f"({', '.join(supports)}); with fewer than 3 it tips over or drags its body",
+            message=f"of wheels and casters only {len(supports)} on the ground ({', '.join(supports)}); "
+            "on fewer than 3 the robot tips over or drags its body",
             fix=f"add a caster: a sphere that ends at z = {floor:.4g} m, with <mu1>0</mu1> for its link",
         )
