@@ -1,5 +1,6 @@
 """From a `RobotDescription` to a MuJoCo model, with a ledger of what became of every element."""
 
+from twin.convert import mujoco_log as mujoco_log
 from twin.convert.bodies import Base
 from twin.convert.conversion import Conversion, LedgerEntry, Outcome
 from twin.convert.convert import convert

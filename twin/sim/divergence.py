@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from twin.convert import mujoco_log as mujoco_log
 from twin.errors import SimulationError
 from twin.geometry import Array
 
@@ -17,8 +17,6 @@ _BAD = (
     mujoco.mjtWarning.mjWARN_BADQVEL,
     mujoco.mjtWarning.mjWARN_BADQACC,
 )
-# MuJoCo would write to stderr and to MUJOCO_LOG.TXT in the current folder.
-mujoco.set_mju_user_warning(logging.getLogger("twin.mujoco").info)
 
 _WHAT = ("position", "velocity", "acceleration")
 
