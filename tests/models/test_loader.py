@@ -110,6 +110,23 @@ FAULTS = {
         "<wheel_diameter>1</wheel_diameter></plugin></gazebo>",
         "the drive plugin names joint 'jj', which does not exist; did you mean 'j'",
     ),
+    "wheel twice": (
+        joint_k("continuous")
+        + "<gazebo><plugin filename='libgazebo_ros_diff_drive.so'><left_joint>k</left_joint>"
+        "<right_joint>k</right_joint><wheel_separation>1</wheel_separation>"
+        "<wheel_diameter>1</wheel_diameter></plugin></gazebo>",
+        "the drive plugin names joint 'k' twice",
+    ),
+    "out of range": (
+        link_c(sphere("<origin xyz='0 1e11 0'/>")),
+        "xyz='0 1e11 0' is out of range; at most 1e+10",
+    ),
+    "no mass to speak of": (link_c(inertial(mass=1e-300)), "link 'c' has mass 1e-300 kg"),
+    "no inertia to speak of": (link_c(inertial(ixx=1e-300)), "moment 1e-300 kg m² is taken for zero"),
+    "too thin": (
+        link_c("<visual><geometry><box size='1 1 1e-300'/></geometry></visual>"),
+        "<box> of link 'c' has a dimension that is not positive",
+    ),
     "command": (
         "<ros2_control><joint name='j'><command_interface name='position'/></joint></ros2_control>",
         "<ros2_control> commands joint 'j', which is fixed",

@@ -21,7 +21,7 @@ from twin.convert.inspection import inspect_robot
 from twin.convert.roles import roles_of
 from twin.convert.self_check import SelfCheck, self_check
 from twin.convert.tag_ledger import counts, tag_ledger
-from twin.errors import ConversionError
+from twin.errors import ConversionError, Problem
 from twin.models.checks import Diagnostic
 from twin.models.description import RobotDescription
 
@@ -59,7 +59,7 @@ def export(
     try:
         assets = _write_assets(spec, staging)
         (staging / MODEL).write_text(exact_xml(spec), encoding="utf-8")
-        model = mujoco.MjModel.from_xml_path(str(staging / MODEL))
+        model = _load(staging / MODEL, description)
         checked = self_check(model, conversion.description)
         if not checked.passed:
             raise ConversionError(f"{description.source}: the model differs from the file: {checked}")
@@ -82,6 +82,14 @@ def _check_folder(folder: Path) -> None:
             )
     elif folder.exists():
         raise ConversionError(f"{folder}: is a file; give a new or empty folder")
+
+
+def _load(file: Path, description: RobotDescription) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        message = f"MuJoCo does not read what was written: {' '.join(str(error).split())}"
+        raise ConversionError(Problem(message, description.source, code="mujoco", element="robot")) from error
 
 
 def _write_assets(spec: mujoco.MjSpec, folder: Path) -> list[str]:

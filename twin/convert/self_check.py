@@ -15,6 +15,8 @@ from twin.models.kinematics import joint_positions, link_poses
 
 SAMPLES = 5
 """Random joint positions that are compared."""
+FARTHEST = 100.0
+"""Of ranges that mean none, only this much is used [rad or m]."""
 TOLERANCE = 1e-9
 """Relative; for kinematics [m] and [-]."""
 
@@ -95,7 +97,8 @@ def _relative(difference: np.ndarray, reference: np.ndarray) -> float:
 
 def _draw(joint: Joint, rng: np.random.Generator) -> float:
     lower, upper = joint.limit.lower, joint.limit.upper
-    return float(rng.uniform(-np.pi if lower is None else lower, np.pi if upper is None else upper))
+    low, high = -np.pi if lower is None else lower, np.pi if upper is None else upper
+    return float(rng.uniform(*np.clip([low, high], -FARTHEST, FARTHEST)))
 
 
 def _repaired(link: Link) -> Link:

@@ -112,7 +112,7 @@ def _fate(element: Element, description: RobotDescription, roles: Roles) -> Fate
     if path == "link" and element.get("name") == WORLD:
         return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
     parent, _, tag = path.rpartition("/")
-    if tag in SHAPES and parent.endswith("/geometry"):
+    if tag in SHAPES and parent in ("link/visual/geometry", "link/collision/geometry"):
         return _shape(element, parent, roles)
     return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
 

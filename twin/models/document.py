@@ -15,6 +15,8 @@ from twin.errors import ModelError, Problem
 Element = Any
 """An lxml element; the library ships no types."""
 
+LARGEST = 1e10
+"""MuJoCo takes no larger number [SI]; only limits may be larger, as some write them for none at all."""
 MAX_BYTES = 32 * 1024 * 1024
 PLACES = ("link", "joint", "gazebo", "sensor")
 """Elements that a user knows by name."""
@@ -75,6 +77,14 @@ class Report:
             return fallback
         if not all(map(math.isfinite, values)):
             self.add(element, f"{describe(element)}: {name}='{text}' is not finite", code="bad-number")
+            return fallback
+        largest = max(map(abs, values))
+        if largest > LARGEST and element.tag != "limit":
+            self.add(
+                element,
+                f"{describe(element)}: {name}='{text}' is out of range; at most {LARGEST:g}",
+                code="bad-number",
+            )
             return fallback
         return values
 

@@ -48,6 +48,10 @@ def read_drive(root: Element, joints: Mapping[str, Joint], report: Report) -> Dr
         report.add(plugins[1], "the robot has two drive plugins; one is allowed", code="bad-drive")
     plugin = plugins[0]
     left, right = (_wheel_joints(plugin, names, joints, report) for names in (LEFT, RIGHT))
+    for name in dict.fromkeys(name for name in left + right if (left + right).count(name) > 1):
+        report.add(
+            plugin, f"the drive plugin names joint '{name}' twice; each wheel is named once", code="bad-drive"
+        )
     separation = report.child_number(plugin, "wheel_separation", "wheelSeparation")
     radius = report.child_number(plugin, "wheel_radius")
     diameter = report.child_number(plugin, "wheel_diameter", "wheelDiameter")

@@ -29,6 +29,10 @@ Rgba = tuple[float, float, float, float]
 
 DEFAULT_RGBA: Rgba = (0.7, 0.7, 0.7, 1.0)
 GEOMETRIES = ("box", "cylinder", "sphere", "capsule", "mesh")
+LEAST = 1e-15
+"""MuJoCo takes a mass or moment up to this for zero [kg, kg m²]."""
+THINNEST = 1e-9
+"""Least dimension of a shape [m]."""
 INERTIA_TOLERANCE = 1e-3
 """Slack of A + B >= C, relative to the trace: files print inertias with few digits."""
 
@@ -105,7 +109,7 @@ def _read_inertial(element: Element, link: str, report: Report) -> Inertial | No
         )
         return None
     mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
-    if mass <= 0.0:
+    if mass <= LEAST:
         report.add(mass_element, f"link '{link}' has mass {mass:g} kg; a mass is positive", code="bad-mass")
         return None
     inertia = _read_inertia(inertia_element, report)
@@ -128,6 +132,8 @@ def _read_inertia(element: Element, report: Report) -> Array:
 def inertia_fault(inertia: Array) -> str | None:
     """Return why no rigid body has this inertia matrix, shape (3, 3) [kg m²], or None if one can."""
     principal = np.linalg.eigvalsh(inertia)
+    if 0.0 < principal[0] <= LEAST:
+        return f"its least principal moment {principal[0]:.4g} kg m² is taken for zero"
     shown = ", ".join(f"{value:.4g}" for value in principal)
     if principal[0] <= 0.0:
         return f"its principal moments {shown} kg m² are not all positive"
@@ -194,7 +200,7 @@ def _read_geometry(element: Element, context: LinkContext) -> Geometry:
         return placeholder
     known = len(report.problems)
     read = _read_primitive(shape, report)
-    if len(report.problems) == known and min(_dimensions(read)) <= 0.0:
+    if len(report.problems) == known and min(_dimensions(read)) < THINNEST:
         report.add(shape, f"{describe(shape)} has a dimension that is not positive", code="bad-geometry")
     return read
 
