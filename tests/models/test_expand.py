@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from twin.errors import ModelError
-from twin.models import load
+from twin.models import ReadOptions, load
 from twin.models.expand import expand
 
 HEAD = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>"
@@ -27,7 +27,8 @@ def test_arguments_and_packages(tmp_path: Path) -> None:
     body += "<xacro:include filename='$(find parts)/wheel.xacro'/>"
     body += "<joint name='j' type='fixed'><parent link='$(arg n)'/><child link='wheel'/></joint>"
     file = write(tmp_path / "model", body)
-    assert set(load(file, args={"n": "base"}, packages={"parts": package}).links) == {"base", "wheel"}
+    read = ReadOptions(args={"n": "base"}, packages={"parts": package})
+    assert set(load(file, read).links) == {"base", "wheel"}
     with pytest.raises(ModelError, match=r"\$\(find parts\): package not found; known packages: twin_robots"):
         load(file)
 

@@ -7,15 +7,17 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.model_options import Args, Packages, RobotFile, parse_args, parse_packages
+from twin.cli.model_options import RobotFile, reads_robot
+from twin.models.options import ReadOptions
 
 
+@reads_robot
 def check(
     file: RobotFile,
     json: Annotated[bool, typer.Option("--json", help="Print JSON, for tools.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit 1 if there are warnings.")] = False,
-    arg: Args = None,
-    package: Packages = None,
+    *,
+    read: ReadOptions,
 ) -> None:
     """Name every fault of a robot file, with its line, the number found, and how to mend it.
 
@@ -25,7 +27,7 @@ def check(
     from twin.cli.diagnostics import inspection_json, inspection_text
     from twin.convert.inspection import inspect_file
 
-    found = inspect_file(file, args=parse_args(arg), packages=parse_packages(package))
+    found = inspect_file(file, read)
     if json:
         sys.stdout.write(inspection_json(found))
     else:

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.model_options import Args, Packages, RobotFile, parse_args, parse_packages
+from twin.cli.model_options import RobotFile, reads_robot
+from twin.models.options import ReadOptions
 
 
 class Base(StrEnum):
@@ -18,14 +19,15 @@ class Base(StrEnum):
     FIXED = "fixed"
 
 
+@reads_robot
 def convert(
     file: RobotFile,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.", show_default=False)
     ],
     base: Annotated[Base, typer.Option(help="fixed: the robot is bolted down.")] = Base.FREE,
-    arg: Args = None,
-    package: Packages = None,
+    *,
+    read: ReadOptions,
 ) -> None:
     """Write robot.xml and assets/, which plain MuJoCo loads, and report.json: what became of every tag.
 
@@ -37,7 +39,7 @@ def convert(
     from twin.models import load
     from twin.sim.physics import Physics
 
-    description = load(file, args=parse_args(arg), packages=parse_packages(package))
+    description = load(file, read)
     report = export(description, output, base=base.value, set_options=Physics(sleep=False).apply)
     tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
     size = ", ".join(counted(len(report[noun + "s"]), noun) for noun in ("link", "joint"))

@@ -8,18 +8,20 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.model_options import Args, Packages, RobotFile, parse_args, parse_packages
+from twin.cli.model_options import RobotFile, reads_robot
 from twin.errors import ModelError
+from twin.models.options import ReadOptions
 
 
+@reads_robot
 def graph(
     file: RobotFile,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="File to write: .gv or .svg.", show_default=".gv on stdout"),
     ] = None,
-    arg: Args = None,
-    package: Packages = None,
+    *,
+    read: ReadOptions,
 ) -> None:
     """Draw links and joints: Graphviz text as urdf_to_graphviz writes it, or SVG, which needs no Graphviz."""
     if output is not None and output.suffix not in (".gv", ".svg"):
@@ -28,7 +30,7 @@ def graph(
     from twin.models.graph import graphviz, svg
     from twin.scenario.verdict import write_atomically
 
-    description = load(file, args=parse_args(arg), packages=parse_packages(package))
+    description = load(file, read)
     if output is None:
         sys.stdout.write(graphviz(description))
         return

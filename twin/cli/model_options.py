@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from twin.errors import ModelError
+from twin.models.options import ReadOptions
 
 RobotFile = Annotated[
     str,
@@ -16,33 +20,72 @@ RobotFile = Annotated[
         metavar="FILE", help="A URDF or xacro file, or a robot of `twin robots`.", show_default=False
     ),
 ]
-Args = Annotated[
-    list[str] | None,
-    typer.Option("--arg", metavar="NAME:=VALUE", help="Value of an <xacro:arg>; may be repeated."),
-]
-Packages = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--package", metavar="NAME=PATH", help="Folder of a ROS package that the file names; may be repeated."
-    ),
-]
 
 
-def parse_args(words: Sequence[str] | None) -> dict[str, str]:
-    """Split `NAME:=VALUE` words; raises ModelError."""
-    valid = "NAME:=VALUE, such as --arg wheel_radius:=0.06"
-    return dict(_split(word, ":=", "--arg", valid) for word in words or ())
+class MissingMesh(StrEnum):
+    """What to do about a shape whose mesh file is missing."""
+
+    ERROR = "error"
+    SKIP = "skip"
 
 
-def parse_packages(words: Sequence[str] | None) -> dict[str, Path]:
-    """Split `NAME=PATH` words; raises ModelError."""
-    valid = "NAME=PATH, such as --package my_robot=."
-    pairs = (_split(word, "=", "--package", valid) for word in words or ())
-    return {name: Path(path) for name, path in pairs}
+def _options(
+    arg: Annotated[
+        list[str] | None,
+        typer.Option("--arg", metavar="NAME:=VALUE", help="Value of an <xacro:arg>; may be repeated."),
+    ] = None,
+    package: Annotated[
+        list[str] | None,
+        typer.Option("--package", metavar="NAME=PATH", help="Folder of a ROS package that the file names."),
+    ] = None,
+    allow_env: Annotated[
+        list[str] | None,
+        typer.Option("--allow-env", metavar="NAME", help="Environment variable that $(env …) may read."),
+    ] = None,
+    allow_path: Annotated[
+        list[Path] | None,
+        typer.Option("--allow-path", metavar="DIR", help="Another folder that the file may read from."),
+    ] = None,
+    missing_mesh: Annotated[
+        MissingMesh, typer.Option(help="skip: leave out shapes whose mesh is missing or unreadable.")
+    ] = MissingMesh.ERROR,
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Take the nearest possible inertia where the file's is not."),
+    ] = False,
+) -> ReadOptions:
+    folders = _pairs(package, "=", "--package", "NAME=PATH, such as --package my_robot=.")
+    return ReadOptions(
+        args=_pairs(arg, ":=", "--arg", "NAME:=VALUE, such as --arg wheel_radius:=0.06"),
+        packages={name: Path(folder) for name, folder in folders.items()},
+        allow_env=tuple(allow_env or ()),
+        allow_paths=tuple(allow_path or ()),
+        missing_mesh=missing_mesh.value,
+        repair=repair,
+    )
 
 
-def _split(word: str, separator: str, option: str, valid: str) -> tuple[str, str]:
-    name, found, value = word.partition(separator)
-    if not name or not found:
-        raise ModelError(f"{option} {word}: must be {valid}")
-    return name, value
+def reads_robot(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command whose last parameter is `read: ReadOptions` the options of which that is made."""
+    shared = inspect.signature(_options, eval_str=True).parameters
+    own = inspect.signature(command, eval_str=True)
+
+    @functools.wraps(command)
+    def wrapper(**given: Any) -> None:
+        read = _options(**{name: given.pop(name) for name in shared})
+        command(**given, read=read)
+
+    parameters = [*(own.parameters[name] for name in own.parameters if name != "read"), *shared.values()]
+    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return wrapper
+
+
+def _pairs(words: Sequence[str] | None, separator: str, option: str, valid: str) -> dict[str, str]:
+    pairs = {}
+    for word in words or ():
+        name, found, value = word.partition(separator)
+        if not name or not found:
+            raise ModelError(f"{option} {word}: must be {valid}")
+        pairs[name] = value
+    return pairs

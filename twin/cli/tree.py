@@ -6,13 +6,15 @@ import sys
 
 import typer
 
-from twin.cli.model_options import Args, Packages, RobotFile, parse_args, parse_packages
+from twin.cli.model_options import RobotFile, reads_robot
+from twin.models.options import ReadOptions
 
 REFUSED = 255
 """check_urdf's exit code for a file that it refuses."""
 
 
-def tree(file: RobotFile, arg: Args = None, package: Packages = None) -> None:
+@reads_robot
+def tree(file: RobotFile, *, read: ReadOptions) -> None:
     """Print the tree of links in check_urdf's format.
 
     Exit code 0, or 255 for a file with errors, as check_urdf's.
@@ -23,7 +25,7 @@ def tree(file: RobotFile, arg: Args = None, package: Packages = None) -> None:
     from twin.models.tree import tree_text
 
     try:
-        description = load(file, args=parse_args(arg), packages=parse_packages(package))
+        description = load(file, read)
     except ModelError as fault:
         print_error(fault)
         raise typer.Exit(REFUSED) from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from twin.errors import ConversionError, ModelError
 from twin.models import load
 from twin.models.checks import Diagnostic, check, from_problems, in_file_order
 from twin.models.description import RobotDescription
-from twin.models.loader import NO_ARGS, NO_PACKAGES
+from twin.models.options import DEFAULTS, ReadOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,22 +29,16 @@ class Inspection:
         return sum(diagnostic.severity == severity for diagnostic in self.diagnostics)
 
 
-def inspect_file(
-    name_or_path: str | Path,
-    *,
-    args: Mapping[str, str] = NO_ARGS,
-    packages: Mapping[str, Path] = NO_PACKAGES,
-) -> Inspection:
+def inspect_file(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> Inspection:
     """Return everything that is wrong or suspicious about a robot file, raising nothing.
 
     Args:
         name_or_path: A robot of the catalogue, or the path of a URDF or xacro file.
-        args: Values of `<xacro:arg>`.
-        packages: Folders of ROS packages.
+        options: How to read it.
     """
     file = Path(name_or_path)
     try:
-        description = load(name_or_path, args=args, packages=packages)
+        description = load(name_or_path, options)
     except ModelError as fault:
         return Inspection(file=file, description=None, diagnostics=from_problems(fault.problems, file))
     return Inspection(file=file, description=description, diagnostics=inspect_robot(description))

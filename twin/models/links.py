@@ -24,6 +24,7 @@ from twin.models.description import (
     Visual,
 )
 from twin.models.document import Element, Report, describe, owner
+from twin.models.options import ReadOptions
 
 Rgba = tuple[float, float, float, float]
 
@@ -43,6 +44,7 @@ class LinkContext:
 
     report: Report
     packages: Mapping[str, Path]
+    options: ReadOptions
     materials: Mapping[str, Rgba]
     surfaces: Mapping[str, Surface]
 

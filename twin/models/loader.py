@@ -14,43 +14,38 @@ from twin.models.expand import expand, known_packages
 from twin.models.gazebo import read_commands, read_drive, read_surfaces
 from twin.models.joints import check_tree, read_joint, unique
 from twin.models.links import LinkContext, read_link, read_materials
+from twin.models.options import DEFAULTS, ReadOptions
 from twin.models.sensors import read_sensors
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 """1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
 XACRO = "http://www.ros.org/wiki/xacro"
-NO_ARGS: Mapping[str, str] = MappingProxyType({})
 NO_PACKAGES: Mapping[str, Path] = MappingProxyType({})
 
 
-def load(
-    name_or_path: str | Path,
-    *,
-    args: Mapping[str, str] = NO_ARGS,
-    packages: Mapping[str, Path] = NO_PACKAGES,
-) -> RobotDescription:
+def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDescription:
     """Return a robot as data.
 
     Args:
         name_or_path: A robot of `catalogue()`, or the path of a URDF or xacro file.
-        args: Values of `<xacro:arg>`, as `name:=value` on a ROS command line.
-        packages: Folders of ROS packages that `$(find name)` and `package://name/` may name.
+        options: How to read it.
 
     Raises:
         ModelError: With every fault of the file, each with its line where that is the user's.
     """
     source = resolve(name_or_path)
-    found = known_packages(source, packages)
+    packages = known_packages(source, options.packages)
     raw = source.read_bytes()
     if _has_xacro(source, raw):
-        urdf = expand(source, args=args, packages=found)
-        return parse_urdf(urdf, source, packages=found, lines_are_users=False)
-    return parse_urdf(raw, source, packages=found)
+        urdf = expand(source, args=options.args, packages=packages)
+        return parse_urdf(urdf, source, options, packages=packages, lines_are_users=False)
+    return parse_urdf(raw, source, options, packages=packages)
 
 
 def parse_urdf(
     urdf: str | bytes,
     source: Path,
+    options: ReadOptions = DEFAULTS,
     *,
     packages: Mapping[str, Path] = NO_PACKAGES,
     lines_are_users: bool = True,
@@ -60,6 +55,7 @@ def parse_urdf(
     Args:
         urdf: The text, without xacro.
         source: The file it came from: named in messages, and meshes are relative to it.
+        options: What to do about what is missing or impossible.
         packages: Folders that `package://name/` may name.
         lines_are_users: False if the lines of `urdf` are not those of `source`.
 
@@ -74,7 +70,7 @@ def parse_urdf(
             root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
         )
     surfaces = read_surfaces(root, report)
-    links = _read_links(root, surfaces, packages, report)
+    links = _read_links(root, surfaces, packages, report, options)
     joints, elements = _read_joints(root, report)
     root_link = check_tree(links, joints, elements, report)
     description = RobotDescription(
@@ -102,10 +98,18 @@ def _has_xacro(source: Path, raw: bytes) -> bool:
 
 
 def _read_links(
-    root: Element, surfaces: Mapping[str, Surface], packages: Mapping[str, Path], report: Report
+    root: Element,
+    surfaces: Mapping[str, Surface],
+    packages: Mapping[str, Path],
+    report: Report,
+    options: ReadOptions,
 ) -> dict[str, Link]:
     context = LinkContext(
-        report=report, packages=packages, materials=read_materials(root, report), surfaces=surfaces
+        report=report,
+        packages=packages,
+        options=options,
+        materials=read_materials(root, report),
+        surfaces=surfaces,
     )
     items = [(element, read_link(element, context)) for element in root.findall("link")]
     links = unique("link", items, report)

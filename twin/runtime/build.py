@@ -14,7 +14,7 @@ from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2
-from twin.models import load
+from twin.models import ReadOptions, load
 from twin.models.description import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
@@ -73,7 +73,7 @@ def build(
     timestep = scenario.physics.timestep
     placements, heights = [], {}
     for robot in scenario.robots:
-        description = load(robot.model, args=robot.args)
+        description = load(robot.model, ReadOptions(args=robot.args))
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
         placements.append(RobotPlacement(name=robot.id, conversion=conversion, pose=starts[robot.id]))

@@ -17,8 +17,10 @@ SEEDS = Path(__file__).parents[4] / "shared" / "seed_models"
 FILES = ["r2d2.urdf", "simple_robot.urdf.xacro", "sp1s_1.urdf", "sp1s_2.urdf"]
 FILES += [f"test_robot_{number}.urdf" for number in (1, 2, 3)]
 
+CHECK_URDF = shutil.which("check_urdf", path="/usr/bin:/usr/local/bin")
+"""Debian's; the one that `pip install pin` brings is of a newer urdfdom with other versions of URDF."""
 pytestmark = pytest.mark.skipif(
-    shutil.which("check_urdf") is None,
+    CHECK_URDF is None,
     reason="check_urdf is not installed (apt-get install liburdfdom-tools)",
 )
 
@@ -128,7 +130,7 @@ ONLY_CHECK_URDF_REFUSES = {
 
 
 def check_urdf(file: Path) -> tuple[bool, str]:
-    done = subprocess.run(["check_urdf", str(file)], capture_output=True, text=True, check=False)
+    done = subprocess.run([str(CHECK_URDF), str(file)], capture_output=True, text=True, check=False)
     assert done.returncode in (0, 255)
     return done.returncode == 0, done.stdout
 
