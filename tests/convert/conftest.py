@@ -77,9 +77,9 @@ class BareWorld:
         for name, value in joint_positions(self.description, positions).items():
             if self.description.joints[name].type == "fixed":
                 continue
-            self.data.qpos[self.model.joint(f"r/{name}").qposadr[0]] = value
+            self.data.qpos[self.model.joint(f"r/{name}").qposadr[0]] = value[0]
             if name in self.description.commands:
-                self.command(name, value)
+                self.command(name, value[0])
         mujoco.mj_forward(self.model, self.data)
 
     def pose(self, link: str | None = None) -> Pose3:

@@ -31,7 +31,7 @@ def random_positions(description: RobotDescription, rng: np.random.Generator) ->
         for name, j in free.items()
     }
     every = joint_positions(description, leaders)
-    return {n: p for n, p in every.items() if description.joints[n].type != "fixed"}
+    return {n: float(p[0]) for n, p in every.items() if description.joints[n].type != "fixed"}
 
 
 def compiled(conversion: Conversion, positions: dict[str, float]) -> tuple[mujoco.MjModel, mujoco.MjData]:

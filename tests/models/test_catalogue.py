@@ -55,7 +55,7 @@ def test_forward_kinematics_equals_yourdfpy(robot: str) -> None:
     for seed in range(5):
         positions = random_positions(description, seed)
         every = joint_positions(description, positions)
-        oracle.update_cfg({name: every[name] for name in oracle.actuated_joint_names})
+        oracle.update_cfg({name: float(every[name][0]) for name in oracle.actuated_joint_names})
         for link, pose in link_poses(description, positions).items():
             expected = oracle.get_transform(link, description.root)
             np.testing.assert_allclose(pose.xyz, expected[:3, 3], atol=1e-9)

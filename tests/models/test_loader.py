@@ -85,7 +85,7 @@ FAULTS = {
     "unknown type": (joint_k("revolut"), "joint 'k' has type 'revolut'; did you mean 'revolute'"),
     "negative mass": (link_c(inertial(mass=-1)), "link 'c' has mass -1 kg"),
     "impossible inertia": (
-        link_c(inertial(ixx=3)),
+        joint_k("continuous", link=inertial(ixx=3)),
         "link 'c' has an impossible inertia: of its principal moments 1, 1, 3 kg m²",
     ),
     "unknown geometry": (
@@ -121,8 +121,10 @@ FAULTS = {
         link_c(sphere("<origin xyz='0 1e11 0'/>")),
         "xyz='0 1e11 0' is out of range; at most 1e+10",
     ),
-    "no mass to speak of": (link_c(inertial(mass=1e-300)), "link 'c' has mass 1e-300 kg"),
-    "no inertia to speak of": (link_c(inertial(ixx=1e-300)), "moment 1e-300 kg m² is taken for zero"),
+    "no inertia to speak of": (
+        joint_k("continuous", link=inertial(ixx=1e-300)),
+        "moment 1e-300 kg m² is taken for zero",
+    ),
     "too thin": (
         link_c("<visual><geometry><box size='1 1 1e-300'/></geometry></visual>"),
         "<box> of link 'c' has a dimension that is not positive",

@@ -9,9 +9,10 @@ import numpy as np
 
 from twin.convert.geoms import GeomBuilder
 from twin.errors import ConversionError, Problem
-from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
-from twin.models.description import Inertial, Joint, Link, RobotDescription
-from twin.models.kinematics import rigid_groups
+from twin.geometry import Pose3
+from twin.models.description import Joint, RobotDescription
+from twin.models.kinematics import planar_axes, rigid_groups
+from twin.models.mass_properties import MassProperties
 
 Base = Literal["free", "fixed", "kinematic"]
 
@@ -34,7 +35,14 @@ def add_bodies(
         ConversionError: A moving part has no mass.
     """
     _check_masses(description, base)
-    root = _add_link(spec.worldbody, description.links[description.root], Pose3.from_xyz_rpy(), geoms)
+    masses = description.settlement.bodies
+
+    def add_link(parent: mujoco.MjsBody, name: str, T_parent_link: Pose3) -> mujoco.MjsBody:
+        body = _add_body(parent, name, T_parent_link, masses.get(name))
+        geoms.add(body, description.links[name])
+        return body
+
+    root = add_link(spec.worldbody, description.root, Pose3.from_xyz_rpy())
     root_joint = None
     if base == "kinematic":
         root.mocap = True
@@ -45,38 +53,23 @@ def add_bodies(
     while pending:
         name, body = pending.pop(0)
         for joint in description.children(name):
-            child = _add_link(body, description.links[joint.child], joint.T_parent_joint, geoms)
+            child = add_link(body, joint.child, joint.T_parent_joint)
             _add_joint(child, joint, is_wheel=joint.name in wheel_joints)
             pending.append((joint.child, child))
     return root_joint
 
 
-def _add_link(parent: mujoco.MjsBody, link: Link, T_parent_link: Pose3, geoms: GeomBuilder) -> mujoco.MjsBody:
-    body = parent.add_body(name=link.name, pos=T_parent_link.xyz, quat=T_parent_link.quat_wxyz)
+def _add_body(
+    parent: mujoco.MjsBody, name: str, T_parent_link: Pose3, mass: MassProperties | None
+) -> mujoco.MjsBody:
+    body = parent.add_body(name=name, pos=T_parent_link.xyz, quat=T_parent_link.quat_wxyz)
     # Without an inertial a link weighs nothing; MuJoCo would else weigh its shapes.
     body.explicitinertial = True
-    if link.inertial is not None:
-        body.mass = link.inertial.mass
-        body.ipos = link.inertial.T_link_com.xyz
-        inertia = inertia_in_link(link.inertial)
-        body.fullinertia = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    geoms.add(body, link)
+    if mass is not None:
+        body.mass = mass.mass
+        body.ipos = mass.com
+        body.fullinertia = mass.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return body
-
-
-def inertia_in_link(inertial: Inertial) -> Array:
-    """Return the inertia about the centre of mass, in link axes, shape (3, 3) [kg m²].
-
-    A file prints few digits, so that the largest moment of a plate can exceed the sum of the others by the
-    last one; the nearest inertia that a body can have is taken then.
-    """
-    R = matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz)
-    moments, axes = np.linalg.eigh(R @ inertial.inertia @ R.T)
-    excess = moments[2] - moments[0] - moments[1]
-    if excess < 0.0:
-        return R @ inertial.inertia @ R.T
-    share = excess / 3.0 + 1e-9 * moments[2]
-    return (axes * (moments + np.array([share, share, -share]))) @ axes.T
 
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, is_wheel: bool) -> None:
@@ -108,11 +101,9 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, is_wheel: bool) -> None:
 
 
 def _add_planar(body: mujoco.MjsBody, joint: Joint) -> None:
-    """Add two slides in the plane and a hinge about its normal, which is the joint's axis."""
-    normal = np.array(joint.axis)
-    along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    along /= np.linalg.norm(along)
-    for suffix, axis in (("x", along), ("y", np.cross(normal, along))):
+    """Add two slides in the plane, then a hinge about its normal."""
+    along, across, normal = planar_axes(joint)
+    for suffix, axis in (("x", along), ("y", across)):
         body.add_joint(name=f"{joint.name}_{suffix}", type=_TYPE.mjJNT_SLIDE, axis=axis)
     body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from twin.convert.bodies import inertia_in_link
-from twin.geometry import Pose3, matrix_from_quat_wxyz
-from twin.models.description import Joint, Link, RobotDescription
-from twin.models.dynamics import hinges_and_slides, mass_matrix_and_gravity
+from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
+from twin.models.description import Inertial, Joint, RobotDescription
+from twin.models.dynamics import mass_matrix_and_gravity
 from twin.models.kinematics import joint_positions, link_poses
 
 SAMPLES = 5
@@ -19,6 +19,12 @@ FARTHEST = 100.0
 """Of ranges that mean none, only this much is used [rad or m]."""
 TOLERANCE = 1e-9
 """Relative; for kinematics [m] and [-]."""
+QPOS_NAMES: Mapping[str, tuple[str, ...]] = {
+    "fixed": (),
+    "planar": ("_x", "_y", "_yaw"),
+    "floating": ("_x", "_y", "_z", "_rotation"),
+}
+"""What is added to a joint's name for each MuJoCo joint that stands for it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,16 +49,17 @@ class SelfCheck:
 
 
 def self_check(model: mujoco.MjModel, description: RobotDescription) -> SelfCheck:
-    """Compare a model with its description at joint position zero and at random ones (fixed seed)."""
-    description = replace(
-        description, links={name: _repaired(link) for name, link in description.links.items()}
-    )
-    names, rng = hinges_and_slides(description), np.random.Generator(np.random.Philox(0))
+    """Compare a model with its description at joint position zero and at random ones (fixed seed).
+
+    Where the file's inertia is impossible, it is compared with the nearest possible one.
+    """
+    description = _as_settled(description)
+    rng = np.random.Generator(np.random.Philox(0))
     worst = np.zeros(3)
     for sample in range(SAMPLES):
-        given = {name: _draw(description.joints[name], rng) if sample else 0.0 for name in names}
-        positions = joint_positions(description, given)
-        worst = np.maximum(worst, _differences(model, description, {n: positions[n] for n in names}))
+        drawn = {joint.name: _draw(joint, rng) for joint in description.joints.values()} if sample else {}
+        positions = joint_positions(description, drawn)
+        worst = np.maximum(worst, _differences(model, description, positions))
     expected = sum(link.inertial.mass for link in description.links.values() if link.inertial)
     found = float(np.sum(model.body_mass))
     return SelfCheck(
@@ -63,12 +70,33 @@ def self_check(model: mujoco.MjModel, description: RobotDescription) -> SelfChec
     )
 
 
+def set_positions(
+    model: mujoco.MjModel, data: mujoco.MjData, description: RobotDescription, positions: Mapping[str, Array]
+) -> None:
+    """Put a model's joints, planar and floating ones too, to `positions` as of `joint_positions`."""
+    for name, joint in description.joints.items():
+        names = QPOS_NAMES.get(joint.type, ("",))
+        parts = np.split(positions[name], range(1, len(names))) if names else []
+        for suffix, part in zip(names, parts, strict=True):
+            start = model.joint(f"{name}{suffix}").qposadr[0]
+            data.qpos[start : start + len(part)] = part
+
+
+def dof_indices(model: mujoco.MjModel, description: RobotDescription) -> list[int]:
+    """Return where in `qvel` the `degrees_of_freedom` of a description are."""
+    indices: list[int] = []
+    for name, joint in description.joints.items():
+        for suffix in QPOS_NAMES.get(joint.type, ("",)):
+            start = int(model.joint(f"{name}{suffix}").dofadr[0])
+            indices += range(start, start + (3 if suffix == "_rotation" else 1))
+    return indices
+
+
 def _differences(
-    model: mujoco.MjModel, description: RobotDescription, positions: dict[str, float]
+    model: mujoco.MjModel, description: RobotDescription, positions: Mapping[str, Array]
 ) -> tuple[float, float, float]:
     data = mujoco.MjData(model)
-    for name, value in positions.items():
-        data.qpos[model.joint(name).qposadr[0]] = value
+    set_positions(model, data, description, positions)
     mujoco.mj_forward(model, data)
     root = data.body(description.root)
     T_world_root = Pose3(root.xpos, root.xquat)
@@ -77,9 +105,9 @@ def _differences(
         placed, body = T_world_root @ pose, data.body(name)
         rotation = matrix_from_quat_wxyz(placed.quat_wxyz) - body.xmat.reshape(3, 3)
         kinematics = max(kinematics, np.max(np.abs(body.xpos - placed.xyz)), np.max(np.abs(rotation)))
-    if not positions:
+    dofs = dof_indices(model, description)
+    if not dofs:
         return kinematics, 0.0, 0.0
-    dofs = [int(model.joint(name).dofadr[0]) for name in positions]
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
     full -= np.diag(model.dof_armature)
@@ -95,16 +123,27 @@ def _relative(difference: np.ndarray, reference: np.ndarray) -> float:
     return float(np.max(np.abs(difference)) / max(1.0e-3, np.max(np.abs(reference))))
 
 
-def _draw(joint: Joint, rng: np.random.Generator) -> float:
+def _draw(joint: Joint, rng: np.random.Generator) -> Array:
+    if joint.type == "planar":
+        return rng.uniform(-np.pi, np.pi, size=3)
+    if joint.type == "floating":
+        quat = rng.normal(size=4)
+        return np.concatenate((rng.uniform(-1.0, 1.0, size=3), quat / np.linalg.norm(quat)))
     lower, upper = joint.limit.lower, joint.limit.upper
     low, high = -np.pi if lower is None else lower, np.pi if upper is None else upper
-    return float(rng.uniform(*np.clip([low, high], -FARTHEST, FARTHEST)))
+    return np.atleast_1d(rng.uniform(*np.clip([low, high], -FARTHEST, FARTHEST)))
 
 
-def _repaired(link: Link) -> Link:
-    """Return the link with the inertia that the conversion gives it."""
-    inertial = link.inertial
-    if inertial is None:
-        return link
-    com = Pose3.from_xyz_rpy(inertial.T_link_com.xyz)
-    return replace(link, inertial=replace(inertial, T_link_com=com, inertia=inertia_in_link(inertial)))
+def _as_settled(description: RobotDescription) -> RobotDescription:
+    """Return the description with the inertias that had to be repaired as they are in the model."""
+    settlement = description.settlement
+    links = dict(description.links)
+    for name, repair in settlement.repaired.items():
+        body = settlement.bodies[name]
+        com = Pose3(body.com, np.array([1.0, 0.0, 0.0, 0.0]))
+        links[name] = replace(
+            links[name], inertial=Inertial(T_link_com=com, mass=body.mass, inertia=body.inertia)
+        )
+        for part in repair.parts:
+            links[part] = replace(links[part], inertial=None)
+    return replace(description, links=links)

@@ -8,12 +8,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from twin.convert.bodies import inertia_in_link
 from twin.convert.conversion import Outcome
 from twin.convert.convert import WORLD
 from twin.convert.ledger import READ_SENSORS
 from twin.convert.roles import Roles
-from twin.geometry import matrix_from_quat_wxyz
 from twin.models.checks.source import is_repeated, number, read_source
 from twin.models.description import RobotDescription
 from twin.models.document import Element, place
@@ -154,16 +152,17 @@ def _limit(element: Element, kind: str) -> Fate:
 
 
 def _inertia(element: Element, description: RobotDescription) -> Fate:
-    inertial = description.links[next(element.iterancestors("link")).get("name")].inertial
-    assert inertial is not None
-    R = matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz)
-    change = np.max(np.abs(inertia_in_link(inertial) - R @ inertial.inertia @ R.T)) / np.max(inertial.inertia)
-    if change < 1e-12:
-        return FATES["link/inertial/inertia"]
-    return (
-        "translated",
-        f"nearest inertia that a body can have; changed by {change:.1e} of the largest moment",
-    )
+    link = next(element.iterancestors("link")).get("name")
+    settlement = description.settlement
+    if link in settlement.lumped:
+        return "translated", f"no body has it; part of the inertia of '{settlement.lumped[link]}'"
+    if link in settlement.repaired:
+        repair = settlement.repaired[link]
+        note = f"nearest inertia that a body can have; {repair.change:.1e} of the largest moment away"
+        return ("guessed" if repair.fault else "translated"), note
+    if description.links[link].inertial is None:
+        return "kept", "no mass, no inertia: a mere frame"
+    return FATES["link/inertial/inertia"]
 
 
 def _shape(element: Element, parent: str, roles: Roles) -> Fate:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from twin.errors import ModelError, Problem, nearest
 from twin.geometry import Array, Pose3
+
+if TYPE_CHECKING:
+    from twin.models.kinematics import Positions
+    from twin.models.mass_properties import Settlement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,4 +285,65 @@ class RobotDescription:
 
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""
-        return tuple(joint for joint in self.joints.values() if joint.parent == link)
+        return self._children.get(link, ())
+
+    @cached_property
+    def _children(self) -> Mapping[str, tuple[Joint, ...]]:
+        below: dict[str, list[Joint]] = {}
+        for joint in self.joints.values():
+            below.setdefault(joint.parent, []).append(joint)
+        return {link: tuple(joints) for link, joints in below.items()}
+
+    @cached_property
+    def settlement(self) -> Settlement:
+        """Mass properties that a physics engine can take, by `twin.models.mass_properties.settle`."""
+        from twin.models.mass_properties import settle
+
+        return settle(self)
+
+    def pose(self, frame: str, positions: Positions | None = None, *, reference: str | None = None) -> Pose3:
+        """Return the pose of a link's frame in that of another, `T_reference_frame`.
+
+        Args:
+            frame: A link.
+            positions: Of joints by name, as for `twin.models.link_poses`; left out ones are at zero.
+            reference: A link; the root by default.
+
+        Raises:
+            ModelError: No such link or joint.
+        """
+        from twin.models.kinematics import link_poses
+
+        self._check(positions, frame, reference)
+        poses = link_poses(self, positions)
+        return poses[reference or self.root].inverse() @ poses[frame]
+
+    def jacobian(self, frame: str, positions: Positions | None = None) -> Array:
+        """Return how joint speeds move a link's frame, base still.
+
+        Args:
+            frame: A link.
+            positions: Of joints by name, as for `twin.models.link_poses`; left out ones are at zero.
+
+        Returns:
+            Shape (6, n), a column for each of `twin.models.dynamics.degrees_of_freedom`: velocity [m/s] and
+            angular velocity [rad/s] of the frame, in root axes, per joint speed.
+
+        Raises:
+            ModelError: No such link or joint.
+        """
+        from twin.models.dynamics import jacobian
+        from twin.models.kinematics import link_poses
+
+        self._check(positions, frame)
+        return jacobian(self, frame, link_poses(self, positions))
+
+    def _check(self, positions: Positions | None, *frames: str | None) -> None:
+        problems = [
+            f"{self.source}: robot '{self.name}' has no {kind} '{name}'; {nearest(name, valid)}"
+            for kind, names, valid in (("link", frames, self.links), ("joint", positions or (), self.joints))
+            for name in names
+            if name is not None and name not in valid
+        ]
+        if problems:
+            raise ModelError(map(Problem, problems))

@@ -6,42 +6,71 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from twin.geometry import Pose3
+from twin.geometry import Array, Pose3
 from twin.models.description import Joint, RobotDescription
 
+Positions = Mapping[str, ArrayLike]
+"""Joint positions by name: a number [rad or m]; of a planar joint x, y [m], yaw [rad]; of a floating joint
+x, y, z [m] and a quaternion w, x, y, z."""
 
-def joint_positions(description: RobotDescription, positions: Mapping[str, float]) -> dict[str, float]:
-    """Return the position of every joint [rad or m]: as given, else by its leader, else zero."""
+ZERO: Mapping[str, tuple[float, ...]] = {
+    "planar": (0.0, 0.0, 0.0),
+    "floating": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+}
 
-    def position(joint: Joint) -> float:
+
+def joint_positions(description: RobotDescription, positions: Positions) -> dict[str, Array]:
+    """Return every joint's position, shape (1,), (3,) or (7,): as given, else by its leader, else zero."""
+
+    def position(joint: Joint) -> Array:
         if joint.mimic is None:
-            return float(positions.get(joint.name, 0.0))
+            return np.atleast_1d(
+                np.asarray(positions.get(joint.name, ZERO.get(joint.type, 0.0)), dtype=np.float64)
+            )
         leader = position(description.joints[joint.mimic.joint])
         return joint.mimic.multiplier * leader + joint.mimic.offset
 
     return {name: position(joint) for name, joint in description.joints.items()}
 
 
-def joint_motion(joint: Joint, position: float) -> Pose3:
-    """Return what a `position` [rad or m] adds after the origin; planar and floating stay at zero."""
-    axis = np.array(joint.axis)
+def joint_motion(joint: Joint, position: ArrayLike) -> Pose3:
+    """Return what a `position`, as in `Positions`, adds after the joint's origin."""
+    value = np.atleast_1d(np.asarray(position, dtype=np.float64))
     if joint.type in ("revolute", "continuous"):
-        quat = np.concatenate(([math.cos(position / 2.0)], math.sin(position / 2.0) * axis))
-        return Pose3(np.zeros(3), quat)
+        return Pose3(np.zeros(3), _turn(np.array(joint.axis), float(value[0])))
     if joint.type == "prismatic":
-        return Pose3(position * axis, np.array([1.0, 0.0, 0.0, 0.0]))
+        return Pose3(value[0] * np.array(joint.axis), np.array([1.0, 0.0, 0.0, 0.0]))
+    if joint.type == "planar":
+        along, across, normal = planar_axes(joint)
+        return Pose3(value[0] * along + value[1] * across, _turn(normal, float(value[2])))
+    if joint.type == "floating":
+        return Pose3(value[:3], value[3:] / np.linalg.norm(value[3:]))
     return Pose3.from_xyz_rpy()
 
 
-def link_poses(
-    description: RobotDescription, positions: Mapping[str, float] | None = None
-) -> dict[str, Pose3]:
+def planar_axes(joint: Joint) -> tuple[Array, Array, Array]:
+    """Return x, y and normal of a planar joint's plane: unit vectors in the joint frame, shape (3,) each.
+
+    The normal is the joint's axis (URDF); x and y are those of the joint frame, turned as little as takes z
+    to the normal.
+    """
+    normal = np.array(joint.axis)
+    if normal[2] < -1.0 + 1e-12:
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0]), normal
+    # A half turn about z, then one about the direction halfway between z and the normal.
+    halfway = normal + np.array([0.0, 0.0, 1.0])
+    turn = 2.0 * np.outer(halfway, halfway) / (halfway @ halfway) - np.eye(3)
+    return -turn[:, 0], -turn[:, 1], normal
+
+
+def link_poses(description: RobotDescription, positions: Positions | None = None) -> dict[str, Pose3]:
     """Return `T_root_link` of every link, the root first.
 
     Args:
         description: The robot.
-        positions: Joint positions by name [rad or m]; left out ones are at zero, followers follow.
+        positions: Of joints; left out ones are at zero, followers follow.
     """
     every = joint_positions(description, positions or {})
     poses = {description.root: Pose3.from_xyz_rpy()}
@@ -65,3 +94,7 @@ def rigid_groups(description: RobotDescription) -> dict[str, str]:
             head[joint.child] = head[link] if joint.type == "fixed" else joint.child
             pending.append(joint.child)
     return head
+
+
+def _turn(axis: Array, angle: float) -> Array:
+    return np.concatenate(([math.cos(angle / 2.0)], math.sin(angle / 2.0) * axis))

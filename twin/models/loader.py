@@ -13,13 +13,17 @@ from twin.models.document import Element, Report, parse
 from twin.models.expand import expand, known_packages
 from twin.models.gazebo import read_commands, read_drive, read_surfaces
 from twin.models.joints import check_tree, read_joint, unique
+from twin.models.kinematics import rigid_groups
 from twin.models.links import LinkContext, read_link, read_materials
+from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
 from twin.models.sensors import read_sensors
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 """1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
 XACRO = "http://www.ros.org/wiki/xacro"
+WORLD = "world"
+"""A root link of this name is bolted down."""
 NO_PACKAGES: Mapping[str, Path] = MappingProxyType({})
 
 
@@ -72,7 +76,9 @@ def parse_urdf(
     surfaces = read_surfaces(root, report)
     links = _read_links(root, surfaces, packages, report, options)
     joints, elements = _read_joints(root, report)
+    known = len(report.problems)
     root_link = check_tree(links, joints, elements, report)
+    is_tree = len(report.problems) == known
     description = RobotDescription(
         name=report.required(root, "name"),
         source=source,
@@ -84,6 +90,8 @@ def parse_urdf(
         commands=read_commands(root, joints, report),
         sensors=read_sensors(root, links, report),
     )
+    if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
+        _refuse_impossible(description, root, report)
     _sort(report)
     report.raise_if_any()
     return description
@@ -123,6 +131,18 @@ def _read_joints(root: Element, report: Report) -> tuple[dict[str, Joint], dict[
     for element, joint in items:
         elements.setdefault(joint.name, element)
     return {name: joint for name, joint in joints.items() if isinstance(joint, Joint)}, elements
+
+
+def _refuse_impossible(description: RobotDescription, root: Element, report: Report) -> None:
+    """Note rigid bodies with an impossible inertia, unless they never move or only rounding makes them so."""
+    settlement = description.settlement
+    elements = {element.get("name"): element for element in root.findall("link/inertial/..")}
+    for head, repair in settlement.repaired.items():
+        if repair.fault and head != WORLD:
+            message, nearest = describe_repair(head, repair, settlement.bodies[head])
+            element = elements.get(head, elements.get(repair.parts[0] if repair.parts else head))
+            inertia = None if element is None else element.find("inertial/inertia")
+            report.add(inertia, f"{message}; {nearest}: give --repair to take it", code="impossible-inertia")
 
 
 def _sort(report: Report) -> None:

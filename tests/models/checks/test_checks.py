@@ -78,6 +78,11 @@ RAISED = CUBE.replace("<collision>", "<collision><origin xyz='0 0 0.05'/>")
 RED = "<visual><geometry><sphere radius='0.1'/></geometry><material name='red'>{}</material></visual>"
 COLOR = "<color rgba='1 0 0 1'/>"
 
+TRINKET = (
+    "<link name='eye'><inertial><mass value='0.1'/><inertia ixx='1e-4' iyy='1e-4' izz='1e-3'/></inertial></link>"
+    "<joint name='f' type='fixed'><parent link='tip'/><child link='eye'/></joint></robot>"
+)
+
 FOUND = {
     "wheel-axis": (cart(left=TUMBLING), 3, "90.0 degrees off the axis of joint 'left_joint'"),
     "wheel-fixed": (cart(left_joint=FIXED_WHEEL).replace("'left'", "'wheel'"), 4, "to 'base' at 0 0.15 0 m"),
@@ -87,6 +92,8 @@ FOUND = {
     "visual-collision": (arm(AXIS + LIMIT, RAISED), 4, "0.05 m apart"),
     "inertia-too-large": (cart(left=wheel("left", "0", inertial=HEAVY)[0]), 3, "0.812 m from the axis"),
     "inertia-too-small": (cart(left=wheel("left", "0", inertial=LIGHT)[0]), 3, "0.01 times"),
+    "lumped-inertia": (arm(AXIS + LIMIT).replace("</robot>", TRINKET), 5, "0.0001, 0.0001, 0.001 kg m²"),
+    "repaired-inertia": (arm(AXIS + LIMIT, CUBE.replace("izz='0.001'", "izz='0.0020005'")), 4, "by rounding"),
     "inertia-placeholder": (cart(left=wheel("left", "0", inertial=ALIKE)[0]), 3, "0.80 to 1.52 times"),
     "massless": (arm(AXIS + LIMIT, ""), 4, "weighs nothing"),
     "massless-base": (arm(AXIS + LIMIT).replace(f"'base'>{CUBE}", "'base'>"), 2, "'base' weighs nothing"),

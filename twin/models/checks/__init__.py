@@ -10,7 +10,7 @@ from twin.models.checks.codes import ERRORS, WARNINGS
 from twin.models.checks.diagnostic import Diagnostic, from_problems, in_file_order
 from twin.models.checks.ground import ground
 from twin.models.checks.ignored import ignored
-from twin.models.checks.inertia import inertia
+from twin.models.checks.inertia import impossible_inertia, inertia
 from twin.models.checks.limits import limits
 from twin.models.checks.masses import masses
 from twin.models.checks.materials import material_elsewhere
@@ -28,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     wheel_axis,
     wheel_fixed,
     ground,
+    impossible_inertia,
     inertia,
     visual_collision,
     limits,

@@ -63,6 +63,8 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "visual-collision": "what is seen and what is touched are in different places",
         "inertia-too-large": "no mass distribution inside the link's shapes has this inertia",
         "inertia-too-small": "less than a tenth of what the shapes would give: simulations get unstable",
+        "lumped-inertia": "no body has this inertia; it counts as part of the link to which it is fixed",
+        "repaired-inertia": "no body has this inertia; the nearest possible one is taken",
         "inertia-placeholder": "the same moment about every axis, for a shape that is not alike",
         "massless-base": "the base has no mass and can only stand fixed",
         "no-collision": "parts that can be seen but not touched",

@@ -9,6 +9,7 @@ import numpy as np
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import Inertial, Link, RobotDescription
+from twin.models.mass_properties import LEAST, describe_repair, inertia_as_urdf, inertia_fault
 from twin.models.solids import homogeneous_inertia, only_primitives
 
 ATTAINABLE = 3.0
@@ -18,10 +19,39 @@ ALIKE = 1.2
 """Up to this ratio of its moments, a shape counts as the same about every axis."""
 
 
+def impossible_inertia(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield inertias that no body has: of links lumped into another one, and of bodies to be repaired."""
+    settlement = description.settlement
+    for name, head in settlement.lumped.items():
+        inertial = description.links[name].inertial
+        fault = None if inertial is None else inertia_fault(inertial.inertia)
+        if inertial is not None and fault is not None and name not in settlement.repaired:
+            yield finding(
+                description,
+                "lumped-inertia",
+                f"link '{name}'",
+                inertial.line,
+                message=f"no body has this inertia: {fault}; it counts as part of '{head}'",
+                fix="take it from CAD, or give it that of its shape",
+            )
+    for head, repair in settlement.repaired.items():
+        inertials = [description.links[name].inertial for name in (head, *repair.parts)]
+        line = next(inertial.line for inertial in inertials if inertial is not None)
+        message, nearest = describe_repair(head, repair, settlement.bodies[head])
+        yield finding(
+            description,
+            "repaired-inertia",
+            f"link '{head}'",
+            line,
+            message=message,
+            fix=f"{nearest}, and is taken",
+        )
+
+
 def inertia(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield inertias that do not fit the link's shapes; links with meshes are left alone."""
     for link in description.links.values():
-        if link.inertial is None:
+        if link.inertial is None or inertia_fault(link.inertial.inertia) or link.inertial.mass <= LEAST:
             continue
         expected = [
             homogeneous_inertia(shapes, link.inertial.mass, link.inertial.T_link_com.xyz)
@@ -68,7 +98,7 @@ def _compare(
         f"link '{link.name}'",
         inertial.line,
         message=message,
-        fix=f"a homogeneous body has {_as_urdf(R.T @ nearest @ R)}",
+        fix=f"a homogeneous body has {inertia_as_urdf(R.T @ nearest @ R)}",
     )
 
 
@@ -83,10 +113,3 @@ def _is_placeholder(actual: Array, expected: Array) -> bool:
     isotropic = np.allclose(actual, actual[0, 0] * np.eye(3), rtol=0.0, atol=1e-6 * actual[0, 0])
     moments = np.linalg.eigvalsh(expected)
     return bool(isotropic and moments[2] > ALIKE * moments[0])
-
-
-def _as_urdf(matrix: Array) -> str:
-    named = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    small = 1e-9 * float(np.max(np.abs(matrix)))
-    values = {name: 0.0 if abs(matrix[place]) < small else matrix[place] for name, place in named.items()}
-    return "<inertia " + " ".join(f"{name}='{value:.4g}'" for name, value in values.items()) + "/>"

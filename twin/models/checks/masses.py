@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import RobotDescription
 from twin.models.kinematics import rigid_groups
+from twin.models.mass_properties import LEAST
 
 WORLD = "world"
 
@@ -19,7 +20,7 @@ def masses(description: RobotDescription) -> Iterator[Diagnostic]:
         fixed = ", ".join(link.name for link in links if link.name != head)
         others = f" (nor do the links fixed to it: {fixed})" if fixed else ""
         line = description.links[head].line
-        if not any(link.inertial for link in links) and head != WORLD:
+        if not any(link.inertial and link.inertial.mass > LEAST for link in links) and head != WORLD:
             moving = head != description.root
             yield finding(
                 description,
