@@ -7,6 +7,7 @@ import numpy as np
 
 from twin.convert.conversion import LedgerEntry
 from twin.models.description import CommandSpec, DriveSpec, Joint, RobotDescription
+from twin.models.kinematics import ONE_DIMENSIONAL
 
 WHEEL_KV = 5.0
 """Least gain of a wheel's velocity servo [Nm s/rad]."""
@@ -34,7 +35,7 @@ def add_actuators(
             entries.append(_add_commanded(spec, description, command, model))
     for joint in description.joints.values():
         if joint.mimic is not None:
-            _add_follower(spec, joint, timestep)
+            _add_follower(spec, joint, description.joints[joint.mimic.joint], timestep)
     return entries
 
 
@@ -115,14 +116,14 @@ def _limit_force(actuator: mujoco.MjsActuator, effort: float | None) -> None:
         actuator.forcerange = [-effort, effort]
 
 
-def _add_follower(spec: mujoco.MjSpec, joint: Joint, timestep: float) -> None:
+def _add_follower(spec: mujoco.MjSpec, joint: Joint, leader: Joint, timestep: float) -> None:
     assert joint.mimic is not None
     equality = spec.add_equality(
         name=f"{joint.name}_mimic",
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=joint.name,
-        name2=joint.mimic.joint,
+        name2=leader.name if leader.type in ONE_DIMENSIONAL else "",  # none: it is held at its offset
         solref=[max(0.004, 2.0 * timestep), 1.0],
         solimp=FOLLOWER_SOLIMP,
     )

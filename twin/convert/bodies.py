@@ -34,7 +34,7 @@ def add_bodies(
     Raises:
         ConversionError: A moving part has no mass.
     """
-    _check_masses(description, base)
+    _refuse_massless(description, base)
     masses = description.settlement.bodies
 
     def add_link(parent: mujoco.MjsBody, name: str, T_parent_link: Pose3) -> mujoco.MjsBody:
@@ -108,23 +108,21 @@ def _add_planar(body: mujoco.MjsBody, joint: Joint) -> None:
     body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
 
 
-def _check_masses(description: RobotDescription, base: Base) -> None:
+def _refuse_massless(description: RobotDescription, base: Base) -> None:
     heads = rigid_groups(description)
-    mass = dict.fromkeys(heads.values(), 0.0)
-    for name, link in description.links.items():
-        mass[heads[name]] += 0.0 if link.inertial is None else link.inertial.mass
+    heavy = {heads[name] for name in description.settlement.bodies}
     still = description.root if base != "free" else None
     problems = [
         Problem(
-            f"link '{name}' moves and has no mass, nor has anything fixed to it; give it an <inertial>"
-            + (", or fix the base" if name == description.root else ""),
+            f"link '{head}' moves and has no mass, nor has anything fixed to it; give it an <inertial>"
+            + (", or fix the base" if head == description.root else ""),
             description.source,
-            description.links[name].line or None,
+            description.links[head].line or None,
             code="massless",
-            element=f"link '{name}'",
+            element=f"link '{head}'",
         )
-        for name, total in mass.items()
-        if total <= 0.0 and name != still
+        for head in dict.fromkeys(heads.values())
+        if head not in heavy and head != still
     ]
     if problems:
         raise ConversionError(problems)

@@ -13,6 +13,7 @@ from twin.convert.conversion import Conversion, LedgerEntry
 from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
 from twin.convert.roles import roles_of
+from twin.convert.stand_ins import refuse_singular
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 
@@ -51,6 +52,7 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
     )
     add_excludes(spec, description)
     model = _compile(spec, description)
+    refuse_singular(model, description)
     entries = add_actuators(spec, description, model, timestep=timestep)
     _compile(spec, description)
     return Conversion(

@@ -158,8 +158,12 @@ def _inertia(element: Element, description: RobotDescription) -> Fate:
         return "translated", f"no body has it; part of the inertia of '{settlement.lumped[link]}'"
     if link in settlement.repaired:
         repair = settlement.repaired[link]
-        note = f"nearest inertia that a body can have; {repair.change:.1e} of the largest moment away"
-        return ("guessed" if repair.fault else "translated"), note
+        if repair.fault is None:
+            return (
+                "translated",
+                "the nearest inertia that a body can have; it is that of a point or rounded",
+            )
+        return "guessed", f"the nearest inertia that a body can have, {repair.change:.1%} away"
     if description.links[link].inertial is None:
         return "kept", "no mass, no inertia: a mere frame"
     return FATES["link/inertial/inertia"]

@@ -282,6 +282,8 @@ class RobotDescription:
     commands: Mapping[str, CommandSpec] = field(default_factory=dict)
     """By joint."""
     sensors: tuple[SensorSpec, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+    """What was left out when the file was read."""
 
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""

@@ -30,11 +30,20 @@ class Report:
     with_lines: bool = True
     """False for text that xacro wrote: its lines are not the user's."""
     problems: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+    """What the robot can be used without."""
 
     def add(self, element: Element | None, message: str, *, code: str) -> None:
         """Note a problem of `element`; its `code` is one of `twin.models.checks.codes`."""
+        self.problems.append(self._problem(element, message, code))
+
+    def warn(self, element: Element | None, message: str, *, code: str) -> None:
+        """Note that a part of `element` is left out; the message ends in `; ` and how to mend it."""
+        self.warnings.append(self._problem(element, message, code))
+
+    def _problem(self, element: Element | None, message: str, code: str) -> Problem:
         line = self.line(element) or None
-        self.problems.append(Problem(message, self.source, line, code=code, element=place(element)))
+        return Problem(message, self.source, line, code=code, element=place(element))
 
     def line(self, element: Element | None) -> int:
         """Return the 1-based line of an element in the user's file, 0 where that is unknown."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import get_args
 
 from twin.errors import nearest
 from twin.models.description import Joint, JointType, Limit, Link, Mimic
 from twin.models.document import Element, Report, describe
+from twin.models.kinematics import ONE_DIMENSIONAL
 from twin.models.links import read_origin
 
 JOINT_TYPES: tuple[str, ...] = get_args(JointType)
@@ -194,17 +196,38 @@ def _cycle(link: str, parent_joint: Mapping[str, Joint]) -> str:
     return " -> ".join(reversed(path))
 
 
+def without_idle_mimics(
+    joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report
+) -> dict[str, Joint]:
+    """Return the joints without those `<mimic>` that cannot have an effect, which are noted as warnings."""
+    return {
+        name: _without_idle_mimic(joint, joints, elements[name], report) for name, joint in joints.items()
+    }
+
+
+def _without_idle_mimic(joint: Joint, joints: Mapping[str, Joint], element: Element, report: Report) -> Joint:
+    if joint.mimic is None or not joint.mimic.joint:
+        return joint
+    if joint.type not in ONE_DIMENSIONAL:
+        why = f"joint '{joint.name}' is {joint.type} and cannot mimic another; remove <mimic>"
+    elif joint.mimic.joint not in joints:
+        missing = (
+            f"joint '{joint.name}' mimics '{joint.mimic.joint}', which does not exist, and moves on its own"
+        )
+        why = f"{missing}; {nearest(joint.mimic.joint, joints)}"
+    else:
+        return joint
+    report.warn(element.find("mimic"), why, code="idle-mimic")
+    return replace(joint, mimic=None)
+
+
 def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report) -> None:
     for joint in joints.values():
         seen = [joint.name]
         leader = joint.mimic
         while leader is not None:
             if leader.joint not in joints:
-                missing = f"joint '{joint.name}' mimics '{leader.joint}', which does not exist"
-                report.add(
-                    elements[joint.name], f"{missing}; {nearest(leader.joint, joints)}", code="unknown-leader"
-                )
-                break
+                break  # has no name, which was noted
             if leader.joint in seen:
                 loop = " -> ".join([*seen, leader.joint])
                 report.add(

@@ -12,7 +12,7 @@ from twin.models.description import Joint, Link, RobotDescription, Surface
 from twin.models.document import Element, Report, parse
 from twin.models.expand import expand, known_packages
 from twin.models.gazebo import read_commands, read_drive, read_surfaces
-from twin.models.joints import check_tree, read_joint, unique
+from twin.models.joints import check_tree, read_joint, unique, without_idle_mimics
 from twin.models.kinematics import rigid_groups
 from twin.models.links import LinkContext, read_link, read_materials
 from twin.models.mass_properties import describe_repair
@@ -76,6 +76,7 @@ def parse_urdf(
     surfaces = read_surfaces(root, report)
     links = _read_links(root, surfaces, packages, report, options)
     joints, elements = _read_joints(root, report)
+    joints = without_idle_mimics(joints, elements, report)
     known = len(report.problems)
     root_link = check_tree(links, joints, elements, report)
     is_tree = len(report.problems) == known
@@ -89,6 +90,7 @@ def parse_urdf(
         drive=read_drive(root, joints, report),
         commands=read_commands(root, joints, report),
         sensors=read_sensors(root, links, report),
+        warnings=tuple(dict.fromkeys(report.warnings)),
     )
     if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
         _refuse_impossible(description, root, report)

@@ -22,8 +22,10 @@ LEAST = 1e-15
 """MuJoCo takes a mass or moment up to this for zero [kg, kg m²]."""
 ROUNDING = 1e-3
 """Slack of A + B >= C, relative to C: files print inertias with few digits."""
-LEAST_GYRATION = 1e-4
-"""Radius of gyration that a repaired body has at least [m]; without any it could not be integrated."""
+LEAST_GYRATION = 1e-5
+"""Radius of gyration that a repaired body has at least [m]: a mere point cannot be integrated."""
+STAND_IN = 1e-14
+"""Mass and moments of massless links that carry others by joints [kg, kg m²]; MuJoCo needs some."""
 _MOMENTS = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]])
 """Principal moments of second moments of mass: A = b + c, and so on."""
 
@@ -45,7 +47,7 @@ class Repair:
     """What the nearest possible inertia stands in for."""
 
     fault: str | None
-    """Why no body has the inertia that the file gives; None if that is an error of rounding."""
+    """Why no body has the inertia that the file gives; None for points, thin rods and errors of rounding."""
     change: float
     """Largest difference of the two matrices, relative to the largest moment."""
     parts: tuple[str, ...]
@@ -62,6 +64,8 @@ class Settlement:
     """Links whose mass properties went to another one, and to which."""
     repaired: Mapping[str, Repair]
     """Links with the nearest possible inertia."""
+    stand_ins: frozenset[str]
+    """Links without mass that move and carry others by joints; a mass of `STAND_IN` makes no difference."""
 
 
 def mass_properties_of(inertial: Inertial) -> MassProperties:
@@ -70,18 +74,17 @@ def mass_properties_of(inertial: Inertial) -> MassProperties:
     return MassProperties(mass=inertial.mass, com=inertial.T_link_com.xyz, inertia=R @ inertial.inertia @ R.T)
 
 
-def inertia_fault(inertia: Array, slack: float = 0.0) -> str | None:
+def inertia_fault(inertia: Array, mass: float = 0.0) -> str | None:
     """Return why no rigid body has this inertia, shape (3, 3) [kg m²], or None if one can.
 
-    `slack`: by how much of the largest moment it may exceed the sum of the others.
+    With a `mass` [kg], errors of rounding pass, and so do points and rods without thickness.
     """
     moments = np.linalg.eigvalsh(inertia)
     shown = ", ".join(f"{value:.4g}" for value in moments)
-    if moments[0] <= 0.0:
+    slack = 0.0 if mass == 0.0 else max(ROUNDING * moments[2], mass * LEAST_GYRATION**2)
+    if moments[0] < -slack or (slack == 0.0 and moments[0] <= LEAST):
         return f"its principal moments {shown} kg m² are not all positive"
-    if moments[0] <= LEAST:
-        return f"its least principal moment {moments[0]:.4g} kg m² is taken for zero"
-    if moments[0] + moments[1] < moments[2] * (1.0 - slack):
+    if moments[0] + moments[1] < moments[2] - slack:
         return f"of its principal moments {shown} kg m² the largest exceeds the sum of the others"
     return None
 
@@ -127,18 +130,37 @@ def settle(description: RobotDescription) -> Settlement:
         bodies[head] = nearest_possible(whole) if _is_impossible(whole) else whole
         if bodies[head] is not whole:
             repaired[head] = Repair(
-                fault=inertia_fault(whole.inertia, ROUNDING),
+                fault=inertia_fault(whole.inertia, whole.mass),
                 change=_change(whole.inertia, bodies[head].inertia),
                 parts=tuple(name for name in parts if name != head),
             )
-    return Settlement(bodies=bodies, lumped=lumped, repaired=repaired)
+    stand_ins = _carriers(description, bodies)
+    trifle = MassProperties(mass=STAND_IN, com=np.zeros(3), inertia=STAND_IN * np.eye(3))
+    bodies |= dict.fromkeys(stand_ins, trifle)
+    return Settlement(bodies=bodies, lumped=lumped, repaired=repaired, stand_ins=frozenset(stand_ins))
+
+
+def _carriers(description: RobotDescription, bodies: Mapping[str, MassProperties]) -> list[str]:
+    """Return the heads of moving rigid bodies without mass that have mass further out."""
+    heads = rigid_groups(description)
+    below = {joint.child: joint.parent for joint in description.joints.values()}
+    heavy = {heads[name] for name in bodies}
+    carrying: set[str] = set()
+    for name in bodies:
+        link = heads[name]
+        while link in below and heads[below[link]] not in carrying:
+            link = heads[below[link]]
+            carrying.add(link)
+    return [name for name in description.links if name in carrying - heavy - {description.root}]
 
 
 def describe_repair(head: str, repair: Repair, body: MassProperties) -> tuple[str, str]:
     """Return what is wrong with the rigid body that starts at link `head`, and the nearest possible."""
     among = f", with {', '.join(repair.parts)} fixed to it," if repair.parts else ""
-    fault = repair.fault or "its largest principal moment exceeds the sum of the others, by rounding"
-    nearest = f"the nearest possible is {inertia_as_urdf(body.inertia)}, {repair.change:.1%} away"
+    fault = repair.fault or "it is that of a point or a line, or rounded"
+    nearest = f"the nearest possible is {inertia_as_urdf(body.inertia)}"
+    if repair.fault:
+        nearest += f", {repair.change:.1%} away"
     return f"link '{head}'{among} has an impossible inertia: {fault}", nearest
 
 

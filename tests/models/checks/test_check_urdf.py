@@ -111,7 +111,6 @@ ONLY_TWIN_REFUSES = {
         link_c(f"<inertial><mass value='1'/>{INERTIA.replace('1', '9', 1)}</inertial>"),
         "impossible-inertia",
     ),
-    "unknown leader": (robot(joint("<mimic joint='q'/>", "continuous")), "unknown-leader"),
     "zero axis": (robot(joint("<axis xyz='0 0 0'/>", "continuous")), "zero-axis"),
     "no inertia": (link_c("<inertial><mass value='1'/></inertial>"), "bad-inertial"),
     "unknown geometry": (link_c("<visual><geometry><cone/></geometry></visual>"), "bad-geometry"),

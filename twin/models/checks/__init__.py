@@ -43,4 +43,5 @@ CHECKS: tuple[Check, ...] = (
 
 def check(description: RobotDescription) -> tuple[Diagnostic, ...]:
     """Return what all checks find, in file order."""
-    return in_file_order(diagnostic for run in CHECKS for diagnostic in run(description))
+    left_out = from_problems(description.warnings, description.source)
+    return in_file_order((*left_out, *(found for run in CHECKS for found in run(description))))

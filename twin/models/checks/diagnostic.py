@@ -52,10 +52,10 @@ def from_problems(problems: Iterable[Problem], source: Path) -> tuple[Diagnostic
 def _from_problem(problem: Problem, source: Path) -> Diagnostic:
     # Messages have the form "what is wrong; what would be valid".
     message, _, valid = problem.message.partition("; ")
-    mend = ERRORS[problem.code]
+    mend = ERRORS.get(problem.code, valid)
     return Diagnostic(
         code=problem.code,
-        severity="error",
+        severity=severity_of(problem.code),
         element=problem.element or "robot",
         file=problem.file or source,
         line=problem.line,

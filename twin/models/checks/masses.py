@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import RobotDescription
 from twin.models.kinematics import rigid_groups
-from twin.models.mass_properties import LEAST
 
 WORLD = "world"
 
@@ -15,12 +14,13 @@ WORLD = "world"
 def masses(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield rigid parts (links on fixed joints) without mass, and visible ones without collision shape."""
     heads = rigid_groups(description)
+    heavy = description.settlement.bodies
     for head in dict.fromkeys(heads.values()):
         links = [description.links[name] for name in heads if heads[name] == head]
         fixed = ", ".join(link.name for link in links if link.name != head)
         others = f" (nor do the links fixed to it: {fixed})" if fixed else ""
         line = description.links[head].line
-        if not any(link.inertial and link.inertial.mass > LEAST for link in links) and head != WORLD:
+        if not any(link.name in heavy for link in links) and head != WORLD:
             moving = head != description.root
             yield finding(
                 description,

@@ -1,0 +1,49 @@
+"""The 69 robots of example-robot-data held to pinocchio; `make oracle` writes the table of docs/fidelity.md."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.oracles.pinocchio_oracle import Errors, compare
+from twin.convert import Base, convert
+from twin.errors import TwinError
+from twin.models import ReadOptions, load
+from twin.models.description import RobotDescription
+
+PAGE = Path(__file__).parents[2] / "docs" / "fidelity.md"
+BEGIN, END = "<!-- robots: begin -->\n", "<!-- robots: end -->\n"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of one file."""
+
+    file: Path
+    description: RobotDescription | None = None
+    errors: Errors | None = None
+    """None if it was refused."""
+    refusal: str = ""
+
+
+def example_robots() -> list[Path]:
+    """Return the files, in order of their path; none if example-robot-data is not installed."""
+    try:
+        files = importlib.metadata.files("example-robot-data") or []
+    except importlib.metadata.PackageNotFoundError:
+        return []
+    return sorted(Path(str(file.locate())) for file in files if file.suffix == ".urdf")
+
+
+def outcomes(base: Base) -> Iterator[Outcome]:
+    """Convert and compare them one by one."""
+    for file in example_robots():
+        try:
+            description = load(file, ReadOptions(missing_mesh="skip"))
+            model = convert(description, base=base).spec.compile()
+        except TwinError as fault:
+            yield Outcome(file=file, refusal=fault.problems[0].message)
+            continue
+        yield Outcome(file=file, description=description, errors=compare(model, description))
