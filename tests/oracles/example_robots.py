@@ -1,4 +1,4 @@
-"""The 69 robots of example-robot-data held to pinocchio; `make oracle` writes the table of docs/fidelity.md."""
+"""The robots of example-robot-data held to pinocchio; `make oracle` writes them to docs/fidelity.md."""
 
 from __future__ import annotations
 

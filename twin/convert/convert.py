@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import mujoco
@@ -66,7 +67,10 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
 
 def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
     try:
-        return spec.copy().compile()
+        with warnings.catch_warnings():
+            # A singular mass matrix is found, and named, by refuse_singular.
+            warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")
+            return spec.copy().compile()
     except ValueError as error:
         message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
         raise ConversionError(Problem(message, description.source, code="mujoco", element="robot")) from error

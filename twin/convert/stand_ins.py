@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from twin.errors import ConversionError, Problem
+from twin.geometry import Array
 from twin.models.description import RobotDescription
 
 SINGULAR = 1e-9
@@ -18,21 +19,33 @@ def refuse_singular(model: mujoco.MjModel, description: RobotDescription) -> Non
     Raises:
         ConversionError: Some motion of the joints moves no mass: any force accelerates it without end.
     """
-    stand_ins = description.settlement.stand_ins
-    if not stand_ins:
+    if not description.settlement.stand_ins:
         return
-    data = mujoco.MjData(model)
     rng = np.random.Generator(np.random.Philox(0))
-    data.qpos[:] = rng.uniform(-0.5, 0.5, size=model.nq)
+    for positions in (model.qpos0, rng.uniform(-0.5, 0.5, size=model.nq)):
+        least, motion = _least_motion(model, positions)
+        if least <= SINGULAR:
+            _refuse(model, description, motion)
+
+
+def _least_motion(model: mujoco.MjModel, positions: Array) -> tuple[float, Array]:
+    """Return the least eigenvalue of the scaled mass matrix and its joint motion, shape (nv,)."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = positions
     mujoco.mj_normalizeQuat(model, data.qpos)
-    mujoco.mj_forward(model, data)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_crb(model, data)
     matrix = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    least, motions = np.linalg.eigh(matrix * np.outer(scale, scale))
-    if least[0] > SINGULAR:
-        return
-    moving = np.abs(motions[:, 0]) > 0.1
+    values, motions = np.linalg.eigh(matrix * np.outer(scale, scale))
+    return float(values[0]), motions[:, 0]
+
+
+def _refuse(model: mujoco.MjModel, description: RobotDescription, motion: Array) -> None:
+    stand_ins = description.settlement.stand_ins
+    moving = np.abs(motion) > 0.1
     bodies = {model.body(model.dof_bodyid[dof]).name for dof in np.flatnonzero(moving)}
     joints = [joint.name for joint in description.joints.values() if joint.child in bodies]
     links = sorted(stand_ins & bodies) or sorted(stand_ins)
