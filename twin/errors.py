@@ -20,6 +20,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+class SourceLine(int):
+    """A 1-based line together with the file it is in, which need not be the one that was asked for."""
+
+    file: Path
+
+    def __new__(cls, line: int, file: Path) -> SourceLine:
+        """Return line `line` of `file`."""
+        self = super().__new__(cls, line)
+        self.file = file
+        return self
+
+    def __getnewargs__(self) -> tuple[int, Path]:  # type: ignore[override]
+        return int(self), self.file
+
+
 @dataclass(frozen=True)
 class Problem:
     """One fault in an input file."""
@@ -28,11 +43,16 @@ class Problem:
     """One sentence: what is wrong and what would be valid."""
     file: Path | None = None
     line: int | None = None
-    """1-based line in `file`."""
+    """1-based line in `file`; a `SourceLine` brings its own file."""
     code: str = ""
     """Stable name of this kind of fault, such as `two-parents`; only robot files have them."""
     element: str = ""
     """What it is about, such as `joint 'lift_joint'`."""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.line, SourceLine):
+            object.__setattr__(self, "file", self.line.file)
+            object.__setattr__(self, "line", int(self.line))
 
     def __str__(self) -> str:
         if self.file is None:

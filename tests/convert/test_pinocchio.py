@@ -15,7 +15,8 @@ from twin.errors import ConversionError
 from twin.models.loader import parse_urdf
 
 pytest.importorskip("pinocchio", reason="pinocchio is not installed (pip install pin)")
-from tests.oracles.example_robots import example_robots, outcomes
+from tests.oracles.example_robots import outcomes
+from tests.oracles.installed import example_robots
 from tests.oracles.pinocchio_oracle import compare
 
 TOLERANCE = 1e-5

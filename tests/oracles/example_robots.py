@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.oracles.installed import example_robots
 from tests.oracles.pinocchio_oracle import Errors, compare
 from twin.convert import Base, convert
 from twin.errors import TwinError
@@ -26,15 +26,6 @@ class Outcome:
     errors: Errors | None = None
     """None if it was refused."""
     refusal: str = ""
-
-
-def example_robots() -> list[Path]:
-    """Return the files, in order of their path; none if example-robot-data is not installed."""
-    try:
-        files = importlib.metadata.files("example-robot-data") or []
-    except importlib.metadata.PackageNotFoundError:
-        return []
-    return sorted(Path(str(file.locate())) for file in files if file.suffix == ".urdf")
 
 
 def outcomes(base: Base) -> Iterator[Outcome]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from twin.errors import ModelError, Problem, nearest
 from twin.geometry import Array, Pose3
+from twin.models.line_table import LineTable
 
 if TYPE_CHECKING:
     from twin.models.kinematics import Positions
@@ -284,6 +285,8 @@ class RobotDescription:
     sensors: tuple[SensorSpec, ...] = ()
     warnings: tuple[Problem, ...] = ()
     """What was left out when the file was read."""
+    lines: LineTable | None = field(default=None, repr=False)
+    """Where the elements of `urdf` come from, if it is not the text of `source`."""
 
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""

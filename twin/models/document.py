@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 from lxml import etree
 
 from twin.errors import ModelError, Problem
+from twin.models.line_table import LineTable
+from twin.models.xml_text import scan
 
 Element = Any
 """An lxml element; the library ships no types."""
 
 LARGEST = 1e10
 """MuJoCo takes no larger number [SI]; only limits may be larger, as some write them for none at all."""
-MAX_BYTES = 32 * 1024 * 1024
 PLACES = ("link", "joint", "gazebo", "sensor")
 """Elements that a user knows by name."""
 
@@ -27,11 +28,12 @@ class Report:
     """The problems of one file, in the order they were found."""
 
     source: Path
-    with_lines: bool = True
-    """False for text that xacro wrote: its lines are not the user's."""
+    table: LineTable | None = None
+    """Of a text that xacro wrote; otherwise the text's lines are those of `source`."""
     problems: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
     """What the robot can be used without."""
+    _lines: dict[Element, int] = field(default_factory=dict, repr=False)
 
     def add(self, element: Element | None, message: str, *, code: str) -> None:
         """Note a problem of `element`; its `code` is one of `twin.models.checks.codes`."""
@@ -46,10 +48,18 @@ class Report:
         return Problem(message, self.source, line, code=code, element=place(element))
 
     def line(self, element: Element | None) -> int:
-        """Return the 1-based line of an element in the user's file, 0 where that is unknown."""
-        if element is None or not self.with_lines:
-            return 0
-        return int(element.sourceline or 0)
+        """Return the 1-based line of an element in the user's file, 0 where that is unknown.
+
+        After xacro it is a `SourceLine`, as an element may come from an included file.
+        """
+        return 0 if element is None else self._lines.get(element, 0)
+
+    def locate(self, root: Element, lines: Sequence[int]) -> None:
+        """Take the lines of all elements of a text, given in the order of start tags."""
+        known = lines if self.table is None else self.table.lines()
+        elements = list(root.iter())
+        # A name with markup in it, of <xacro:element>, makes other elements than xacro had.
+        self._lines = dict(zip(elements, known, strict=True)) if len(elements) == len(known) else {}
 
     def raise_if_any(self) -> None:
         """Raise ModelError with all problems found so far."""
@@ -133,26 +143,29 @@ class Report:
 
 
 def parse(text: bytes, report: Report) -> Element:
-    """Return the root element of a URDF text.
+    """Return the root element of a URDF text in UTF-8; the report then knows the lines of its elements.
 
     Raises:
-        ModelError: Not well-formed, too large, or with a DOCTYPE (entities can read files and exhaust memory,
-            and no robot needs them).
+        ModelError: Not well-formed, too large, too deep, or with a DOCTYPE.
     """
-    if len(text) > MAX_BYTES:
-        report.add(None, f"the file has {len(text)} bytes; at most {MAX_BYTES} are read", code="too-large")
-        report.raise_if_any()
-    _refuse_doctype(text, report)
+    lines = scan(text, report.source, has_lines=report.table is None)
     parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+        encoding="utf-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=True,
+        remove_pis=True,
     )
     try:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
-        line = error.lineno if report.with_lines else None
+        line = error.lineno if report.table is None else None
         raise ModelError(
             Problem(f"not well-formed XML: {error.msg}", report.source, line, code="bad-xml")
         ) from None
+    _drop_default_namespace(root)
+    report.locate(root, lines)
     if root.tag != "robot":
         report.add(
             root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>", code="not-urdf"
@@ -205,27 +218,11 @@ def _of_owner(element: Element) -> str:
     return ""
 
 
-def _refuse_doctype(text: bytes, report: Report) -> None:
-    # expat, not lxml: libxml2 expands internal entities inside attributes even with resolve_entities=False.
-    parser = expat.ParserCreate()
-
-    def refuse(*_: object) -> None:
-        line = parser.CurrentLineNumber if report.with_lines else None
-        raise ModelError(
-            Problem(
-                "the file has a DOCTYPE; remove it, a robot needs none", report.source, line, code="doctype"
-            )
-        )
-
-    parser.StartDoctypeDeclHandler = refuse
-    try:
-        parser.Parse(text, True)
-    except expat.ExpatError as error:
-        line = error.lineno if report.with_lines else None
-        message = expat.ErrorString(error.code)
-        raise ModelError(
-            Problem(f"not well-formed XML: {message}", report.source, line, code="bad-xml")
-        ) from None
+def _drop_default_namespace(root: Element) -> None:
+    # URDF has none; ROS's own reader takes no notice of one.
+    for element in root.iter():
+        if element.prefix is None:
+            element.tag = etree.QName(element).localname
 
 
 def _count(count: int) -> str:

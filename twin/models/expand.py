@@ -3,106 +3,106 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from twin.errors import ModelError, Problem
-from twin.models.catalogue import ROBOTS
+from twin.models.line_table import LineTable
+from twin.models.options import DEFAULTS, ReadOptions
+from twin.models.packages import PackagePath
 
 TIME_LIMIT_S = 15.0
-WORKER = Path(__file__).with_name("xacro_worker.py")
+_ROOT = Path(__file__).parents[2]
+"""The folder with the package `twin` that is running, installed or not."""
+_START = "import sys; sys.path.insert(0, sys.argv[1]); from twin.models.xacro_worker import main; main()"
 
 
-def expand(
-    source: Path,
-    *,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    time_limit_s: float = TIME_LIMIT_S,
-) -> str:
+@dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """What became of a xacro file."""
+
+    urdf: str
+    """The text without xacro."""
+    lines: LineTable
+    """Where its elements were written."""
+
+
+def expand(source: Path, options: ReadOptions = DEFAULTS, *, time_limit_s: float = TIME_LIMIT_S) -> Expansion:
     """Return the URDF text of a xacro file.
 
     Args:
         source: The file.
-        args: Values of `<xacro:arg>`, as `name:=value` on a ROS command line.
-        packages: Folder of each ROS package that `$(find name)` may name.
+        options: Arguments, packages, and what the file may read.
         time_limit_s: Of the whole expansion [s, wall clock].
 
     Raises:
-        ModelError: xacro refuses the file, or it takes too long.
+        ModelError: xacro refuses the file, it tries what a model file may not do, or it takes too long.
     """
+    path = PackagePath.of(source, options)
     request = {
-        "file": str(source.resolve()),
-        "args": dict(args),
-        "packages": {name: str(path.resolve()) for name, path in packages.items()},
-        "roots": [str(root.resolve()) for root in (source.parent, *packages.values())],
+        "file": str(source.absolute()),
+        "args": dict(options.args),
+        "environment": {name: os.environ[name] for name in options.allow_env if name in os.environ},
+        "packages": {
+            "starts": list(map(str, path.starts)),
+            "given": {name: str(folder) for name, folder in path.given.items()},
+            "ament_prefixes": list(map(str, path.ament_prefixes)),
+            "search": list(map(str, path.search)),
+            "allowed": list(map(str, path.allowed)),
+        },
     }
     answer = _run_worker(request, source, time_limit_s)
     if "error" in answer:
-        file = Path(answer["files"][-1]) if answer["files"] else source
-        raise ModelError(
-            Problem(f"xacro: {answer['error']}", source if _same(file, source) else file, code="xacro")
-        )
-    return answer["urdf"]
+        file = source if answer["file"] is None else _as_given(answer["file"], source)
+        raise ModelError(Problem(f"xacro: {answer['error']}", file, answer["line"], code=answer["code"]))
+    files = tuple(_as_given(file, source) for file in answer["files"])
+    return Expansion(
+        urdf=answer["urdf"], lines=LineTable(files=files, places=tuple(map(tuple, answer["places"])))
+    )
 
 
 def _run_worker(request: Mapping[str, object], source: Path, time_limit_s: float) -> dict[str, Any]:
     # Isolated and with an empty environment: $(env ...) and PYTHON* variables do not reach into a model.
-    command = [sys.executable, "-I", "-X", "utf8", str(WORKER)]
-    try:
-        done = subprocess.run(
-            command,
-            input=json.dumps(request),
-            capture_output=True,
-            encoding="utf-8",
-            timeout=time_limit_s,
-            env={},
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise ModelError(
-            Problem(
-                f"xacro did not finish within {time_limit_s:g} s; look for endless recursion",
-                source,
-                code="xacro",
+    command = [sys.executable, "-I", "-X", "utf8", "-c", _START, str(_ROOT)]
+    with tempfile.TemporaryFile() as output:  # a file, as its size can be limited
+        try:
+            done = subprocess.run(
+                command,
+                input=json.dumps(request).encode(),
+                stdout=output,
+                stderr=subprocess.PIPE,
+                timeout=time_limit_s,
+                env={},
+                check=False,
             )
-        ) from None
-    if done.returncode != 0:
-        reason = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        raise ModelError(Problem(f"xacro failed: {reason[0]}", source, code="xacro"))
-    return json.loads(done.stdout)
+        except subprocess.TimeoutExpired:
+            raise ModelError(
+                Problem(
+                    f"xacro did not finish within {time_limit_s:g} s; look for what repeats without end",
+                    source,
+                    code="xacro",
+                )
+            ) from None
+        if done.returncode != 0:
+            last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+            reason = last or [f"exit code {done.returncode}; it may have taken too much time or memory"]
+            raise ModelError(Problem(f"xacro failed: {reason[0]}", source, code="xacro"))
+        output.seek(0)
+        answer: dict[str, Any] = json.load(output)
+        return answer
 
 
-def known_packages(source: Path, given: Mapping[str, Path]) -> dict[str, Path]:
-    """Return the ROS packages a model may name: its own (found by package.xml above it), twin's, the given.
-
-    Raises:
-        ModelError: A given folder does not exist.
-    """
-    missing = [name for name, path in given.items() if not path.is_dir()]
-    if missing:
-        raise ModelError(
-            Problem(f"package '{name}': no such folder {given[name]}", code="no-package") for name in missing
-        )
-    found = {"twin_robots": ROBOTS}
-    for folder in source.resolve().parents:
-        if (folder / "package.xml").is_file():
-            found[_package_name(folder)] = folder
-            break
-    return {**found, **given}
-
-
-def _package_name(folder: Path) -> str:
-    from lxml import etree
-
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, recover=True)
-    root = etree.parse(str(folder / "package.xml"), parser).getroot()
-    name = None if root is None else root.findtext("name")
-    return (name or folder.name).strip()
-
-
-def _same(a: Path, b: Path) -> bool:
-    return a.resolve() == b.resolve()
+def _as_given(file: str, source: Path) -> Path:
+    """Return a file's path as the user would write it: relative if the path of the robot file is."""
+    path = Path(os.path.normpath(file))
+    if path == source.absolute():
+        return source
+    if not source.is_absolute() and path.is_relative_to(Path.cwd()):
+        return path.relative_to(Path.cwd())
+    return path

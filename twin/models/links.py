@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +25,8 @@ from twin.models.description import (
 from twin.models.document import Element, Report, describe, owner
 from twin.models.mass_properties import LEAST
 from twin.models.options import ReadOptions
+from twin.models.packages import Packages
+from twin.models.resources import locate
 
 Rgba = tuple[float, float, float, float]
 
@@ -40,7 +41,7 @@ class LinkContext:
     """What the links of one file share."""
 
     report: Report
-    packages: Mapping[str, Path]
+    packages: Packages
     options: ReadOptions
     materials: Mapping[str, Rgba]
     surfaces: Mapping[str, Surface]
@@ -214,20 +215,8 @@ def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
     if not reference:
         return None
     x, y, z = report.numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
-    path = _mesh_path(reference, context)
-    if path is None or not path.is_file():
-        hint = (
-            "" if path is not None else f"; known packages: {', '.join(sorted(context.packages)) or 'none'}"
-        )
-        report.add(shape, f"mesh '{reference}' of {owner(shape)} does not exist{hint}", code="missing-mesh")
+    found = locate(reference, report.source, context.packages)
+    if found.path is None:
+        report.add(shape, f"mesh '{reference}' of {owner(shape)} {found.reason}", code=found.code)
         return None
-    return Mesh(path=path, scale=(x, y, z))
-
-
-def _mesh_path(reference: str, context: LinkContext) -> Path | None:
-    for scheme in ("package://", "model://"):
-        if reference.startswith(scheme):
-            package, _, inside = reference.removeprefix(scheme).partition("/")
-            folder = context.packages.get(package)
-            return None if folder is None else folder / inside
-    return context.report.source.parent / reference.removeprefix("file://")
+    return Mesh(path=found.path, scale=(x, y, z))

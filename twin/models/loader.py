@@ -4,27 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 from twin.errors import Problem
 from twin.models.catalogue import resolve
 from twin.models.description import Joint, Link, RobotDescription, Surface
 from twin.models.document import Element, Report, parse
-from twin.models.expand import expand, known_packages
+from twin.models.expand import expand
 from twin.models.gazebo import read_commands, read_drive, read_surfaces
 from twin.models.joints import check_tree, read_joint, unique, without_idle_mimics
 from twin.models.kinematics import rigid_groups
+from twin.models.line_table import LineTable
 from twin.models.links import LinkContext, read_link, read_materials
 from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
+from twin.models.packages import PackagePath, Packages
 from twin.models.sensors import read_sensors
+from twin.models.xml_text import as_utf8, read_utf8
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 """1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
 XACRO = "http://www.ros.org/wiki/xacro"
 WORLD = "world"
 """A root link of this name is bolted down."""
-NO_PACKAGES: Mapping[str, Path] = MappingProxyType({})
 
 
 def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDescription:
@@ -38,12 +39,11 @@ def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDesc
         ModelError: With every fault of the file, each with its line where that is the user's.
     """
     source = resolve(name_or_path)
-    packages = known_packages(source, options.packages)
-    raw = source.read_bytes()
+    raw = read_utf8(source)
     if _has_xacro(source, raw):
-        urdf = expand(source, args=options.args, packages=packages)
-        return parse_urdf(urdf, source, options, packages=packages, lines_are_users=False)
-    return parse_urdf(raw, source, options, packages=packages)
+        expanded = expand(source, options)
+        return parse_urdf(expanded.urdf, source, options, lines=expanded.lines)
+    return parse_urdf(raw, source, options)
 
 
 def parse_urdf(
@@ -51,8 +51,7 @@ def parse_urdf(
     source: Path,
     options: ReadOptions = DEFAULTS,
     *,
-    packages: Mapping[str, Path] = NO_PACKAGES,
-    lines_are_users: bool = True,
+    lines: LineTable | None = None,
 ) -> RobotDescription:
     """Return the description in a URDF text.
 
@@ -60,20 +59,20 @@ def parse_urdf(
         urdf: The text, without xacro.
         source: The file it came from: named in messages, and meshes are relative to it.
         options: What to do about what is missing or impossible.
-        packages: Folders that `package://name/` may name.
-        lines_are_users: False if the lines of `urdf` are not those of `source`.
+        lines: Where its elements come from, if `urdf` is not the text of `source`.
 
     Raises:
         ModelError: With every fault of the text.
     """
-    raw = urdf.encode() if isinstance(urdf, str) else urdf
-    report = Report(source, lines_are_users)
+    raw = urdf.encode() if isinstance(urdf, str) else as_utf8(urdf, source)
+    report = Report(source, lines)
     root = parse(raw, report)
     if root.get("version", "1.0") not in VERSIONS:
         report.add(
             root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
         )
     surfaces = read_surfaces(root, report)
+    packages = Packages(PackagePath.of(source, options))
     links = _read_links(root, surfaces, packages, report, options)
     joints, elements = _read_joints(root, report)
     joints = without_idle_mimics(joints, elements, report)
@@ -91,6 +90,7 @@ def parse_urdf(
         commands=read_commands(root, joints, report),
         sensors=read_sensors(root, links, report),
         warnings=tuple(dict.fromkeys(report.warnings)),
+        lines=lines,
     )
     if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
         _refuse_impossible(description, root, report)
@@ -110,7 +110,7 @@ def _has_xacro(source: Path, raw: bytes) -> bool:
 def _read_links(
     root: Element,
     surfaces: Mapping[str, Surface],
-    packages: Mapping[str, Path],
+    packages: Packages,
     report: Report,
     options: ReadOptions,
 ) -> dict[str, Link]:
@@ -148,6 +148,6 @@ def _refuse_impossible(description: RobotDescription, root: Element, report: Rep
 
 
 def _sort(report: Report) -> None:
-    """Put problems in the order of the file, each once (a material may be used by many visuals)."""
+    """Put problems in the order of the files, each once (a material may be used by many visuals)."""
     distinct: dict[Problem, None] = dict.fromkeys(report.problems)
-    report.problems = sorted(distinct, key=lambda problem: problem.line or 0)
+    report.problems = sorted(distinct, key=lambda problem: (str(problem.file), problem.line or 0))

@@ -1,87 +1,240 @@
-"""The child process that expands one xacro file; it is run as a script and imports nothing of twin.
+"""The child process that expands one xacro file.
 
-xacro evaluates Python expressions of the file behind a guard that can be escaped. So the process itself gives
-up what a model file has no business with: other folders, writing, sockets, programs.
-It reads a JSON request on stdin, writes a JSON answer on stdout.
+xacro evaluates Python expressions of the file behind a guard that can be escaped. So only listed forms of
+them are evaluated (`xacro_expressions`), and the process gives up what a model file has no business with
+(`sandbox`).
+It reads a JSON request on stdin and writes a JSON answer on stdout.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
-import resource
+import re
 import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
 from typing import Any
+from xml.dom.minidom import Document, Element
 
-CPU_SECONDS = 15
-ADDRESS_SPACE_BYTES = 1 << 30
-FORBIDDEN_EVENTS = ("socket.", "subprocess.", "os.", "shutil.", "ctypes.", "glob.", "urllib.", "webbrowser.")
-HARMLESS_EVENTS = ("os.listdir", "os.scandir", "os.walk", "os.fwalk", "os.putenv", "os.unsetenv")
+import xacro
+import xacro.substitution_args as substitution
+import yaml  # noqa: F401  (xacro imports it when asked for; the door is closed then)
+
+from twin.models.packages import PackagePath, Packages, unknown_package
+from twin.models.sandbox import Refused, close_the_door, limit_resources, refuse_outside
+from twin.models.xacro_document import Sources, elements, place
+from twin.models.xacro_expressions import Expressions, checked, guarded_symbols
+from twin.models.xml_text import MAX_BYTES
+
+MAX_MACROS = 300
+"""Macros inside of each other; some use them as loops."""
+MAX_CALLS = 20_000
+"""Macros called in one file."""
+MAX_INCLUDES = 50
+"""Files inside of each other."""
+LONGEST = 400
+"""Characters of a message: an expression may be part of it."""
+FRAMES = 20_000
+"""Of the interpreter; a macro takes up to ten."""
 
 
-class Refused(Exception):
-    """The file tried what a model file may not do."""
+class _Silence(io.TextIOBase):
+    """Takes what xacro prints."""
+
+    def write(self, text: str) -> int:
+        return len(text)
 
 
 def main() -> None:
-    """Expand the requested file and answer with its text, or with what went wrong and in which files."""
+    """Expand the requested file and answer with its text, or with what went wrong and where."""
     request = json.load(sys.stdin)
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
-    resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE_BYTES, ADDRESS_SPACE_BYTES))
-    with contextlib.redirect_stdout(sys.stderr):
-        answer = _expand(request)
+    limit_resources()
+    with contextlib.redirect_stdout(_Silence()), contextlib.redirect_stderr(_Silence()):
+        answer = _answer(request)
     json.dump(answer, sys.stdout)
 
 
-def _expand(request: dict[str, Any]) -> dict[str, Any]:
-    import xacro
-    import xacro.substitution_args as substitution
-
-    packages: dict[str, str] = request["packages"]
-
-    def find(package: str) -> str:
-        if package in packages:
-            return packages[package]
-        known = ", ".join(sorted(packages)) or "none"
-        raise Refused(
-            f"$(find {package}): package not found; known packages: {known} (give --package {package}=PATH)"
+def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
+    path = request["packages"]
+    packages = Packages(
+        PackagePath(
+            starts=tuple(map(Path, path["starts"])),
+            given={name: Path(folder) for name, folder in path["given"].items()},
+            ament_prefixes=tuple(map(Path, path["ament_prefixes"])),
+            search=tuple(map(Path, path["search"])),
+            allowed=tuple(map(Path, path["allowed"])),
         )
-
-    substitution._eval_find = find
-    substitution._eval_dict["find"] = find
-    _close_the_door(request["roots"])
+    )
+    sys.setrecursionlimit(FRAMES)
+    _guard(Sources(), Expressions(xacro.NameSpace, xacro.YamlDictWrapper), packages, request["environment"])
+    close_the_door(packages)
     try:
         document = xacro.process_file(request["file"], mappings=request["args"])
         # Without xacro's banner: it holds the file's path, and the text is published and part of digests.
-        return {"urdf": '<?xml version="1.0"?>' + document.documentElement.toxml()}
+        text = '<?xml version="1.0"?>' + document.documentElement.toxml()
+        if len(text) > MAX_BYTES:
+            raise Refused(
+                f"the file expands to {len(text)} bytes; at most {MAX_BYTES} are read", code="too-large"
+            )
+        return {"urdf": text, **_table(document.documentElement)}
     except RecursionError:
-        message = "a macro or include calls itself without end"
+        return _fault("it is nested too deeply; a macro or property may call itself without end")
     except MemoryError:
-        message = "the expansion needs more memory than a model file may use"
+        return _fault("the expansion needs more memory than a model file may use")
     except Exception as error:  # every fault of the file, whatever its type, is the user's to read
-        message = " ".join(str(error).split()) or repr(error)
-    return {"error": message, "files": [name for name in xacro.filestack or () if name]}
+        return _explain(error)
 
 
-def _close_the_door(roots: list[str]) -> None:
-    readable = tuple(os.path.realpath(root) + os.sep for root in [*roots, sys.prefix, sys.base_prefix])
+def _table(top: Element) -> dict[str, Any]:
+    """Return the files, and index and line of every element."""
+    places = [place(element) or ("", 0) for element in elements(top)]
+    files = {file: index for index, file in enumerate(dict.fromkeys(file for file, _ in places))}
+    return {"files": list(files), "places": [(files[file], line) for file, line in places]}
 
-    def guard(event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "open":
-            path, _, flags = arguments
-            writes = isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
-            if isinstance(path, int):
-                return
-            real = os.path.realpath(os.fsdecode(path))
-            if writes or not real.startswith(readable):
-                raise Refused(
-                    f"the file opens '{os.fsdecode(path)}', which is outside of its own folder and packages"
-                )
-        elif event.startswith(FORBIDDEN_EVENTS) and event not in HARMLESS_EVENTS:
-            raise Refused(f"the file tries '{event}', which a model file may not do")
 
-    sys.addaudithook(guard)
+def _guard(
+    sources: Sources, expressions: Expressions, packages: Packages, environment: Mapping[str, str]
+) -> None:
+    """Put our own functions in the place of those of xacro that read, evaluate or recurse."""
+    _guard_reading(sources, expressions, packages)
+    _guard_expansion()
+    guarded_symbols(xacro._global_symbols)
+    guarded_symbols(substitution._eval_dict)
+    xacro.safe_eval = expressions.evaluate
+
+    def evaluate_extension(text: str, context: Mapping[str, Any]) -> str:
+        names = {**substitution._eval_dict, "arg": lambda name: substitution._eval_arg(name, context["arg"])}
+        arguments = {
+            name: substitution.convert_value(value, "auto") for name, value in context["arg"].items()
+        }
+        return str(expressions.evaluate(text, {**arguments, **names}))
+
+    def find(package: str) -> str:
+        try:
+            return str(packages[package])
+        except KeyError:
+            raise Refused(
+                f"$(find {package}): package not found; {unknown_package(package, packages)}"
+            ) from None
+
+    def env(name: str) -> str:
+        if name in environment:
+            return environment[name]
+        raise Refused(f"$(env {name}): not set, or not allowed; give --allow-env {name}")
+
+    def optenv(name: str, default: str = "") -> str:
+        return environment.get(name, default)
+
+    substitution._eval = evaluate_extension
+    substitution._eval_dirname = lambda _: os.path.dirname(os.path.abspath(xacro.filestack[-1]))
+    functions = {"find": find, "env": env, "optenv": optenv}
+    for name, function in functions.items():
+        setattr(substitution, f"_eval_{name}", function)
+        substitution._eval_dict[name] = function
+
+
+def _guard_reading(sources: Sources, expressions: Expressions, packages: Packages) -> None:
+    def parse(_: None, filename: str) -> Document:
+        refuse_outside(filename, packages)
+        try:
+            return sources.parse(filename)
+        except OSError as error:
+            # As xacro does: the file is named as missing, not as the place of the fault.
+            xacro.filestack.pop()
+            raise xacro.XacroException(f"{error.strerror}: {filename}", exc=error) from None
+
+    def read_yaml(filename: str) -> Any:
+        refuse_outside(xacro.abs_filename_spec(filename), packages)
+        return expressions.weigh(load_yaml(filename))
+
+    load_yaml = xacro.load_yaml
+    for table in (xacro._global_symbols, xacro._global_symbols["xacro"]):
+        dict.__setitem__(table, "load_yaml", read_yaml)
+    xacro.parse = parse
+    evaluate = xacro.eval_text
+    xacro.eval_text = lambda text, symbols: checked(evaluate(text, symbols))
+
+
+def _guard_expansion() -> None:
+    call, include = xacro.handle_macro_call, xacro.process_include
+    calls = 0
+    # The same pattern, without the nested repetition whose matching takes exponential time.
+    pattern = xacro.re_macro_arg.pattern.replace(r"[^\s'\"]+", r"[^\s'\"]++")
+    pattern = pattern.replace("'.*?'", "'[^']*+'").replace(r"\".*?\"", r"\"[^\"]*+\"")
+    xacro.re_macro_arg = re.compile(pattern)
+
+    def call_macro(node: Element, macros: Any, symbols: Any) -> bool:
+        nonlocal calls
+        if node.tagName.startswith("xacro:"):
+            name = node.tagName.removeprefix("xacro:")
+            calls += 1
+            if len(xacro.macrostack) > MAX_MACROS:
+                raise Refused(f"macro '{name}' is called {MAX_MACROS} times inside of itself, without end")
+            if calls > MAX_CALLS:
+                raise Refused(f"more than {MAX_CALLS} macros are called, the last one is '{name}'")
+        return call(node, macros, symbols)
+
+    def include_file(node: Element, macros: Any, symbols: Any, expand: Any) -> None:
+        if len(xacro.filestack) > MAX_INCLUDES:
+            chain = " -> ".join(map(os.path.basename, xacro.filestack[-3:]))
+            raise Refused(f"files include each other without end: … -> {chain}")
+        include(node, macros, symbols, expand)
+
+    xacro.handle_macro_call = call_macro
+    xacro.process_include = include_file
+
+
+def _explain(error: Exception) -> dict[str, Any]:
+    refused = _refusal(error)
+    file, line = _place(error.__traceback__)
+    if refused is not None and refused.file is not None:
+        file, line = refused.file, refused.line
+    macro = xacro.macrostack[-1].body.getAttribute("name") if xacro.macrostack else ""
+    message = " ".join(_message(error).split())
+    if len(message) > LONGEST:
+        message = message[:LONGEST] + "…"
+    message += f" (in macro '{macro}')" if macro else ""
+    return _fault(message, file or xacro.filestack[-1], line, refused.code if refused else "xacro")
+
+
+def _fault(
+    message: str, file: str | None = None, line: int | None = None, code: str = "xacro"
+) -> dict[str, Any]:
+    return {"error": message, "file": file, "line": line, "code": code}
+
+
+def _refusal(error: BaseException | None) -> Refused | None:
+    while error is not None and not isinstance(error, Refused):
+        error = getattr(error, "exc", None)
+    return error
+
+
+def _message(error: BaseException) -> str:
+    """Return xacro's message without the names of Python's exception types."""
+    if not isinstance(error, xacro.XacroException):
+        return f"no such key {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
+    own = str(error.args[0] or "") if error.args else ""
+    if error.exc is not None and (own.startswith("<class ") or isinstance(error.exc, OSError)):
+        own = own if isinstance(error.exc, OSError) else ""
+    inner = "" if error.exc is None or isinstance(error.exc, OSError) else _message(error.exc)
+    suffix = "" if inner and "when evaluating" in inner else error.suffix or ""
+    return " ".join(part for part in (own, inner, suffix) if part)
+
+
+def _place(traceback: TracebackType | None) -> tuple[str | None, int | None]:
+    """Return the place of the element that was expanded when an error came up."""
+    found: tuple[str | None, int | None] = (None, None)
+    while traceback is not None:
+        frame = traceback.tb_frame
+        if frame.f_code is xacro.eval_all.__code__:
+            node = frame.f_locals.get("node")
+            found = place(node) or place(getattr(node, "parentNode", None)) or found
+        traceback = traceback.tb_next
+    return found
 
 
 if __name__ == "__main__":

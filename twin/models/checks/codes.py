@@ -38,6 +38,7 @@ ERRORS: Mapping[str, str] = MappingProxyType(
         "impossible-inertia": "no principal moment exceeds the sum of the others: take it from CAD",
         "bad-geometry": "give one shape with positive dimensions",
         "missing-mesh": "correct the path, or give --package NAME=PATH",
+        "outside-path": "keep files in the robot's folder or package, or give --allow-path DIR",
         "undefined-material": "define <material name=''><color rgba=''/></material> under <robot>",
         "bad-friction": "give a coefficient of at least 0",
         "bad-drive": "complete the drive plugin",

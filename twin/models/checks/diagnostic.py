@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from twin.errors import Problem
+from twin.errors import Problem, SourceLine
 from twin.models.checks.codes import ERRORS, Severity, severity_of
 from twin.models.description import RobotDescription
 
@@ -22,7 +22,7 @@ class Diagnostic:
     """Such as `joint 'lift_joint'`, or `robot`."""
     file: Path
     line: int | None
-    """1-based; None where the file's own line is unknown, as after xacro."""
+    """1-based, in `file`; None where it is unknown."""
     message: str
     """What is wrong, with the number found."""
     fix: str
@@ -37,8 +37,8 @@ def finding(
         code=code,
         severity=severity_of(code),
         element=element,
-        file=description.source,
-        line=line or None,
+        file=line.file if isinstance(line, SourceLine) else description.source,
+        line=int(line) or None,
         message=message,
         fix=fix,
     )
@@ -65,5 +65,10 @@ def _from_problem(problem: Problem, source: Path) -> Diagnostic:
 
 
 def in_file_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """Return them sorted by line, those without a line last, each once; else in the order they were found."""
-    return tuple(sorted(dict.fromkeys(diagnostics), key=lambda found: (found.line is None, found.line or 0)))
+    """Return them sorted by file and line, those without a line last, each once; else as they were found."""
+    return tuple(
+        sorted(
+            dict.fromkeys(diagnostics),
+            key=lambda found: (found.line is None, str(found.file), found.line or 0),
+        )
+    )

@@ -13,8 +13,7 @@ ONCE = ("inertial", "visual", "collision", "joint")
 
 def read_source(description: RobotDescription) -> tuple[Element, Report]:
     """Return the root element of the robot's text, and a report that knows its lines."""
-    with_lines = any(link.line for link in description.links.values())
-    report = Report(description.source, with_lines)
+    report = Report(description.source, description.lines)
     return parse(description.urdf.encode(), report), report
 
 

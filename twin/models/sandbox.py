@@ -1,0 +1,89 @@
+"""What the process that expands xacro gives up: other folders, writing, programs, endless time."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import sys
+from typing import Any
+
+from twin.models.packages import MANIFEST, Packages
+
+CPU_SECONDS = 15
+ADDRESS_SPACE_BYTES = 1 << 30
+ANSWER_BYTES = 1 << 28
+"""The process writes nothing but its answer."""
+FORBIDDEN_EVENTS = ("socket.", "subprocess.", "os.", "shutil.", "ctypes.", "urllib.", "webbrowser.", "pty.")
+HARMLESS_EVENTS = ("os.listdir", "os.scandir", "os.walk", "os.fwalk", "os.putenv", "os.unsetenv")
+MODULES = (".py", ".pyc", ".so")
+
+
+class Refused(Exception):
+    """The file tried what a model file may not do."""
+
+    def __init__(
+        self, message: str, *, code: str = "xacro", file: str | None = None, line: int | None = None
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.file = file
+        self.line = line
+
+
+def limit_resources() -> None:
+    """Limit time, memory, the answer's size, processes and open files of this process, for good."""
+    limits = {
+        resource.RLIMIT_CPU: CPU_SECONDS,
+        resource.RLIMIT_AS: ADDRESS_SPACE_BYTES,
+        resource.RLIMIT_FSIZE: ANSWER_BYTES,
+        resource.RLIMIT_CORE: 0,
+        resource.RLIMIT_NPROC: 0,
+        resource.RLIMIT_NOFILE: 128,
+    }
+    for kind, most in limits.items():
+        # Not every system knows every limit, and the user's own may be lower.
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(kind, (most, most))
+
+
+def refuse_outside(name: str, packages: Packages) -> None:
+    """Refuse to open a file that is not in the robot file's folder, a package or an allowed folder.
+
+    Raises:
+        Refused: It is elsewhere.
+    """
+    if not packages.allows(name):
+        folder = os.path.dirname(os.path.realpath(name))
+        raise Refused(
+            f"the file opens '{name}', which is outside of its own folder and packages; "
+            f"if you trust it, give --allow-path {folder}",
+            code="outside-path",
+        )
+
+
+def close_the_door(packages: Packages) -> None:
+    """Let this process read only what `packages` allows, write nothing and start nothing, for good."""
+    interpreter = tuple(
+        os.path.realpath(folder) + os.sep for folder in (sys.prefix, sys.base_prefix, *sys.path) if folder
+    )
+
+    def is_of_interpreter(real: str) -> bool:
+        if os.path.basename(real) == MANIFEST:  # read to find packages
+            return True
+        return real.endswith(MODULES) and real.startswith(interpreter)
+
+    def guard(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            path, _, flags = arguments
+            if isinstance(path, int):
+                return
+            name = os.fsdecode(path)
+            if isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+                raise Refused(f"the file writes '{name}', which a model file may not do")
+            if not is_of_interpreter(os.path.realpath(name)):
+                refuse_outside(name, packages)
+        elif event.startswith(FORBIDDEN_EVENTS) and event not in HARMLESS_EVENTS:
+            raise Refused(f"the file tries '{event}', which a model file may not do")
+
+    sys.addaudithook(guard)

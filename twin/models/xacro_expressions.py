@@ -1,0 +1,344 @@
+"""The Python expressions of a xacro file, evaluated without giving them Python.
+
+xacro forbids names with double underscores and takes the builtins away; a lambda, a format string or an
+attribute gets around that. So here an expression is first parsed, and only listed forms are evaluated.
+What can reach further, or take long, goes through a function that looks at the values: every attribute, every
+operator that can make something large, every call, every turn of a loop.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import CodeType, MappingProxyType
+from typing import Any
+
+from twin.models.sandbox import Refused
+
+MAX_LENGTH = 10_000
+"""Characters of an expression."""
+MAX_ITEMS = 1_000_000
+"""Characters of a string, items of a list or range."""
+MAX_BITS = 4096
+"""Of an integer."""
+MAX_STEPS = 1_000_000
+"""Calls and turns of loops in one file; a hundred items of a value that is worked on count as one."""
+MAX_FACTORIAL = 170
+"""The largest whose result is a float."""
+
+NODES = (
+    "Expression Constant Name Load Store Attribute Subscript Slice Tuple List Dict Set Starred BoolOp And Or "
+    "UnaryOp UAdd USub Not Invert BinOp Add Sub Mult Div FloorDiv Mod Pow LShift RShift BitAnd BitOr BitXor "
+    "Compare Eq NotEq Lt LtE Gt GtE Is IsNot In NotIn IfExp Call keyword ListComp SetComp DictComp "
+    "GeneratorExp comprehension Lambda arguments arg JoinedStr FormattedValue"
+)
+ALLOWED = tuple(getattr(ast, name) for name in NODES.split())
+FORMS = {"NamedExpr": ":=", "Await": "await", "Yield": "yield", "MatMult": "@"}
+
+METHODS: Mapping[type, frozenset[str]] = MappingProxyType(
+    {
+        kind: frozenset(names.split())
+        for kind, names in {
+            str: "capitalize casefold center count endswith find index isalnum isalpha isascii "
+            "isdecimal isdigit isidentifier islower isnumeric isspace isupper join ljust lower lstrip "
+            "partition removeprefix removesuffix replace rfind rindex rjust rpartition rsplit rstrip split "
+            "splitlines startswith strip swapcase title upper zfill",
+            dict: "copy get items keys pop setdefault update values clear",
+            list: "append clear copy count extend index insert pop remove reverse sort",
+            tuple: "count index",
+            set: "add copy difference discard intersection isdisjoint issubset issuperset remove union",
+            frozenset: "difference intersection isdisjoint issubset issuperset union",
+            int: "real imag numerator denominator bit_length conjugate",
+            float: "real imag is_integer conjugate",
+            complex: "real imag conjugate",
+        }.items()
+    }
+)
+"""What values have; functions, classes, generators and modules have no attributes here."""
+PLAIN = (str, int, float, bool, complex, list, tuple, dict, set, frozenset, type(None))
+_WIDE = re.compile(r"\d{4}|\*")
+_DUNDER = re.compile(r"__\w+__")
+_ATTRIBUTE, _CALL, _LOOP, _STEP, _WEIGH = "<attribute>", "<call>", "<loop>", "<step>", "<weigh>"
+_OPERATORS = {ast.Add: "<+>", ast.Mult: "<*>", ast.Pow: "<**>", ast.LShift: "<<<>", ast.Mod: "<%>"}
+
+
+class Expressions:
+    """Evaluates the expressions of one file.
+
+    Args:
+        namespace: Mappings of this type have nothing but their items, as attributes.
+        record: Mappings of this type have their items as attributes too.
+    """
+
+    def __init__(self, namespace: type[Any], record: type[Any]) -> None:
+        self._namespace = namespace
+        self._record = record
+        self._steps = 0
+        # These names are no Python names, so that no expression can use or replace them.
+        self._builtins: dict[str, Any] = {
+            _ATTRIBUTE: self._attribute,
+            _CALL: self._call,
+            _LOOP: self._loop,
+            _STEP: self._step,
+            _WEIGH: self.weigh,
+            **{name: self._operator(function) for name, function in _FUNCTIONS.items()},
+        }
+
+    def evaluate(
+        self, expression: str, variables: dict[str, Any], more: Mapping[str, Any] | None = None
+    ) -> Any:
+        """Return the value of an expression.
+
+        Args:
+            expression: Its text.
+            variables: What it may name; the builtins are replaced in it.
+            more: Looked up before `variables`.
+
+        Raises:
+            Refused: It is of a form that a model file has no need of, or its value gets too large.
+            Exception: Whatever the evaluation raises.
+        """
+        code = compiled(expression.strip())
+        variables.update(__builtins__=self._builtins)
+        return self.weigh(eval(code, variables, more))
+
+    def weigh(self, value: Any) -> Any:
+        """Return a value that is not too large to be written out, and count the work that it will be.
+
+        Raises:
+            Refused: It is too large, or the file has done enough.
+        """
+        self._step(checked(value), _size(value) // 100)
+        return value
+
+    def _attribute(self, value: Any, name: str) -> Any:
+        # Items only: a namespace's own attributes lead to the tables of the expansion.
+        if isinstance(value, self._namespace):
+            if name in value:
+                return value[name]
+            raise NameError(f"name '{name}' is not defined")
+        for kind, names in METHODS.items():
+            if isinstance(value, kind) and name in names:
+                return getattr(value, name)
+        if isinstance(value, self._record):
+            return value[name]
+        raise Refused(f"'.{name}' of a {type(value).__name__} is not for model files")
+
+    def _call(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        for value in (*args, *kwargs.values()):
+            self.weigh(value)
+        return self.weigh(function(*args, **kwargs))
+
+    def _operator(self, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        return lambda a, b: self.weigh(function(a, self.weigh(b) if isinstance(a, str) else b))
+
+    def _loop(self, items: Iterable[Any]) -> Iterator[Any]:
+        for item in items:
+            yield self._step(item)
+
+    def _step(self, value: Any, work: int = 0) -> Any:
+        self._steps += 1 + work
+        if self._steps > MAX_STEPS:
+            raise Refused(f"the file's expressions take more than {MAX_STEPS} calls and turns of loops")
+        return value
+
+
+@functools.lru_cache(maxsize=4096)
+def compiled(expression: str) -> CodeType:
+    """Return the code of an expression with its guards.
+
+    Raises:
+        Refused: It is of a form that a model file has no need of.
+        SyntaxError: It is no expression.
+    """
+    if len(expression) > MAX_LENGTH:
+        raise Refused(f"an expression of {len(expression)} characters; at most {MAX_LENGTH} are read")
+    try:
+        tree = ast.parse(expression, "<expression>", "eval")
+        for node in ast.walk(tree):
+            _check(node)
+        guarded = ast.fix_missing_locations(_Guards().visit(tree))
+        return compile(guarded, "<expression>", "eval")
+    except (RecursionError, MemoryError):
+        raise Refused("the expression is nested too deeply") from None
+
+
+def guarded_symbols(symbols: dict[str, Any]) -> None:
+    """Replace functions in a table of xacro's by ones that take no time and show no insides."""
+    names = {"range": _range, "type": _type, "factorial": _factorial, "comb": _comb, "perm": _perm}
+    for table in (symbols, *(value for value in symbols.values() if isinstance(value, dict))):
+        dict.pop(table, "vars", None)
+        for name in [name for name in names if dict.__contains__(table, name)]:
+            dict.__setitem__(table, name, names[name])
+
+
+def checked(value: Any) -> Any:
+    """Return a value that is not too large to go on with.
+
+    Raises:
+        Refused: It is.
+    """
+    if isinstance(value, str | bytes | list | tuple | dict | set | frozenset) and len(value) > MAX_ITEMS:
+        raise Refused(f"a value of {len(value)} characters or items; at most {MAX_ITEMS} are taken")
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
+        raise Refused(f"an integer of {value.bit_length()} bits; at most {MAX_BITS} are taken")
+    return value
+
+
+def _size(value: Any) -> int:
+    """Return how many characters and items a value has, inner ones as often as they occur."""
+    if isinstance(value, str | bytes | range):
+        return len(value)
+    size, waiting = 0, [value]
+    while waiting:
+        inner = waiting.pop()
+        size += 1
+        if isinstance(inner, list | tuple | set | frozenset):
+            waiting += list(inner)
+        elif isinstance(inner, dict):
+            waiting += dict.values(inner)
+        elif isinstance(inner, str):
+            size += len(inner)
+        if size + len(waiting) > MAX_ITEMS:
+            raise Refused(f"a value of more than {MAX_ITEMS} characters or items inside of each other")
+    return size
+
+
+def _check(node: ast.AST) -> None:
+    if not isinstance(node, ALLOWED):
+        kind = type(node).__name__
+        raise Refused(f"'{FORMS.get(kind, kind)}' is not for expressions of model files")
+    for name in _names(node):
+        if name.startswith("__") or (isinstance(node, ast.Attribute) and name.startswith("_")):
+            raise Refused(f"'{name}': names of Python's inside are not for model files")
+    if isinstance(node, ast.Constant):
+        checked(node.value)
+        if isinstance(node.value, str) and _DUNDER.search(node.value):
+            raise Refused(f"'{node.value[:40]}': names of Python's inside are not for model files")
+    if isinstance(node, ast.FormattedValue) and node.format_spec is not None:
+        parts = node.format_spec.values if isinstance(node.format_spec, ast.JoinedStr) else []
+        if any(not isinstance(part, ast.Constant) or _WIDE.search(str(part.value)) for part in parts):
+            raise Refused("a format this wide is not for model files")
+
+
+def _names(node: ast.AST) -> tuple[str, ...]:
+    if isinstance(node, ast.Name):
+        return (node.id,)
+    if isinstance(node, ast.Attribute):
+        return (node.attr,)
+    if isinstance(node, ast.arg | ast.keyword):
+        return (node.arg or "",)
+    return ()
+
+
+class _Guards(ast.NodeTransformer):
+    """Puts the guards into an expression."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.generic_visit(node)
+        return _apply(_ATTRIBUTE, node.value, ast.Constant(node.attr))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        return ast.Call(_name(_CALL), [node.func, *node.args], node.keywords)
+
+    def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
+        self.generic_visit(node)
+        node.body = _apply(_STEP, node.body)
+        return node
+
+    def visit_comprehension(self, node: ast.comprehension) -> ast.AST:
+        self.generic_visit(node)
+        node.iter = _apply(_LOOP, node.iter)
+        return node
+
+    def visit_FormattedValue(self, node: ast.FormattedValue) -> ast.AST:
+        self.generic_visit(node)
+        node.value = _apply(_WEIGH, node.value)
+        return node
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        guard = _OPERATORS.get(type(node.op))
+        return node if guard is None else _apply(guard, node.left, node.right)
+
+
+def _apply(function: str, *values: ast.expr) -> ast.Call:
+    return ast.Call(_name(function), list(values), [])
+
+
+def _name(name: str) -> ast.Name:
+    return ast.Name(name, ast.Load())
+
+
+def _add(a: Any, b: Any) -> Any:
+    return checked(a + b)
+
+
+def _multiply(a: Any, b: Any) -> Any:
+    for items, times in ((a, b), (b, a)):
+        if isinstance(times, int) and isinstance(items, str | bytes | list | tuple):
+            _limit(len(items) * times, MAX_ITEMS, "characters or items")
+    if isinstance(a, int) and isinstance(b, int):
+        _limit(a.bit_length() + b.bit_length() - 1, MAX_BITS, "bits")
+    return a * b
+
+
+def _power(a: Any, b: Any) -> Any:
+    if isinstance(a, int) and isinstance(b, int) and abs(a) > 1:
+        _limit((a.bit_length() - 1) * b, MAX_BITS, "bits")
+    return a**b
+
+
+def _shift(a: Any, b: Any) -> Any:
+    if isinstance(a, int) and isinstance(b, int):
+        _limit(a.bit_length() + b, MAX_BITS, "bits")
+    return a << b
+
+
+def _modulo(a: Any, b: Any) -> Any:
+    if isinstance(a, str | bytes) and _WIDE.search(a if isinstance(a, str) else a.decode("latin-1")):
+        raise Refused("a format this wide is not for model files")
+    return a % b
+
+
+_FUNCTIONS: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType(
+    {"<+>": _add, "<*>": _multiply, "<**>": _power, "<<<>": _shift, "<%>": _modulo}
+)
+"""By the names in `_OPERATORS`."""
+
+
+def _range(*args: int) -> range:
+    numbers = range(*args)
+    steps = -(-(numbers.stop - numbers.start) // numbers.step)
+    _limit(steps, MAX_ITEMS, "items")
+    return numbers
+
+
+def _type(value: Any) -> type:
+    if isinstance(value, PLAIN):
+        return type(value)
+    raise Refused(f"type() of a {type(value).__name__} is not for model files")
+
+
+def _factorial(n: int) -> int:
+    _limit(n, MAX_FACTORIAL, "for a factorial")
+    return math.factorial(n)
+
+
+def _comb(n: int, k: int) -> int:
+    _limit(n, MAX_FACTORIAL, "for a number of combinations")
+    return math.comb(n, k)
+
+
+def _perm(n: int, k: int | None = None) -> int:
+    _limit(n, MAX_FACTORIAL, "for a number of permutations")
+    return math.perm(n, k)
+
+
+def _limit(number: int, most: int, what: str) -> None:
+    if number > most:
+        raise Refused(f"{number} {what}; at most {most} are taken" if number < 10**30 else f"too many {what}")

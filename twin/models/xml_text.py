@@ -1,0 +1,147 @@
+"""The text of an XML file as UTF-8, and the limits that it keeps before a parser builds a tree of it."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from pathlib import Path
+from xml.parsers import expat
+
+from twin.errors import ModelError, Problem
+
+MAX_BYTES = 32 * 1024 * 1024
+MAX_ELEMENTS = 200_000
+MAX_DEPTH = 100
+"""Elements inside of each other; robots have about ten."""
+MAX_ATTRIBUTES = 100
+"""Of one element."""
+
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_DECLARED = re.compile(r"""^(<\?xml\b[^>]*?)\s+encoding\s*=\s*["']([^"'>]*)["']""")
+_ENCODINGS = re.compile(
+    r"utf-?8|us-ascii|ascii|(iso-?)?8859-\d+|iso-8859-\d+|latin-?\d|windows-125\d|cp125\d"
+    r"|gb2312|gbk|gb18030|big5|shift_jis|euc-(jp|kr)|koi8-[ru]"
+)
+"""What a declaration may name; Python knows codecs that are none of text."""
+
+
+def read_utf8(source: Path) -> bytes:
+    """Return a file's text as UTF-8, without byte order mark; UTF-8 stays as it is, byte by byte.
+
+    Raises:
+        ModelError: The file cannot be read, is too large, or is not text in the encoding that it declares.
+    """
+    try:
+        if source.stat().st_size > MAX_BYTES:
+            raise _fault(
+                f"the file has {source.stat().st_size} bytes; at most {MAX_BYTES} are read",
+                source,
+                code="too-large",
+            )
+        raw = source.read_bytes()
+    except OSError as error:
+        raise _fault(f"cannot be read: {error.strerror}; give a file", source, code="no-file") from None
+    return as_utf8(raw, source)
+
+
+def as_utf8(raw: bytes, source: Path) -> bytes:
+    """Return the text of `source` as UTF-8; see `read_utf8`.
+
+    Raises:
+        ModelError: It is not text in the encoding that it declares.
+    """
+    encoding, body = _encoding(raw, source)
+    try:
+        text = body.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = body.count(b"\n", 0, error.start) + 1
+        message = f"byte 0x{body[error.start]:02x} is no {encoding.upper()}; save the file as UTF-8"
+        raise _fault(message, source, line) from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise _fault("the file has a null byte; save it as plain text", source, line)
+    if encoding == "utf-8":
+        return body
+    return _DECLARED.sub(r'\1 encoding="UTF-8"', text, count=1).encode()
+
+
+def scan(text: bytes, source: Path, *, has_lines: bool = True) -> list[int]:
+    """Return the line of every start tag of a UTF-8 text, in order.
+
+    Args:
+        text: The text.
+        source: The file it came from, for messages.
+        has_lines: False if the lines of `text` are not those of `source`; messages then have none.
+
+    Raises:
+        ModelError: Not well-formed, too large, too deep, or with a DOCTYPE: its entities can read files and
+            exhaust memory, and no robot needs them.
+    """
+    if len(text) > MAX_BYTES:
+        raise _fault(
+            f"the file has {len(text)} bytes; at most {MAX_BYTES} are read", source, code="too-large"
+        )
+    if not text.strip():
+        raise _fault("the file is empty; a URDF file has <robot name='...'>", source)
+    lines: list[int] = []
+    # expat, not lxml: libxml2 expands internal entities inside attributes even with resolve_entities=False.
+    parser = expat.ParserCreate("utf-8")
+    depth = 0
+
+    def line() -> int | None:
+        return parser.CurrentLineNumber if has_lines else None
+
+    def refuse_doctype(*_: object) -> None:
+        raise _fault("the file has a DOCTYPE; remove it, a robot needs none", source, line(), code="doctype")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        lines.append(parser.CurrentLineNumber)
+        for what, number, most in (
+            ("elements", len(lines), MAX_ELEMENTS),
+            (f"elements inside of each other, down to <{tag[:40]}>", depth, MAX_DEPTH),
+            (f"attributes in <{tag[:40]}>", len(attributes), MAX_ATTRIBUTES),
+        ):
+            if number > most:
+                raise _fault(f"the file has more than {most} {what}", source, line(), code="too-large")
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler = refuse_doctype
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        message = f"not well-formed XML: {expat.ErrorString(error.code)}"
+        raise _fault(message, source, error.lineno if has_lines else None) from None
+    return lines
+
+
+def _encoding(raw: bytes, source: Path) -> tuple[str, bytes]:
+    """Return a text's encoding, as Python calls it, and the text without byte order mark."""
+    for mark, encoding in _BOMS:
+        if raw.startswith(mark):
+            return encoding, raw[len(mark) :]
+    for start, encoding in ((b"<\0", "utf-16-le"), (b"\0<", "utf-16-be")):
+        if raw.startswith(start):
+            return encoding, raw
+    declared = _DECLARED.match(raw[:200].decode("latin-1"))
+    name = declared[2].lower() if declared else "utf-8"
+    if not _ENCODINGS.fullmatch(name):
+        raise _fault(f"encoding '{name}' is unknown; save the file as UTF-8", source, 1)
+    # US-ASCII files with a stray character are UTF-8 in practice.
+    return ("utf-8" if name in ("utf8", "us-ascii", "ascii") else name), raw
+
+
+def _fault(message: str, source: Path, line: int | None = None, *, code: str = "bad-xml") -> ModelError:
+    return ModelError(Problem(message, source, line, code=code))
