@@ -260,7 +260,7 @@ def test_unreadable_mesh_is_named(tmp_path: Path) -> None:
     description = load("diff_bot")
     visual = Visual(T_link_geometry=Pose3.from_xyz_rpy(), geometry=Mesh(path=file))
     links = {**description.links, "base_link": replace(description.links["base_link"], visuals=(visual,))}
-    with pytest.raises(ConversionError, match=r"mesh 'arm\.dae' of link 'base_link' is not of a format"):
+    with pytest.raises(ConversionError, match=r"mesh 'arm\.dae' of link 'base_link' has no scene"):
         convert(replace(description, links=links))
 
 

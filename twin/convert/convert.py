@@ -17,12 +17,15 @@ from twin.convert.roles import roles_of
 from twin.convert.stand_ins import refuse_singular
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
+from twin.models.meshes import mesh_faults
 
 WORLD = "world"
 """A root link of this name means a robot that is bolted down."""
 
 
-def convert(description: RobotDescription, *, base: Base = "free", timestep: float = 0.002) -> Conversion:
+def convert(
+    description: RobotDescription, *, base: Base = "free", timestep: float = 0.002, visuals: bool = True
+) -> Conversion:
     """Return a robot as a MuJoCo model, built body by body (MuJoCo's URDF reader fuses links, drops visuals).
 
     Args:
@@ -30,11 +33,15 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         base: `free`: the root link has a free joint (a root named `world` is fixed all the same). `fixed`: it
             is welded to the world. `kinematic`: it is a mocap body, moved by whoever sets its pose.
         timestep: Of the simulation it is meant for [s]; bounds how stiff contacts may be.
+        visuals: False leaves out what is seen only, and does not read its meshes.
 
     Raises:
-        ConversionError: A moving part has no mass, a mesh has a format that MuJoCo cannot read, or MuJoCo
-            refuses the model.
+        ConversionError: A moving part has no mass, meshes cannot be read (all are named), or MuJoCo refuses
+            the model.
     """
+    faults = mesh_faults(description, visuals=visuals)
+    if faults:
+        raise ConversionError(faults)
     description, renamed = _without_world(description)
     if renamed and base == "free":
         base = "fixed"
@@ -48,7 +55,7 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
         spec,
         description,
         base=base,
-        geoms=GeomBuilder(spec, roles, timestep=timestep),
+        geoms=GeomBuilder(spec, roles, timestep=timestep, visuals=visuals),
         wheel_joints=wheel_joints,
     )
     add_excludes(spec, description)

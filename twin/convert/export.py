@@ -93,20 +93,14 @@ def _load(file: Path, description: RobotDescription) -> mujoco.MjModel:
 
 
 def _write_assets(spec: mujoco.MjSpec, folder: Path) -> list[str]:
-    """Copy meshes to names made of their content, and let `spec` refer to them."""
-    names: list[str] = []
+    """Write the meshes that `spec` holds in memory, each content once."""
     spec.meshdir = ASSETS
     spec.modelfiledir = str(folder)
-    for mesh in spec.meshes:
-        source = Path(mesh.file)
-        content = source.read_bytes()
-        name = f"{source.stem}-{hashlib.sha256(content).hexdigest()[:8]}{source.suffix.lower()}"
+    for name, content in spec.assets.items():
         target = folder / ASSETS / name
         target.parent.mkdir(exist_ok=True)
         target.write_bytes(content)
-        mesh.file = name
-        names.append(name)
-    return sorted(set(names))
+    return sorted(spec.assets)
 
 
 def _replace(new: Path, folder: Path) -> None:

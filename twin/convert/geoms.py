@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import mujoco
 
+from twin.convert.mesh_assets import mesh_asset
 from twin.convert.roles import Roles
-from twin.errors import ConversionError, Problem
 from twin.geometry import Pose3
 from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Link, Mesh, Sphere, Visual
 
 GROUP_VISUAL = 2
 GROUP_COLLISION = 3
-MESH_SUFFIXES = (".stl", ".obj", ".msh")
 STIFF_SOLREF_S = 0.004
 """Contact time constant of wheels and gripping surfaces [s]; at least two time steps.
 
@@ -28,22 +26,30 @@ TORSION, ROLLING = 0.005, 0.0001
 class GeomBuilder:
     """Adds a link's shapes to its body."""
 
-    def __init__(self, spec: mujoco.MjSpec, roles: Roles, *, timestep: float) -> None:
-        """Bind to the spec under construction; `timestep` [s] bounds how stiff a contact may be."""
+    def __init__(self, spec: mujoco.MjSpec, roles: Roles, *, timestep: float, visuals: bool = True) -> None:
+        """Bind to the spec under construction.
+
+        Args:
+            spec: Gets the meshes, and their files as assets, so that nothing is written to disk.
+            roles: What the links' contacts are for.
+            timestep: Bounds how stiff a contact may be [s].
+            visuals: False leaves out what is seen only, and does not read its meshes.
+        """
         self._spec = spec
         self._roles = roles
+        self._visuals = visuals
         self._stiff = [max(STIFF_SOLREF_S, 2.0 * timestep), 1.0]
-        self._meshes: dict[tuple[Path, tuple[float, float, float]], str] = {}
+        self._meshes: dict[Mesh, str] = {}
 
     def add(self, body: mujoco.MjsBody, link: Link) -> None:
         """Add all shapes of `link`.
 
         Raises:
-            ConversionError: A mesh has a format that MuJoCo does not read.
+            ModelError: A mesh cannot be read; `twin.models.meshes.mesh_faults` tells before.
         """
-        for visual in link.visuals:
+        for visual in link.visuals if self._visuals else ():
             body.add_geom(
-                **self._shape(visual, link),
+                **self._shape(visual),
                 rgba=visual.rgba,
                 group=GROUP_VISUAL,
                 contype=0,
@@ -59,7 +65,7 @@ class GeomBuilder:
             # A cylinder touches the floor along a line and scrubs when the robot turns.
             half = [geometry.radius, geometry.radius, geometry.length / 2.0]
             return {**_placed(collision.T_link_geometry), "type": _TYPE.mjGEOM_ELLIPSOID, "size": half}
-        return self._shape(collision, link)
+        return self._shape(collision)
 
     def _contact(self, link: Link) -> dict[str, Any]:
         contact: dict[str, Any] = {"group": GROUP_COLLISION, "density": 0.0}
@@ -77,33 +83,26 @@ class GeomBuilder:
             contact["solref"] = self._stiff
         return contact
 
-    def _shape(self, shape: Visual | Collision, link: Link) -> dict[str, Any]:
+    def _shape(self, shape: Visual | Collision) -> dict[str, Any]:
         placed = _placed(shape.T_link_geometry)
         if isinstance(shape.geometry, Mesh):
-            return {**placed, "type": _TYPE.mjGEOM_MESH, "meshname": self._mesh(shape.geometry, link)}
+            return {**placed, "type": _TYPE.mjGEOM_MESH, "meshname": self._mesh(shape.geometry)}
         kind, size = primitive(shape.geometry)
         return {**placed, "type": kind, "size": size}
 
-    def _mesh(self, mesh: Mesh, link: Link) -> str:
-        if mesh.path.suffix.lower() not in MESH_SUFFIXES:
-            readable = ", ".join(MESH_SUFFIXES)
-            message = (
-                f"mesh '{mesh.path.name}' of link '{link.name}' is not of a format MuJoCo reads: {readable}"
-            )
-            raise ConversionError(
-                Problem(message, mesh.path, code="mesh-format", element=f"link '{link.name}'")
-            )
-        key = (mesh.path, mesh.scale)
-        if key not in self._meshes:
+    def _mesh(self, mesh: Mesh) -> str:
+        if mesh not in self._meshes:
+            file, content = mesh_asset(mesh)
+            self._spec.assets[file] = content
             name = f"{mesh.path.stem}#{len(self._meshes)}"
             self._spec.add_mesh(
                 name=name,
-                file=str(mesh.path.resolve()),
-                scale=mesh.scale,
+                file=file,
+                scale=mesh.scale,  # MuJoCo turns the triangles of a mirrored mesh round
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a flat mesh has no volume
             )
-            self._meshes[key] = name
-        return self._meshes[key]
+            self._meshes[mesh] = name
+        return self._meshes[mesh]
 
 
 _TYPE = mujoco.mjtGeom

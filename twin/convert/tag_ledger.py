@@ -111,7 +111,7 @@ def _fate(element: Element, description: RobotDescription, roles: Roles) -> Fate
         return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
     parent, _, tag = path.rpartition("/")
     if tag in SHAPES and parent in ("link/visual/geometry", "link/collision/geometry"):
-        return _shape(element, parent, roles)
+        return _shape(element, parent, description, roles)
     return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
 
 
@@ -169,11 +169,24 @@ def _inertia(element: Element, description: RobotDescription) -> Fate:
     return FATES["link/inertial/inertia"]
 
 
-def _shape(element: Element, parent: str, roles: Roles) -> Fate:
+def _shape(element: Element, parent: str, description: RobotDescription, roles: Roles) -> Fate:
     link = next(element.iterancestors("link")).get("name")
-    if parent == "link/collision/geometry" and element.tag == "cylinder" and link in roles.wheels:
+    touched = parent == "link/collision/geometry"
+    if touched and element.tag == "cylinder" and link in roles.wheels:
         return "translated", "ellipsoid: a wheel touches in a point"
-    return SHAPE if element.tag != "mesh" else ("kept", "mesh in assets/")
+    return SHAPE if element.tag != "mesh" else _mesh(element, link, touched, description)
+
+
+def _mesh(element: Element, link: str, touched: bool, description: RobotDescription) -> Fate:
+    for skipped in description.skipped_meshes:
+        same = skipped.link == link and skipped.role == ("collision" if touched else "visual")
+        if same and skipped.reference == element.get("filename", "").strip():
+            return "dropped", f"the mesh {skipped.reason}"
+    return (
+        ("translated", "mesh in assets/; its convex hull is touched")
+        if touched
+        else ("kept", "mesh in assets/")
+    )
 
 
 def _gazebo(element: Element, path: str, description: RobotDescription) -> Fate:

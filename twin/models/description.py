@@ -60,6 +60,9 @@ class Mesh:
     path: Path
     """Resolved, existing file."""
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Along x, y, z; none is zero, negative ones mirror."""
+    apply_up_axis: bool = False
+    """Turn a COLLADA file as its `<up_axis>` says."""
 
 
 Geometry = Box | Cylinder | Sphere | Capsule | Mesh
@@ -97,6 +100,19 @@ class Collision:
     T_link_geometry: Pose3
     geometry: Geometry
     name: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkippedMesh:
+    """A shape that was left out, as its mesh is missing or unreadable and the options allow that."""
+
+    link: str
+    role: Literal["visual", "collision"]
+    reference: str
+    """The mesh as the file names it."""
+    reason: str
+    """Such as `does not exist`."""
     line: int = 0
 
 
@@ -287,6 +303,8 @@ class RobotDescription:
     """What was left out when the file was read."""
     lines: LineTable | None = field(default=None, repr=False)
     """Where the elements of `urdf` come from, if it is not the text of `source`."""
+    skipped_meshes: tuple[SkippedMesh, ...] = ()
+    """In file order."""
 
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""

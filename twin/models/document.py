@@ -11,6 +11,7 @@ from typing import Any
 from lxml import etree
 
 from twin.errors import ModelError, Problem
+from twin.models.description import SkippedMesh
 from twin.models.line_table import LineTable
 from twin.models.xml_text import scan
 
@@ -34,6 +35,8 @@ class Report:
     warnings: list[Problem] = field(default_factory=list)
     """What the robot can be used without."""
     _lines: dict[Element, int] = field(default_factory=dict, repr=False)
+    skipped_meshes: list[SkippedMesh] = field(default_factory=list)
+    """What the options allow to leave out."""
 
     def add(self, element: Element | None, message: str, *, code: str) -> None:
         """Note a problem of `element`; its `code` is one of `twin.models.checks.codes`."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from twin.errors import nearest
+from twin.errors import ModelError, nearest
 from twin.geometry import Array, Pose3
 from twin.models.description import (
     Box,
@@ -18,12 +18,14 @@ from twin.models.description import (
     Inertial,
     Link,
     Mesh,
+    SkippedMesh,
     Sphere,
     Surface,
     Visual,
 )
 from twin.models.document import Element, Report, describe, owner
 from twin.models.mass_properties import LEAST
+from twin.models.meshes import read_mesh
 from twin.models.options import ReadOptions
 from twin.models.packages import Packages
 from twin.models.resources import locate
@@ -72,15 +74,17 @@ def read_link(element: Element, context: LinkContext) -> Link:
     return Link(
         name=name,
         inertial=_read_inertial(inertials[0], name, report) if inertials else None,
-        visuals=tuple(_read_visual(child, context) for child in element.findall("visual")),
+        visuals=tuple(
+            _read_visual(child, found, context) for child, found in _shapes(element, "visual", context)
+        ),
         collisions=tuple(
             Collision(
                 T_link_geometry=read_origin(child, report),
-                geometry=_read_geometry(child, context),
+                geometry=found,
                 name=child.get("name", ""),
                 line=report.line(child),
             )
-            for child in element.findall("collision")
+            for child, found in _shapes(element, "collision", context)
         ),
         surface=context.surfaces.get(name, Surface()),
         line=report.line(element),
@@ -126,10 +130,18 @@ def _read_inertia(element: Element, report: Report) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _read_visual(element: Element, context: LinkContext) -> Visual:
+def _shapes(link: Element, role: str, context: LinkContext) -> Iterator[tuple[Element, Geometry]]:
+    """Yield the `<visual>` or `<collision>` elements that are not left out."""
+    for element in link.findall(role):
+        geometry = _read_geometry(element, context)
+        if geometry is not None:
+            yield element, geometry
+
+
+def _read_visual(element: Element, geometry: Geometry, context: LinkContext) -> Visual:
     return Visual(
         T_link_geometry=read_origin(element, context.report),
-        geometry=_read_geometry(element, context),
+        geometry=geometry,
         rgba=_read_material(element, context),
         name=element.get("name", ""),
         line=context.report.line(element),
@@ -161,7 +173,8 @@ def _rgba(color: Element, report: Report) -> Rgba:
     return (r, g, b, a)
 
 
-def _read_geometry(element: Element, context: LinkContext) -> Geometry:
+def _read_geometry(element: Element, context: LinkContext) -> Geometry | None:
+    """Return a shape: None is one to leave out, and one with a fault becomes a placeholder."""
     report = context.report
     placeholder = Sphere(radius=1.0)
     geometry = element.find("geometry")
@@ -174,7 +187,8 @@ def _read_geometry(element: Element, context: LinkContext) -> Geometry:
         return placeholder
     shape = geometry[0]
     if shape.tag == "mesh":
-        return _read_mesh(shape, context) or placeholder
+        mesh = _read_mesh(shape, context)
+        return placeholder if mesh is None and context.options.missing_mesh == "error" else mesh
     if shape.tag not in GEOMETRIES:
         report.add(
             shape,
@@ -210,13 +224,42 @@ def _dimensions(geometry: Box | Cylinder | Sphere | Capsule) -> tuple[float, ...
 
 
 def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
-    report = context.report
+    """Return the mesh; None if it is missing or, where the options allow that, unreadable."""
+    report, options = context.report, context.options
     reference = report.required(shape, "filename")
+    x, y, z = report.numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
+    if min(abs(x), abs(y), abs(z)) < THINNEST:
+        report.add(shape, f"mesh '{reference}' of {owner(shape)} has a scale of zero", code="bad-geometry")
     if not reference:
         return None
-    x, y, z = report.numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
     found = locate(reference, report.source, context.packages)
-    if found.path is None:
-        report.add(shape, f"mesh '{reference}' of {owner(shape)} {found.reason}", code=found.code)
-        return None
-    return Mesh(path=found.path, scale=(x, y, z))
+    reason = found.reason
+    if found.path is not None:
+        mesh = Mesh(path=found.path, scale=(x, y, z), apply_up_axis=options.apply_up_axis)
+        fault = _mesh_fault(mesh) if options.missing_mesh == "skip" else None
+        if fault is None:
+            return mesh
+        reason = fault
+    if options.missing_mesh == "skip":
+        _skip(shape, reference, reason, report)
+    else:
+        report.add(shape, f"mesh '{reference}' of {owner(shape)} {reason}", code=found.code)
+    return None
+
+
+def _mesh_fault(mesh: Mesh) -> str | None:
+    try:
+        read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
+    except ModelError as error:
+        return error.problems[0].message
+    return None
+
+
+def _skip(shape: Element, reference: str, reason: str, report: Report) -> None:
+    link = next(shape.iterancestors("link")).get("name", "")
+    element = next(shape.iterancestors("visual", "collision"))
+    report.skipped_meshes.append(
+        SkippedMesh(
+            link=link, role=element.tag, reference=reference, reason=reason, line=report.line(element)
+        )
+    )

@@ -91,6 +91,7 @@ def parse_urdf(
         sensors=read_sensors(root, links, report),
         warnings=tuple(dict.fromkeys(report.warnings)),
         lines=lines,
+        skipped_meshes=tuple(report.skipped_meshes),
     )
     if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
         _refuse_impossible(description, root, report)

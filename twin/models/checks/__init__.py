@@ -14,6 +14,7 @@ from twin.models.checks.inertia import impossible_inertia, inertia
 from twin.models.checks.limits import limits
 from twin.models.checks.masses import masses
 from twin.models.checks.materials import material_elsewhere
+from twin.models.checks.meshes import meshes
 from twin.models.checks.motors import weak_motor
 from twin.models.checks.poses import visual_collision
 from twin.models.checks.wheels import wheel_axis, wheel_fixed
@@ -25,6 +26,7 @@ Check = Callable[[RobotDescription], Iterator[Diagnostic]]
 
 CHECKS: tuple[Check, ...] = (
     masses,
+    meshes,
     wheel_axis,
     wheel_fixed,
     ground,

@@ -45,7 +45,8 @@ ERRORS: Mapping[str, str] = MappingProxyType(
         "bad-command": "correct <ros2_control>",
         "bad-sensor": "complete the <sensor>",
         "massless": "give it an <inertial>, or make the joint above it fixed",
-        "mesh-format": "export the mesh as binary STL or OBJ",
+        "mesh-format": "export the mesh as STL, OBJ or COLLADA, whole",
+        "bad-mesh": "repair or simplify the mesh",
         "mujoco": "change what MuJoCo names",
     }
 )
@@ -59,6 +60,7 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "base-on-ground": "a part that is no wheel and no caster rests on the ground beside the wheels",
         "wheels-off-ground": "something reaches lower than a wheel does",
         "few-supports": "the robot stands on fewer than three points",
+        "skipped-mesh": "a shape that was left out, as its mesh is missing or unreadable",
         "overlap": "collision shapes of links that no joint connects overlap at joint position zero",
         "visual-collision": "what is seen and what is touched are in different places",
         "inertia-too-large": "no mass distribution inside the link's shapes has this inertia",

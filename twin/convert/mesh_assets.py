@@ -1,0 +1,36 @@
+"""Mesh files as what MuJoCo reads: binary STL, OBJ and MSH stay as they are, others become binary STL."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+from twin.models.description import Mesh
+from twin.models.mesh_formats import write_msh, write_stl
+from twin.models.meshes import TriangleMesh, read_mesh
+
+MOST_STL_FACES = 200_000
+"""MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""
+_KEPT = {"stl": ".stl", "obj": ".obj", "msh": ".msh"}
+
+
+def mesh_asset(mesh: Mesh) -> tuple[str, bytes]:
+    """Return a name made of the content, and the content, the same bytes each time.
+
+    Raises:
+        ModelError: As by `read_mesh`.
+    """
+    triangles = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
+    suffix, content = _content(mesh.path, triangles)
+    return f"{mesh.path.stem}-{hashlib.sha256(content).hexdigest()[:8]}{suffix}", content
+
+
+@lru_cache(maxsize=128)
+def _content(path: Path, triangles: TriangleMesh) -> tuple[str, bytes]:
+    few = len(triangles.faces) <= MOST_STL_FACES
+    if triangles.format in _KEPT and (few or triangles.format != "stl"):
+        return _KEPT[triangles.format], path.read_bytes()
+    if few:
+        return ".stl", write_stl(triangles.points, triangles.faces)
+    return ".msh", write_msh(triangles.points, triangles.faces)

@@ -1,0 +1,167 @@
+"""STL, OBJ and MuJoCo's MSH: bytes to triangles, told apart by their content, not by the file's name.
+
+Formats: STL as of 3D Systems (1989), Wavefront OBJ, MSH as in MuJoCo's XML reference (`asset/mesh/file`).
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+
+Format = Literal["stl", "ascii-stl", "obj", "dae", "msh"]
+Faces = NDArray[np.int64]
+
+READABLE = "STL, OBJ and COLLADA (.dae)"
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+STL_HEADER = 84
+_SNIFFED = 4096
+_OTHERS = {
+    b"glTF": "glTF, of which RViz and Gazebo disagree which axis is up",
+    b"ply": "PLY",
+    b"Kaydara FBX": "FBX",
+    b"PK\x03\x04": "a zip archive",
+    b"version https://git-lfs": "a Git LFS pointer: the mesh itself was not fetched",
+}
+_OTHER_SUFFIXES = {".mesh": "an Ogre mesh", ".gltf": _OTHERS[b"glTF"]}
+_VERTEX = re.compile(rb"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", re.IGNORECASE | re.MULTILINE)
+
+
+def format_of(data: bytes, suffix: str) -> Format:
+    """Return the format of a mesh file.
+
+    Args:
+        data: All of the file.
+        suffix: Of its name; it decides only where the content does not.
+
+    Raises:
+        ValueError: It is of none that is read.
+    """
+    start = data[:_SNIFFED].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if not start:
+        raise ValueError("is empty")
+    for magic, name in _OTHERS.items():
+        if start.startswith(magic):
+            raise ValueError(f"is {name}; {READABLE} are read")
+    if start.startswith(b"<"):
+        return "dae"
+    if len(data) >= STL_HEADER and len(data) == STL_HEADER + _stl_count(data) * STL_TRIANGLE.itemsize:
+        return "stl"
+    if start[:5].lower() == b"solid" and b"\0" not in start:
+        return "ascii-stl"
+    if suffix == ".msh":
+        return "msh"
+    if suffix in _OTHER_SUFFIXES:
+        raise ValueError(f"is {_OTHER_SUFFIXES[suffix]}; {READABLE} are read")
+    if suffix == ".stl":
+        return "stl"
+    if b"\0" not in start and re.search(rb"^\s*v\s", data, re.MULTILINE):
+        return "obj"
+    raise ValueError(f"is no mesh of a known format; {READABLE} are read")
+
+
+def _stl_count(data: bytes) -> int:
+    return int.from_bytes(data[STL_HEADER - 4 : STL_HEADER], "little")
+
+
+def read_stl(data: bytes) -> tuple[Array, Faces]:
+    """Return the corners, shape (3 n, 3), and triangles of a binary STL file.
+
+    Raises:
+        ValueError: The file ends early.
+    """
+    count = _stl_count(data) if len(data) >= STL_HEADER else 0
+    needed = STL_HEADER + count * STL_TRIANGLE.itemsize
+    if len(data) < needed or not count:
+        raise ValueError(
+            f"is no whole STL file: its {len(data)} bytes tell of {count} triangles, which need {needed}"
+        )
+    triangles = np.frombuffer(data, STL_TRIANGLE, count, STL_HEADER)
+    return _loose(triangles["corners"].astype(np.float64))
+
+
+def read_ascii_stl(data: bytes) -> tuple[Array, Faces]:
+    """Return the corners, shape (3 n, 3), and triangles of an ASCII STL file.
+
+    Raises:
+        ValueError: The file ends early or holds no numbers.
+    """
+    corners = np.array(_VERTEX.findall(data)).astype(np.float64)
+    facets = len(re.findall(rb"\bendfacet\b", data, re.IGNORECASE))
+    whole = re.search(rb"\bendsolid\b", data[-_SNIFFED:], re.IGNORECASE)
+    if not len(corners) or len(corners) != 3 * facets or not whole:
+        raise ValueError(f"is no whole STL file: {facets} complete triangles, {len(corners)} corners")
+    return _loose(corners)
+
+
+def _loose(corners: Array) -> tuple[Array, Faces]:
+    corners = corners.reshape(-1, 3)
+    return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
+
+
+def read_obj(data: bytes) -> tuple[Array, Faces]:
+    """Return the points, shape (n, 3), and triangles of an OBJ file; polygons become fans.
+
+    Raises:
+        ValueError: A line is broken.
+    """
+    points: list[list[bytes]] = []
+    faces: list[tuple[int, int, int]] = []
+    for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), 1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            if words[0] == b"v":
+                x, y, z = words[1:4]
+                points.append([x, y, z])
+            elif words[0] == b"f":
+                first, *others = [_obj_index(word, len(points)) for word in words[1:]]
+                faces += [(first, *pair) for pair in pairwise(others)]
+        except ValueError:
+            shown = line.decode(errors="replace").strip()[:60]
+            raise ValueError(f"has a broken line {number}: '{shown}'") from None
+    return (
+        np.array(points).astype(np.float64).reshape(-1, 3),
+        np.array(faces, dtype=np.int64).reshape(-1, 3),
+    )
+
+
+def _obj_index(word: bytes, count: int) -> int:
+    """Return the index from 0 of a corner as `3`, `3/1`, `3//2` or, counted from the end, `-1`."""
+    index = int(word.partition(b"/")[0])
+    return index - 1 if index > 0 else count + index
+
+
+def read_msh(data: bytes) -> tuple[Array, Faces]:
+    """Return the points, shape (n, 3), and triangles of MuJoCo's own format.
+
+    Raises:
+        ValueError: The file has another size than its counts say.
+    """
+    counts = [int(value) for value in np.frombuffer(data[:16].ljust(16, b"\0"), "<i4")]
+    points, normals, texcoords, faces = counts
+    size = 16 + 12 * points + 12 * normals + 8 * texcoords + 12 * faces
+    if min(counts) < 0 or len(data) != size:
+        raise ValueError(f"is no whole MSH file: {len(data)} bytes, not {size}")
+    corners = np.frombuffer(data, "<f4", 3 * points, 16).astype(np.float64).reshape(-1, 3)
+    triangles = np.frombuffer(data, "<i4", 3 * faces, size - 12 * faces).astype(np.int64).reshape(-1, 3)
+    return corners, triangles
+
+
+def write_stl(points: Array, faces: Faces) -> bytes:
+    """Return a binary STL file, without normals, which no simulator reads."""
+    triangles = np.zeros(len(faces), STL_TRIANGLE)
+    triangles["corners"] = points[faces]
+    return bytes(STL_HEADER - 4) + len(faces).to_bytes(4, "little") + triangles.tobytes()
+
+
+def write_msh(points: Array, faces: Faces) -> bytes:
+    """Return a file of MuJoCo's own format, without normals and texture coordinates."""
+    counts = np.array([len(points), 0, 0, len(faces)], "<i4")
+    return counts.tobytes() + points.astype("<f4").tobytes() + faces.astype("<i4").tobytes()

@@ -1,0 +1,171 @@
+"""Mesh files as triangles, whatever their format, and what is wrong with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import ModelError, Problem
+from twin.geometry import Array
+from twin.models.dae import Rgb, read_dae
+from twin.models.description import Collision, Link, Mesh, RobotDescription, Visual
+from twin.models.mesh_formats import (
+    Faces,
+    Format,
+    format_of,
+    read_ascii_stl,
+    read_msh,
+    read_obj,
+    read_stl,
+)
+
+MOST_BYTES = 256 * 1024 * 1024
+MOST_FACES = 1_000_000
+FARTHEST = 1e6
+"""Largest coordinate [m], in the file and scaled; MuJoCo keeps meshes in single precision."""
+FLAT = 1e-6
+"""Thickness, relative to its size, up to which a mesh has no volume."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TriangleMesh:
+    """The surface in a mesh file."""
+
+    points: Array
+    """Shape (n, 3), in the file's axes [m, before the robot file's scale]; each is a corner of a triangle."""
+    faces: Faces
+    """Shape (m, 3), counter-clockwise seen from outside."""
+    format: Format
+    colour: Rgb | None = None
+    """Of most of the triangles; only COLLADA files tell."""
+
+
+def read_mesh(path: Path, *, apply_up_axis: bool = False) -> TriangleMesh:
+    """Return the triangles of an STL, OBJ, COLLADA or MSH file; the same object while the file is the same.
+
+    Args:
+        path: The file; its content decides on the format.
+        apply_up_axis: For COLLADA, see `twin.models.dae.read_dae`.
+
+    Raises:
+        ModelError: It cannot be read (code `mesh-format`) or holds no usable mesh (code `bad-mesh`).
+    """
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
+    if not path.is_file():
+        raise _fault(path, "is no file", code="mesh-format")
+    if status.st_size > MOST_BYTES:
+        raise _fault(path, f"has {status.st_size} bytes; at most {MOST_BYTES} are read", code="bad-mesh")
+    return _read(path, apply_up_axis, status.st_mtime_ns, status.st_size)
+
+
+def _fault(path: Path, message: str, *, code: str) -> ModelError:
+    return ModelError(Problem(message, path, code=code))
+
+
+@lru_cache(maxsize=128)
+def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> TriangleMesh:
+    try:
+        data = path.read_bytes()
+        kind = format_of(data, path.suffix.lower())
+        with np.errstate(over="ignore", invalid="ignore"):
+            points, faces, colour = _parse(data, kind, apply_up_axis)
+    except OSError as error:
+        raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
+    except (ValueError, OverflowError, RecursionError, MemoryError) as error:
+        raise _fault(path, " ".join(str(error).split()) or "is too complex", code="mesh-format") from None
+    flaw = _flaw(points, faces)
+    if flaw:
+        raise _fault(path, flaw, code="bad-mesh")
+    used, faces = np.unique(faces, return_inverse=True)
+    points, faces = points[used], faces.reshape(-1, 3)
+    points.flags.writeable = faces.flags.writeable = False  # it is shared
+    return TriangleMesh(points=points, faces=faces, format=kind, colour=colour)
+
+
+def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> tuple[Array, Faces, Rgb | None]:
+    if kind == "dae":
+        return read_dae(data, apply_up_axis=apply_up_axis, most_faces=MOST_FACES)
+    readers = {"stl": read_stl, "ascii-stl": read_ascii_stl, "obj": read_obj, "msh": read_msh}
+    return *readers[kind](data), None
+
+
+def _flaw(points: Array, faces: Faces) -> str | None:
+    if not len(faces):
+        return "has no triangles"
+    if len(faces) > MOST_FACES:
+        return f"has {len(faces)} triangles; at most {MOST_FACES} are read"
+    if faces.min() < 0 or faces.max() >= len(points):
+        return f"has a triangle between points that it does not have; there are {len(points)}"
+    used = points[faces.ravel()]
+    if not np.all(np.isfinite(used)):
+        return "has points that are not finite"
+    largest = float(np.max(np.abs(used)))
+    if largest > FARTHEST:
+        return f"reaches {largest:.3g} m far; at most {FARTHEST:g} m are read"
+    # Four different points are mostly among the first ones; sorting all takes long.
+    if not any(len(np.unique(some.astype(np.float32), axis=0)) >= 4 for some in (used[:64], used)):
+        return "has less than four different points"
+    return None
+
+
+def mesh_faults(description: RobotDescription, *, visuals: bool = True) -> tuple[Problem, ...]:
+    """Return what keeps the robot's meshes from being used, in file order; reads them all.
+
+    Args:
+        description: The robot.
+        visuals: Also look at the meshes that are seen only.
+    """
+    faults: dict[Problem, None] = {}
+    for link in description.links.values():
+        shapes: tuple[Visual | Collision, ...] = (*(link.visuals if visuals else ()), *link.collisions)
+        for shape in shapes:
+            if isinstance(shape.geometry, Mesh):
+                fault = _fault_of(shape, shape.geometry, link, description)
+                if fault is not None:
+                    faults[fault] = None
+    return tuple(faults)
+
+
+def _fault_of(
+    shape: Visual | Collision, mesh: Mesh, link: Link, description: RobotDescription
+) -> Problem | None:
+    try:
+        points = scaled_points(mesh)
+    except ModelError as error:
+        message, code = error.problems[0].message, error.problems[0].code
+    else:
+        if not isinstance(shape, Collision) or not is_flat(points):
+            return None
+        message, code = "is flat, and a thing to touch needs a volume; use a thin <box>", "bad-mesh"
+    return Problem(
+        f"mesh '{mesh.path.name}' of link '{link.name}' {message}",
+        description.source,
+        shape.line or None,
+        code=code,
+        element=f"link '{link.name}'",
+    )
+
+
+def scaled_points(mesh: Mesh) -> Array:
+    """Return the corners of a mesh in its own frame [m], shape (n, 3).
+
+    Raises:
+        ModelError: As by `read_mesh`.
+    """
+    points = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis).points * mesh.scale
+    largest = float(np.max(np.abs(points)))
+    if largest > FARTHEST:
+        raise _fault(mesh.path, f"reaches {largest:.3g} m far with its scale", code="bad-mesh")
+    return points
+
+
+def is_flat(points: Array) -> bool:
+    """Tell whether all points, shape (n, 3), lie in a plane."""
+    thickness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(thickness[2] <= FLAT * thickness[0])
