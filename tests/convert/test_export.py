@@ -172,15 +172,15 @@ LEDGER: dict[str, tuple[str, str]] = {
     "link 'base'/collision/contact_coefficients": ("dropped", "no counterpart"),
     "link 'base'/collision/origin": ("kept", "pose"),
     "gazebo 'wheel'/mu1": ("kept", "friction 0.5"),
-    "gazebo 'wheel'/mu2": ("dropped", "same in every direction"),
-    "gazebo 'wheel'/kp": ("dropped", "no counterpart"),
+    "gazebo 'wheel'/mu2": ("kept", "same in every direction"),
+    "gazebo 'wheel'/kp": ("dropped", "not in N/m"),
     "gazebo/plugin": ("translated", "velocity actuators"),
     "gazebo/plugin/left_joint": ("translated", "actuator"),
     "gazebo/plugin/wheel_radius": ("dropped", "drive controller"),
     "sensor 'eye'": ("dropped", "not simulated"),
-    "transmission": ("dropped", "no counterpart"),
-    "transmission/type": ("dropped", "no counterpart"),
-    "material": ("kept", "rgba"),
+    "transmission": ("dropped", "names 0 joints"),
+    "transmission/type": ("dropped", "names 0 joints"),
+    "material": ("dropped", "nothing uses it"),
 }
 
 

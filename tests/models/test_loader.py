@@ -125,10 +125,6 @@ FAULTS = {
         "<ros2_control><joint name='j'><command_interface name='position'/></joint></ros2_control>",
         "<ros2_control> commands joint 'j', which is fixed",
     ),
-    "sensor on no link": (
-        "<gazebo reference='c'><sensor name='s' type='imu'/></gazebo>",
-        "sensor 's' is on link 'c', which does not exist",
-    ),
 }
 
 

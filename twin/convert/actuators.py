@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
 from twin.convert.conversion import LedgerEntry
-from twin.models.description import CommandSpec, DriveSpec, Joint, RobotDescription
-from twin.models.kinematics import ONE_DIMENSIONAL
+from twin.convert.roles import commanded_wheels
+from twin.models.checks.wheels import Wheel
+from twin.models.description import CommandSpec, Joint, RobotDescription
+from twin.models.document import LARGEST
+from twin.models.kinematics import ONE_DOF
 
 WHEEL_KV = 5.0
 """Least gain of a wheel's velocity servo [Nm s/rad]."""
@@ -34,54 +39,58 @@ def add_actuators(
         if spec.actuator(command.joint) is None:
             entries.append(_add_commanded(spec, description, command, model))
     for joint in description.joints.values():
-        if joint.mimic is not None:
-            _add_follower(spec, joint, description.joints[joint.mimic.joint], timestep)
+        if joint.mimic is not None and joint.type in ONE_DOF:
+            leader = description.joints[joint.mimic.joint]
+            _add_follower(spec, joint, timestep, leader=leader.name if leader.type in ONE_DOF else "")
     return entries
 
 
 def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[LedgerEntry]:
-    drive = description.drive
-    if drive is None:
+    wheels = commanded_wheels(description)
+    if not wheels:
         return []
-    wheels = (*drive.left_joints, *drive.right_joints)
-    gain = _wheel_gain(description, drive, len(wheels))
-    for name in wheels:
-        actuator = _add(spec, description.joints[name])
+    drive = description.drive
+    gain = _wheel_gain(description, wheels)
+    for wheel in wheels:
+        joint = wheel.joint
+        driven = drive is not None and joint.name in (*drive.left_joints, *drive.right_joints)
+        actuator = _add(spec, joint)
         actuator.set_to_velocity(gain)
-        _limit_force(actuator, drive.max_wheel_torque)
-        velocity = description.joints[name].limit.velocity
-        if velocity:
-            actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
-            actuator.ctrlrange = [-velocity, velocity]
-    note = f"velocity actuators, gain {gain:.3g} Nm s/rad"
-    return [LedgerEntry(element=f"wheels of the {drive.kind}", outcome="guessed", note=note)]
+        _limit_force(actuator, drive.max_wheel_torque if drive and driven else joint.limit.effort)
+        speed = joint.limit.velocity
+        _limit_command(actuator, description.commands.get(joint.name), *((-speed, speed) if speed else ()))
+    of = "commanded wheels" if drive is None else f"wheels of the {drive.kind}"
+    return [LedgerEntry(element=of, outcome="guessed", note=f"velocity actuators, gain {gain:.3g} Nm s/rad")]
 
 
-def _wheel_gain(description: RobotDescription, drive: DriveSpec, wheels: int) -> float:
+def _wheel_gain(description: RobotDescription, wheels: tuple[Wheel, ...]) -> float:
     masses = [link.inertial.mass for link in description.links.values() if link.inertial is not None]
-    return max(WHEEL_KV, sum(masses) * drive.wheel_radius**2 / wheels / WHEEL_TIME_CONSTANT_S)
+    radius = max(wheel.radius for wheel in wheels)
+    return max(WHEEL_KV, sum(masses) * radius**2 / len(wheels) / WHEEL_TIME_CONSTANT_S)
 
 
 def _add_commanded(
     spec: mujoco.MjSpec, description: RobotDescription, command: CommandSpec, model: mujoco.MjModel
 ) -> LedgerEntry:
     joint = description.joints[command.joint]
+    limit = joint.limit
     actuator = _add(spec, joint)
-    _limit_force(actuator, joint.limit.effort)
+    _limit_force(actuator, limit.effort)
     inertia = moved_inertia(description, joint, model)
     if command.interface == "effort":
         actuator.set_to_motor()
+        _limit_command(actuator, command)
         note = "motor"
     elif command.interface == "velocity":
         gain = inertia / WHEEL_TIME_CONSTANT_S
         actuator.set_to_velocity(gain)
+        _limit_command(actuator, command)
         note = f"velocity actuator, gain {gain:.3g}"
     else:
         stiffness, damping = inertia * SERVO_BANDWIDTH**2, 2.0 * inertia * SERVO_BANDWIDTH
         actuator.set_to_position(stiffness, damping)
-        if joint.limit.lower is not None and joint.limit.upper is not None:
-            actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
-            actuator.ctrlrange = [joint.limit.lower, joint.limit.upper]
+        known = limit.lower is not None and limit.upper is not None
+        _limit_command(actuator, command, *((limit.lower, limit.upper) if known else ()))
         note = f"position actuator, stiffness {stiffness:.3g}, critically damped"
     element = f"command interface {command.interface} of joint '{joint.name}'"
     return LedgerEntry(
@@ -97,7 +106,7 @@ def moved_inertia(description: RobotDescription, joint: Joint, model: mujoco.MjM
         while leader.mimic is not None:
             share *= leader.mimic.multiplier
             leader = description.joints[leader.mimic.joint]
-        if leader.name == joint.name and other.type != "fixed":
+        if leader.name == joint.name and other.type in ONE_DOF:
             speed[model.joint(other.name).dofadr[0]] = share
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -116,14 +125,34 @@ def _limit_force(actuator: mujoco.MjsActuator, effort: float | None) -> None:
         actuator.forcerange = [-effort, effort]
 
 
-def _add_follower(spec: mujoco.MjSpec, joint: Joint, leader: Joint, timestep: float) -> None:
+def _limit_command(
+    actuator: mujoco.MjsActuator,
+    command: CommandSpec | None,
+    lower: float | None = None,
+    upper: float | None = None,
+) -> None:
+    """Limit commands to what both the joint and its command interface allow."""
+    low, high = (-math.inf if lower is None else lower), (math.inf if upper is None else upper)
+    if command is not None:
+        low = low if command.lower is None else max(low, command.lower)
+        high = high if command.upper is None else min(high, command.upper)
+    if math.isinf(low) and math.isinf(high):
+        return
+    low, high = max(low, -LARGEST), min(high, LARGEST)
+    if low < high:
+        actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.ctrlrange = [low, high]
+
+
+def _add_follower(spec: mujoco.MjSpec, joint: Joint, timestep: float, *, leader: str) -> None:
+    """Let a joint follow `leader`, or stand at its offset if it has none that moves."""
     assert joint.mimic is not None
     equality = spec.add_equality(
         name=f"{joint.name}_mimic",
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=joint.name,
-        name2=leader.name if leader.type in ONE_DIMENSIONAL else "",  # none: it is held at its offset
+        name2=leader,
         solref=[max(0.004, 2.0 * timestep), 1.0],
         solimp=FOLLOWER_SOLIMP,
     )

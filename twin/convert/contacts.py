@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import combinations, product
 
 import mujoco
 import numpy as np
@@ -15,20 +15,36 @@ _TYPE = mujoco.mjtGeom
 
 
 def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
-    """Exclude contacts between rigid groups that a joint connects.
+    """Exclude contacts between rigid groups that a joint connects, and of links that shall not touch others.
 
-    MuJoCo has such a filter itself, but not towards a group that is welded to the world.
+    MuJoCo has the first filter itself, but not towards a group that is welded to the world.
     """
     heads = rigid_groups(description)
     solid: dict[str, list[str]] = {head: [] for head in heads.values()}
     for name, link in description.links.items():
         if link.collisions:
             solid[heads[name]].append(name)
+    pairs: dict[frozenset[str], tuple[str, str]] = {}
     for joint in description.joints.values():
-        if joint.type == "fixed":
-            continue
-        for parent, child in product(solid[heads[joint.parent]], solid[heads[joint.child]]):
-            spec.add_exclude(name=f"{parent}~{child}", bodyname1=parent, bodyname2=child)
+        if joint.type != "fixed":
+            for pair in product(solid[heads[joint.parent]], solid[heads[joint.child]]):
+                pairs.setdefault(frozenset(pair), pair)
+    for pair in combinations([name for group in solid.values() for name in group], 2):
+        if heads[pair[0]] != heads[pair[1]] and not may_touch(description, *pair):
+            pairs.setdefault(frozenset(pair), pair)
+    for one, other in pairs.values():
+        spec.add_exclude(name=f"{one}~{other}", bodyname1=one, bodyname2=other)
+
+
+def may_touch(description: RobotDescription, link: str, other: str) -> bool:
+    """Tell whether two links touch each other, as SDFormat's self_collide says: if one of them wants to.
+
+    In Gazebo links that say nothing do not; here they do, as nobody builds a robot whose parts pass through
+    each other.
+    """
+    said = [description.links[name].surface.self_collide for name in (link, other)]
+    wishes = [description.self_collide if wish is None else wish for wish in said]
+    return True in wishes or False not in wishes
 
 
 def spawn_height(model: mujoco.MjModel) -> float:

@@ -11,6 +11,7 @@ from twin.convert.actuators import add_actuators
 from twin.convert.bodies import Base, add_bodies
 from twin.convert.contacts import add_excludes, spawn_height
 from twin.convert.conversion import Conversion, LedgerEntry
+from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
 from twin.convert.roles import roles_of
@@ -30,8 +31,9 @@ def convert(
 
     Args:
         description: The robot.
-        base: `free`: the root link has a free joint (a root named `world` is fixed all the same). `fixed`: it
-            is welded to the world. `kinematic`: it is a mocap body, moved by whoever sets its pose.
+        base: `free`: the root link has a free joint (a root named `world`, or of a robot that is static, is
+            fixed all the same). `fixed`: it is welded to the world. `kinematic`: it is a mocap body, moved by
+            whoever sets its pose.
         timestep: Of the simulation it is meant for [s]; bounds how stiff contacts may be.
         visuals: False leaves out what is seen only, and does not read its meshes.
 
@@ -43,22 +45,21 @@ def convert(
     if faults:
         raise ConversionError(faults)
     description, renamed = _without_world(description)
-    if renamed and base == "free":
+    if (renamed or description.static) and base == "free":
         base = "fixed"
     roles = roles_of(description)
     spec = mujoco.MjSpec()
     spec.modelname = description.name
     spec.compiler.degree = False
-    drive = description.drive
-    wheel_joints = frozenset(() if drive is None else (*drive.left_joints, *drive.right_joints))
     root_joint = add_bodies(
         spec,
         description,
         base=base,
         geoms=GeomBuilder(spec, roles, timestep=timestep, visuals=visuals),
-        wheel_joints=wheel_joints,
+        wheel_joints=roles.wheel_joints,
     )
     add_excludes(spec, description)
+    add_extensions(spec, description)
     model = _compile(spec, description)
     refuse_singular(model, description)
     entries = add_actuators(spec, description, model, timestep=timestep)
@@ -95,6 +96,9 @@ def _without_world(description: RobotDescription) -> tuple[RobotDescription, lis
         for key, joint in description.joints.items()
     }
     sensors = tuple(replace(s, link=name) if s.link == WORLD else s for s in description.sensors)
+    cameras = tuple(replace(c, link=name) if c.link == WORLD else c for c in description.cameras)
     note = f"body '{name}'; MuJoCo has a body '{WORLD}' of its own"
     entry = LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)
-    return replace(description, root=name, links=links, joints=joints, sensors=sensors), [entry]
+    return replace(description, root=name, links=links, joints=joints, sensors=sensors, cameras=cameras), [
+        entry
+    ]

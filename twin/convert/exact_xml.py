@@ -21,7 +21,12 @@ JOINT = {
     "damping": "damping",
     "frictionloss": "frictionloss",
     "armature": "armature",
+    "stiffness": "stiffness",
+    "springref": "springref",
 }
+SITE = {"pos": "pos", "quat": "quat"}
+CAMERA = {"pos": "pos", "quat": "quat", "fovy": "fovy"}
+SENSOR = {"cutoff": "cutoff", "noise": "noise"}
 EQUALITY = {"polycoef": "data"}
 ACTUATOR = {
     "ctrlrange": "ctrlrange",
@@ -61,8 +66,14 @@ def _sources(
             yield geom, source, GEOM
         for joint in element.iterfind("joint"):
             yield joint, spec.joint(joint.get("name")), JOINT
+        for site in element.iterfind("site"):
+            yield site, spec.site(site.get("name")), SITE
+        for camera in element.iterfind("camera"):
+            yield camera, spec.camera(camera.get("name")), CAMERA
     for element in root.iterfind("equality/joint"):
         yield element, spec.equality(element.get("name")), EQUALITY
+    for element in root.iterfind("sensor/*"):
+        yield element, spec.sensor(element.get("name")), SENSOR
     for element in root.iterfind("actuator/general"):
         yield element, spec.actuator(element.get("name")), ACTUATOR
 

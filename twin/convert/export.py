@@ -20,6 +20,7 @@ from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
 from twin.convert.roles import roles_of
 from twin.convert.self_check import SelfCheck, self_check
+from twin.convert.sensors import add_sensors
 from twin.convert.tag_ledger import counts, tag_ledger
 from twin.errors import ConversionError, Problem
 from twin.models.checks import Diagnostic
@@ -54,6 +55,7 @@ def export(
         set_options(spec)
     if conversion.root_joint is not None:
         spec.body(conversion.description.root).pos = [0.0, 0.0, conversion.spawn_height]
+    sensors = add_sensors(spec, conversion.description)
     folder.parent.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     try:
@@ -63,7 +65,7 @@ def export(
         checked = self_check(model, conversion.description)
         if not checked.passed:
             raise ConversionError(f"{description.source}: the model differs from the file: {checked}")
-        report = _report(description, conversion, model, assets, checked)
+        report = _report(description, conversion, model, assets, checked) | {"sensors": sensors}
         text = json.dumps(report, indent=2, ensure_ascii=False) + "\n"
         (staging / REPORT).write_text(text, encoding="utf-8")
         staging.chmod(0o755)  # mkdtemp's 0700 would lock out other users
@@ -138,6 +140,7 @@ def _report(
             for name, joint in description.joints.items()
         ],
         "actuators": [model.actuator(index).name for index in range(model.nu)],
+        "drive": None if description.drive is None else asdict(description.drive),
         "assets": assets,
         "self_check": {"passed": checked.passed, **asdict(checked)},
         "diagnostics": [diagnostic_json(item) for item in inspect_robot(description)],

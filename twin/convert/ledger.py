@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from twin.convert.command_fates import CommandFates
 from twin.convert.conversion import LedgerEntry, Outcome
+from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.roles import Roles
 from twin.models.description import Joint, Link, RobotDescription
 from twin.models.document import Report, parse
 
-KNOWN = {"link", "joint", "material", "gazebo", "ros2_control"}
-"""Top-level elements that the loader reads; of `<gazebo>` only the parts below."""
-READ_SENSORS = {"gpu_lidar", "lidar", "ray", "gpu_ray", "sonar", "ray-cone", "imu", "contact"}
-READ_IN_GAZEBO = {"sensor", "plugin", "mu1", "mu2", "collision"}
+KNOWN = {"link", "joint", "material", "gazebo", "ros2_control", "transmission"}
+"""Top-level elements that the loader reads."""
 
 
 def describe_conversion(description: RobotDescription, roles: Roles, base: str) -> list[LedgerEntry]:
@@ -72,17 +72,20 @@ def _joint(joint: Joint) -> Iterator[LedgerEntry]:
 
 def _dropped(description: RobotDescription) -> Iterator[LedgerEntry]:
     root = parse(description.urdf.encode(), Report(description.source))
+    commands = CommandFates(root, description)
     for element in root:
         name = element.get("name") or element.get("reference") or ""
-        if element.tag not in KNOWN:
+        if element.tag == "transmission":
+            outcome, note = commands.of(element)
+            yield _entry(f"<transmission> '{name}'", outcome, note)
+        elif element.tag not in KNOWN:
             yield _entry(f"<{element.tag}> '{name}'", "dropped", "not part of the simulation")
-        if element.tag != "gazebo":
-            continue
-        for child in element:
-            if child.tag not in READ_IN_GAZEBO:
-                yield _entry(f"<{child.tag}> of gazebo '{name}'", "dropped", "no counterpart")
-            elif child.tag == "sensor" and child.get("type") not in READ_SENSORS:
-                yield _entry(f"sensor '{child.get('name')}'", "dropped", f"type {child.get('type')}")
+        for child in element if element.tag == "gazebo" else ():
+            outcome, note = gazebo_fate(child, description)
+            if outcome == "dropped":
+                named = child.tag == "sensor"
+                kind = f"sensor '{child.get('name')}'" if named else f"<{child.tag}> of gazebo '{name}'"
+                yield _entry(kind, "dropped", note)
 
 
 def _entry(element: str, outcome: Outcome, note: str) -> LedgerEntry:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twin.models.checks.wheels import Wheel, wheels_of
 from twin.models.description import RobotDescription
 
 
@@ -12,7 +13,9 @@ class Roles:
     """Links with contact parameters of their own."""
 
     wheels: frozenset[str]
-    """Links that the drive turns."""
+    """Links that a motor turns as wheels."""
+    wheel_joints: frozenset[str]
+    """The joints above them."""
     gripping: frozenset[str]
     """Links that a commanded joint presses against things: they have a declared friction."""
     skid_steer: bool
@@ -21,15 +24,35 @@ class Roles:
 def roles_of(description: RobotDescription) -> Roles:
     """Return the roles of a robot's links."""
     drive = description.drive
-    turned = () if drive is None else (*drive.left_joints, *drive.right_joints)
-    wheels = frozenset(description.joints[name].child for name in turned)
+    driven = commanded_wheels(description)
+    wheels = frozenset(wheel.link for wheel in driven)
     gripping = frozenset(
         name
         for name, link in description.links.items()
         if (link.surface.friction or 0.0) > 0.0 and name not in wheels and _is_commanded(description, name)
     )
-    skid_steer = drive is not None and drive.kind == "skid_steer"
-    return Roles(wheels=wheels, gripping=gripping, skid_steer=skid_steer)
+    return Roles(
+        wheels=wheels,
+        wheel_joints=frozenset(wheel.joint.name for wheel in driven),
+        gripping=gripping,
+        # without a drive plugin, more than two wheels cannot all roll round a curve
+        skid_steer=len(driven) > 2 if drive is None else drive.kind == "skid_steer",
+    )
+
+
+def commanded_wheels(description: RobotDescription) -> tuple[Wheel, ...]:
+    """Return the wheels of the drive, left ones first, then others with a velocity command."""
+    drive = description.drive
+    order = () if drive is None else (*drive.left_joints, *drive.right_joints)
+    known = {wheel.joint.name: wheel for wheel in wheels_of(description)}
+    others = [
+        wheel
+        for name, wheel in known.items()
+        if name not in order
+        and name in description.commands
+        and description.commands[name].interface == "velocity"
+    ]
+    return (*(known[name] for name in order), *others)
 
 
 def _is_commanded(description: RobotDescription, link: str) -> bool:

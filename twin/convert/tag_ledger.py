@@ -8,19 +8,19 @@ from types import MappingProxyType
 
 import numpy as np
 
+from twin.convert.command_fates import CommandFates
 from twin.convert.conversion import Outcome
 from twin.convert.convert import WORLD
-from twin.convert.ledger import READ_SENSORS
+from twin.convert.fates import Fate, lost_attributes
+from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.roles import Roles
 from twin.models.checks.source import is_repeated, number, read_source
 from twin.models.description import RobotDescription
 from twin.models.document import Element, place
-from twin.models.gazebo import LEFT, RIGHT
+from twin.models.kinematics import ONE_DOF
 
-Fate = tuple[Outcome, str]
 POSE: Fate = ("kept", "pose")
 SHAPE: Fate = ("kept", "geom")
-TORQUES = ("max_wheel_torque", "wheelTorque", "torque")
 
 FATES: Mapping[str, Fate] = MappingProxyType(
     {
@@ -45,7 +45,6 @@ FATES: Mapping[str, Fate] = MappingProxyType(
         "joint/origin": ("kept", "pose of the child's body"),
         "joint/parent": ("kept", "nesting of bodies"),
         "joint/child": ("kept", "nesting of bodies"),
-        "joint/mimic": ("translated", "joint equality"),
         "joint/calibration": ("dropped", "a simulated joint needs none"),
         "joint/safety_controller": ("dropped", "a matter of the controller"),
     }
@@ -69,11 +68,15 @@ class TagEntry:
 def tag_ledger(description: RobotDescription, roles: Roles) -> tuple[TagEntry, ...]:
     """Return one entry for every element of the robot's text, in its order."""
     root, report = read_source(description)
-    return tuple(
-        TagEntry(line=report.line(element) or None, element=_name(element), outcome=outcome, note=note)
-        for element in root.iter()
-        for outcome, note in [_fate(element, description, roles)]
-    )
+    fates = _Fates(root, description, roles)
+    entries = []
+    for element in root.iter():
+        outcome, note = fates.of(element)
+        if outcome != "dropped":
+            note += "".join(f"; {name}= is dropped" for name in lost_attributes(element))
+        line = report.line(element) or None
+        entries.append(TagEntry(line=line, element=_name(element), outcome=outcome, note=note))
+    return tuple(entries)
 
 
 def _path(element: Element) -> str:
@@ -94,25 +97,57 @@ def _name(element: Element) -> str:
     return inside if owner == "robot" else (f"{owner}/{inside}" if inside else owner)
 
 
-def _fate(element: Element, description: RobotDescription, roles: Roles) -> Fate:
-    path = _path(element)
-    if is_repeated(element):
-        return "dropped", f"the first <{element.tag}> counts"
-    area = path.partition("/")[0]
-    if area == "gazebo":
-        return _gazebo(element, path, description)
-    if area == "ros2_control":
-        return _ros2_control(element, path, description)
-    if area == "joint" and path in ("joint", "joint/axis", "joint/limit", "joint/dynamics"):
-        return _joint(element, path, description)
-    if path == "link/inertial/inertia":
-        return _inertia(element, description)
-    if path == "link" and element.get("name") == WORLD:
-        return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
-    parent, _, tag = path.rpartition("/")
-    if tag in SHAPES and parent in ("link/visual/geometry", "link/collision/geometry"):
-        return _shape(element, parent, description, roles)
-    return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
+class _Fates:
+    """Knows of each element of a robot's text what became of it."""
+
+    def __init__(self, root: Element, description: RobotDescription, roles: Roles) -> None:
+        self._description = description
+        self._roles = roles
+        self._commands = CommandFates(root, description)
+        self._used = {element.get("name") for element in root.iterfind("link/visual/material")}
+        self._defined: dict[str, Element] = {}
+        for element in root.iter("material"):
+            if element.find("color") is not None:
+                self._defined.setdefault(element.get("name", ""), element)
+
+    def of(self, element: Element) -> Fate:
+        """Return the fate of one element."""
+        path = _path(element)
+        for item in (element, *element.iterancestors()):
+            if is_repeated(item):
+                return "dropped", f"the first <{item.tag}> counts"
+        area = path.partition("/")[0]
+        if area == "gazebo":
+            return gazebo_fate(element, self._description)
+        if area in ("ros2_control", "transmission"):
+            return self._commands.of(element)
+        if path in ("joint", "joint/axis", "joint/limit", "joint/dynamics", "joint/mimic"):
+            return _joint(element, path, self._description)
+        if path == "link/inertial/inertia":
+            return _inertia(element, self._description)
+        if path == "link" and element.get("name") == WORLD:
+            return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
+        if "material" in path.split("/"):
+            return self._material(element, path)
+        parent, _, tag = path.rpartition("/")
+        if tag in SHAPES and parent in ("link/visual/geometry", "link/collision/geometry"):
+            return _shape(element, parent, self._description, self._roles)
+        return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
+
+    def _material(self, element: Element, path: str) -> Fate:
+        if path not in FATES:
+            return "dropped", "no counterpart in MuJoCo"
+        material = element if element.tag == "material" else element.getparent()
+        if path.startswith("link"):
+            if material.find("color") is None and material.get("name") not in self._defined:
+                return "dropped", "it has no colour; shapes have no textures"
+        elif material.get("name") not in self._used:
+            return "dropped", "nothing uses it"
+        elif material.find("color") is not None and self._defined[material.get("name")] is not material:
+            return "dropped", "the first definition of this name counts"
+        elif material.find("color") is None:
+            return "dropped", "it has no colour; shapes have no textures"
+        return FATES[path]
 
 
 def _joint(element: Element, path: str, description: RobotDescription) -> Fate:
@@ -126,6 +161,14 @@ def _joint(element: Element, path: str, description: RobotDescription) -> Fate:
         return "kept", kinds.get(joint.type, "hinge")
     if joint.type in ("fixed", "floating"):
         return "dropped", f"a {joint.type} joint has none"
+    if path == "joint/mimic":
+        if joint.type not in ONE_DOF or joint.mimic is None:
+            return "dropped", f"not for {joint.type} joints"
+        leads = description.joints[joint.mimic.joint].type in ONE_DOF
+        return (
+            "translated",
+            "joint equality" if leads else "joint equality with its offset: its leader is fixed",
+        )
     if path == "joint/axis":
         given = np.array([float(word) for word in element.get("xyz").split()])
         if np.allclose(given, joint.axis, rtol=0.0, atol=1e-12):
@@ -187,53 +230,6 @@ def _mesh(element: Element, link: str, touched: bool, description: RobotDescript
         if touched
         else ("kept", "mesh in assets/")
     )
-
-
-def _gazebo(element: Element, path: str, description: RobotDescription) -> Fate:
-    container = element if element.tag == "gazebo" else next(element.iterancestors("gazebo"))
-    link = description.links.get(container.get("reference", ""))
-    if path in ("gazebo/mu1", "gazebo/collision/surface/friction/ode/mu"):
-        if link is not None and link.collisions and link.surface.friction is not None:
-            return "kept", f"friction {link.surface.friction:g}, whatever it touches"
-        return "dropped", "its link has no collision shape"
-    if path == "gazebo/mu2":
-        return "dropped", "friction is the same in every direction"
-    sensors = [element, *element.iterancestors()]
-    sensor = next((item for item in sensors if item.tag == "sensor"), None)
-    if sensor is not None:
-        known = sensor.get("type") in READ_SENSORS
-        return "dropped", "not part of the MJCF; twin simulates it itself" if known else "not simulated"
-    if path.startswith("gazebo/plugin") and description.drive is not None:
-        return _plugin(element, path)
-    if path == "gazebo" and any(
-        _gazebo(child, _path(child), description)[0] != "dropped" for child in element
-    ):
-        return "translated", "see what is inside"
-    return "dropped", "no counterpart in MuJoCo"
-
-
-def _plugin(element: Element, path: str) -> Fate:
-    if path == "gazebo/plugin":
-        drives = any(child.tag in (*LEFT, *RIGHT) for child in element)
-        return ("translated", "velocity actuators") if drives else ("dropped", "not simulated")
-    if element.tag in (*LEFT, *RIGHT):
-        return "translated", "velocity actuator of the joint's name"
-    if element.tag in TORQUES:
-        return "translated", "forcerange of the wheels' actuators"
-    return "dropped", "the drive controller's; not part of the MJCF"
-
-
-def _ros2_control(element: Element, path: str, description: RobotDescription) -> Fate:
-    if path == "ros2_control":
-        return ("translated", "actuators") if description.commands else ("dropped", "commands no joint")
-    if path == "ros2_control/joint":
-        commanded = element.get("name") in description.commands
-        return ("translated", "actuator") if commanded else ("dropped", "it is not commanded")
-    if path == "ros2_control/joint/command_interface":
-        if element.getparent().find("command_interface") is element:
-            return "translated", f"actuator for {element.get('name')}"
-        return "dropped", "the first command interface of a joint counts"
-    return "dropped", "a matter of the hardware"
 
 
 def counts(entries: Iterable[TagEntry]) -> dict[str, int]:

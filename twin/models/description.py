@@ -122,7 +122,23 @@ class Surface:
 
     friction: float | None = None
     """Coulomb coefficient, from mu1."""
+    friction2: float | None = None
+    """In the second direction, from mu2; no effect, as MuJoCo's friction is the same in every direction."""
+    gravity: bool = True
+    """False for a link that gravity does not pull, from turnGravityOff or gravity."""
+    self_collide: bool | None = None
+    """Whether it touches the robot's other links; None means that the file does not say."""
     line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    """A spring in a joint, from `<gazebo reference="joint">`."""
+
+    stiffness: float
+    """[Nm/rad] or [N/m]"""
+    reference: float = 0.0
+    """Position without force [rad] or [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,6 +200,10 @@ class Joint:
     line: int = 0
 
 
+Interface = Literal["position", "velocity", "effort"]
+"""Of ros2_control: [rad or m], [rad/s or m/s], [Nm or N]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class DriveSpec:
     """A wheeled drive, from the diff-drive or skid-steer plugin in `<gazebo>`."""
@@ -212,10 +232,14 @@ class DriveSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class CommandSpec:
-    """How a joint is commanded, from `<ros2_control>` (wheels of a drive need none)."""
+    """How a joint is commanded, from `<ros2_control>` or `<transmission>` (wheels of a drive need none)."""
 
     joint: str
-    interface: Literal["position", "velocity", "effort"]
+    interface: Interface
+    lower: float | None = None
+    """Least command that `<param name='min'>` allows, in the interface's unit."""
+    upper: float | None = None
+    """Largest command."""
     line: int = 0
 
 
@@ -229,6 +253,8 @@ class SensorSpec:
     topic: str
     """Relative ROS name, such as `scan`."""
     rate_hz: float
+    T_link_sensor: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
+    """From the sensor's `<pose>`; `twin.sim` samples at the link's origin."""
     line: int = 0
 
 
@@ -281,6 +307,26 @@ class ContactSpec(SensorSpec):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CameraSpec(SensorSpec):
+    """A camera that looks along +x of its link with +z up, as Gazebo's do; `twin.sim` renders none."""
+
+    horizontal_fov: float
+    """Full angle [rad]."""
+    width: int
+    """[pixels]"""
+    height: int
+    """[pixels]"""
+    near: float
+    """Clipping distance [m]."""
+    far: float
+    """Clipping distance [m]."""
+    noise_stddev: float = 0.0
+    """Of a pixel's value, from 0 to 1."""
+    optical_frame: str | None = None
+    """Frame that stamps its images: +z forward, +x right (REP-103)."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class RobotDescription:
     """A robot: a tree of links that are connected by joints, its drive and its sensors."""
 
@@ -298,6 +344,8 @@ class RobotDescription:
     drive: DriveSpec | None = None
     commands: Mapping[str, CommandSpec] = field(default_factory=dict)
     """By joint."""
+    states: Mapping[str, tuple[Interface, ...]] = field(default_factory=dict)
+    """What `<ros2_control>` reads of joints, by joint."""
     sensors: tuple[SensorSpec, ...] = ()
     warnings: tuple[Problem, ...] = ()
     """What was left out when the file was read."""
@@ -305,6 +353,14 @@ class RobotDescription:
     """Where the elements of `urdf` come from, if it is not the text of `source`."""
     skipped_meshes: tuple[SkippedMesh, ...] = ()
     """In file order."""
+    """Those that `twin.sim` samples."""
+    cameras: tuple[CameraSpec, ...] = ()
+    springs: Mapping[str, Spring] = field(default_factory=dict)
+    """By joint."""
+    static: bool = False
+    """Bolted down, from `<gazebo><static>`."""
+    self_collide: bool | None = None
+    """Whether links that do not say touch each other, from `<gazebo><self_collide>`; None: not said."""
 
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""

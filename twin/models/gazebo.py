@@ -1,154 +1,118 @@
-"""Drive, contact and command elements: `<gazebo>` (classic and new Gazebo) and `<ros2_control>`.
+"""What `<gazebo>` says of links, joints and the whole robot: contacts, gravity, springs, being static.
 
-Element names: gz-sim DiffDrive system, gazebo_ros_pkgs diff_drive and skid_steer_drive, ros2_control's URDF.
+Tags as in SDFormat's extensions of URDF (gazebosim/sdf_tutorials, docs/urdf/sdf_extensions.md). Gazebo reads
+them leniently, and so does this: a value that cannot be read counts as absent, and `twin check` warns of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal, get_args
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
-from twin.errors import nearest
-from twin.models.description import CommandSpec, DriveSpec, Joint, Surface
-from twin.models.document import Element, Report, first, text_of
+from twin.models.description import Joint, Spring, Surface
+from twin.models.document import LARGEST, Element, Report, first
 
-DIFF_DRIVE = ("libgazebo_ros_diff_drive.so", "gz-sim-diff-drive-system", "ignition-gazebo-diff-drive-system")
-SKID_STEER = ("libgazebo_ros_skid_steer_drive.so",)
-LEFT = ("left_joint", "leftJoint", "leftFrontJoint", "leftRearJoint")
-RIGHT = ("right_joint", "rightJoint", "rightFrontJoint", "rightRearJoint")
-Interface = Literal["position", "velocity", "effort"]
-INTERFACES: tuple[str, ...] = get_args(Interface)
+MU1 = ("mu1", "collision/surface/friction/ode/mu")
+MU2 = ("mu2", "collision/surface/friction/ode/mu2")
+SELF_COLLIDE = ("selfCollide", "self_collide")
+NUMBERS = (*MU1, *MU2, "springStiffness", "springReference")
+"""Tags whose number has an effect."""
+
+
+def value_of(element: Element | None) -> str:
+    """Return the text of an element, else its `value=` as in files of Gazebo's first years; else nothing."""
+    if element is None:
+        return ""
+    return str((element.text or "").strip() or element.get("value", "").strip())
+
+
+def number_in(element: Element | None) -> float | None:
+    """Return the number in an element, or None if there is none."""
+    try:
+        value = float(value_of(element))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and abs(value) <= LARGEST else None
+
+
+def flag_in(element: Element | None) -> bool | None:
+    """Return the truth value in an element, or None if there is none."""
+    return {"true": True, "1": True, "false": False, "0": False}.get(value_of(element).lower())
+
+
+def extensions_of(root: Element) -> Iterator[tuple[str, Element]]:
+    """Yield every `<gazebo>` that extends a link or joint, with its name."""
+    for element in root.findall("gazebo"):
+        name = element.get("reference", "").strip()
+        if name:
+            yield name, element
 
 
 def read_surfaces(root: Element, report: Report) -> dict[str, Surface]:
-    """Return the contact parameters of links, from `<gazebo reference='link'><mu1>`."""
+    """Return the contact parameters of links, from `<gazebo reference='link'>`; the last value holds."""
     surfaces: dict[str, Surface] = {}
-    for element in root.findall("gazebo"):
-        link = element.get("reference")
-        friction = report.child_number(element, "mu1", "collision/surface/friction/ode/mu") if link else None
-        if friction is None:
-            continue
-        if friction < 0.0:
+    for link, element in extensions_of(root):
+        known = surfaces.get(link, Surface())
+        friction = number_in(first(element, *MU1))
+        if friction is not None and friction < 0.0:
             report.add(
                 element,
                 f"mu1 of link '{link}' is {friction:g}; friction is not negative",
                 code="bad-friction",
             )
-            continue
-        surfaces[link] = Surface(friction=friction, line=report.line(element))
+            friction = None
+        friction2 = number_in(first(element, *MU2))
+        gravity = _gravity(element)
+        self_collide = flag_in(first(element, *SELF_COLLIDE))
+        found = replace(
+            known,
+            friction=known.friction if friction is None else friction,
+            friction2=known.friction2 if friction2 is None else friction2,
+            gravity=known.gravity if gravity is None else gravity,
+            self_collide=known.self_collide if self_collide is None else self_collide,
+        )
+        if found != known:
+            surfaces[link] = replace(found, line=report.line(element))
     return surfaces
 
 
-def read_drive(root: Element, joints: Mapping[str, Joint], report: Report) -> DriveSpec | None:
-    """Return the wheeled drive of the robot, or None if no plugin describes one."""
-    plugins = [plugin for plugin in root.iterfind("gazebo/plugin") if _is_drive(plugin)]
-    if not plugins:
-        return None
-    if len(plugins) > 1:
-        report.add(plugins[1], "the robot has two drive plugins; one is allowed", code="bad-drive")
-    plugin = plugins[0]
-    left, right = (_wheel_joints(plugin, names, joints, report) for names in (LEFT, RIGHT))
-    for name in dict.fromkeys(name for name in left + right if (left + right).count(name) > 1):
-        report.add(
-            plugin, f"the drive plugin names joint '{name}' twice; each wheel is named once", code="bad-drive"
+def read_springs(root: Element, joints: Mapping[str, Joint]) -> dict[str, Spring]:
+    """Return the springs of hinges and slides, by joint."""
+    springs: dict[str, Spring] = {}
+    for name, element in extensions_of(root):
+        joint = joints.get(name)
+        if joint is None or joint.type not in ("revolute", "continuous", "prismatic"):
+            continue
+        known = springs.get(name, Spring(stiffness=0.0))
+        stiffness, reference = (
+            number_in(element.find(tag)) for tag in ("springStiffness", "springReference")
         )
-    separation = report.child_number(plugin, "wheel_separation", "wheelSeparation")
-    radius = report.child_number(plugin, "wheel_radius")
-    diameter = report.child_number(plugin, "wheel_diameter", "wheelDiameter")
-    if radius is None and diameter is not None:
-        radius = diameter / 2.0
-    for what, value in (("wheel_separation", separation), ("wheel_radius", radius)):
-        if value is None or value <= 0.0:
-            report.add(plugin, f"the drive plugin needs a positive <{what}> [m]", code="bad-drive")
-    torque = report.child_number(plugin, "max_wheel_torque", "wheelTorque", "torque")
-    return DriveSpec(
-        kind="skid_steer" if len(left) > 1 or _names(plugin, SKID_STEER) else "diff_drive",
-        left_joints=left,
-        right_joints=right,
-        wheel_separation=separation or 1.0,
-        wheel_radius=radius or 1.0,
-        max_wheel_torque=_wheel_effort(left + right, joints) if torque is None else torque,
-        max_linear_velocity=report.child_number(plugin, "max_linear_velocity"),
-        max_linear_acceleration=report.child_number(plugin, "max_linear_acceleration"),
-        max_angular_velocity=report.child_number(plugin, "max_angular_velocity"),
-        max_angular_acceleration=report.child_number(plugin, "max_angular_acceleration"),
-        odometry_frame=text_of(plugin, "frame_id", "odometry_frame", "odometryFrame") or "odom",
-        base_frame=text_of(plugin, "child_frame_id", "robot_base_frame", "robotBaseFrame")
-        or "base_footprint",
-        line=report.line(plugin),
-    )
+        springs[name] = Spring(
+            stiffness=known.stiffness if stiffness is None else stiffness,
+            reference=known.reference if reference is None else reference,
+        )
+    return {name: spring for name, spring in springs.items() if spring.stiffness > 0.0}
 
 
-def read_commands(root: Element, joints: Mapping[str, Joint], report: Report) -> dict[str, CommandSpec]:
-    """Return how joints are commanded, from `<ros2_control><joint><command_interface>`, by joint."""
-    commands: dict[str, CommandSpec] = {}
-    for element in root.iterfind("ros2_control/joint"):
-        name = report.required(element, "name")
-        interface = first(element, "command_interface")
-        if interface is None or not name:
-            continue
-        kind = interface.get("name", "")
-        if kind not in INTERFACES:
-            report.add(
-                interface,
-                f"command interface '{kind}' of joint '{name}': {nearest(kind, INTERFACES)}",
-                code="bad-command",
-            )
-            continue
-        if name not in joints:
-            report.add(
-                element,
-                f"<ros2_control> commands joint '{name}', which does not exist; {nearest(name, joints)}",
-                code="bad-command",
-            )
-        elif joints[name].mimic is not None:
-            report.add(
-                element,
-                f"<ros2_control> commands joint '{name}', which mimics another; command its leader",
-                code="bad-command",
-            )
-        elif joints[name].type == "fixed":
-            report.add(element, f"<ros2_control> commands joint '{name}', which is fixed", code="bad-command")
-        commands[name] = CommandSpec(joint=name, interface=kind, line=report.line(element))
-    return commands
+def read_static(root: Element) -> bool:
+    """Tell whether the robot is bolted down, from a `<gazebo><static>` that names no link."""
+    return any(flag_in(element) for element in _of_robot(root, "static"))
 
 
-def _is_drive(plugin: Element) -> bool:
-    return _names(plugin, DIFF_DRIVE + SKID_STEER) or plugin.get("name", "").endswith("::systems::DiffDrive")
+def read_self_collide(root: Element) -> bool | None:
+    """Return whether links that do not say themselves touch each other, or None if the file does not say."""
+    found = [flag_in(element) for tag in SELF_COLLIDE for element in _of_robot(root, tag)]
+    known = [flag for flag in found if flag is not None]
+    return known[-1] if known else None
 
 
-def _names(plugin: Element, libraries: tuple[str, ...]) -> bool:
-    filename = plugin.get("filename", "").rsplit("/", 1)[-1]
-    return filename in libraries or filename.removeprefix("lib").removesuffix(".so") in libraries
+def _of_robot(root: Element, tag: str) -> Iterator[Element]:
+    for gazebo in root.findall("gazebo"):
+        if not gazebo.get("reference", "").strip():
+            yield from gazebo.findall(tag)
 
 
-def _wheel_joints(
-    plugin: Element, names: tuple[str, ...], joints: Mapping[str, Joint], report: Report
-) -> tuple[str, ...]:
-    found: list[str] = []
-    for child in plugin:
-        if child.tag not in names:
-            continue
-        joint = (child.text or "").strip()
-        if joint not in joints:
-            report.add(
-                child,
-                f"the drive plugin names joint '{joint}', which does not exist; {nearest(joint, joints)}",
-                code="bad-drive",
-            )
-        elif joints[joint].type not in ("continuous", "revolute"):
-            report.add(
-                child,
-                f"the drive plugin names joint '{joint}', which is {joints[joint].type}, not continuous",
-                code="bad-drive",
-            )
-        found.append(joint)
-    if not found:
-        report.add(plugin, f"the drive plugin has no <{names[0]}>", code="bad-drive")
-    return tuple(found)
-
-
-def _wheel_effort(names: tuple[str, ...], joints: Mapping[str, Joint]) -> float | None:
-    efforts = [joints[name].limit.effort for name in names if name in joints]
-    known = [effort for effort in efforts if effort is not None]
-    return min(known) if known else None
+def _gravity(element: Element) -> bool | None:
+    off = flag_in(element.find("turnGravityOff"))
+    return flag_in(element.find("gravity")) if off is None else not off

@@ -10,7 +10,7 @@ from typing import get_args
 from twin.errors import nearest
 from twin.models.description import Joint, JointType, Limit, Link, Mimic
 from twin.models.document import Element, Report, describe
-from twin.models.kinematics import ONE_DIMENSIONAL
+from twin.models.kinematics import ONE_DOF
 from twin.models.links import read_origin
 
 JOINT_TYPES: tuple[str, ...] = get_args(JointType)
@@ -208,7 +208,7 @@ def without_idle_mimics(
 def _without_idle_mimic(joint: Joint, joints: Mapping[str, Joint], element: Element, report: Report) -> Joint:
     if joint.mimic is None or not joint.mimic.joint:
         return joint
-    if joint.type not in ONE_DIMENSIONAL:
+    if joint.type not in ONE_DOF:
         why = f"joint '{joint.name}' is {joint.type} and cannot mimic another; remove <mimic>"
     elif joint.mimic.joint not in joints:
         missing = (

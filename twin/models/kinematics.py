@@ -15,7 +15,8 @@ Positions = Mapping[str, ArrayLike]
 """Joint positions by name: a number [rad or m]; of a planar joint x, y [m], yaw [rad]; of a floating joint
 x, y, z [m] and a quaternion w, x, y, z."""
 
-ONE_DIMENSIONAL = ("revolute", "continuous", "prismatic")
+ONE_DOF = ("revolute", "continuous", "prismatic")
+"""Types of joints whose position is a number."""
 ZERO: Mapping[str, tuple[float, ...]] = {
     "planar": (0.0, 0.0, 0.0),
     "floating": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
@@ -31,7 +32,7 @@ def joint_positions(description: RobotDescription, positions: Positions) -> dict
                 np.asarray(positions.get(joint.name, ZERO.get(joint.type, 0.0)), dtype=np.float64)
             )
         leader = description.joints[joint.mimic.joint]
-        lead = position(leader) if leader.type in ONE_DIMENSIONAL else np.zeros(1)
+        lead = position(leader) if leader.type in ONE_DOF else np.zeros(1)
         return joint.mimic.multiplier * lead + joint.mimic.offset
 
     return {name: position(joint) for name, joint in description.joints.items()}

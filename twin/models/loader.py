@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twin.errors import Problem
+from twin.models.cameras import read_cameras
 from twin.models.catalogue import resolve
+from twin.models.commands import read_commands, read_states
 from twin.models.description import Joint, Link, RobotDescription, Surface
 from twin.models.document import Element, Report, parse
+from twin.models.drives import read_drive
 from twin.models.expand import expand
-from twin.models.gazebo import read_commands, read_drive, read_surfaces
+from twin.models.gazebo import read_self_collide, read_springs, read_static, read_surfaces
+from twin.models.gazebo_materials import colour_visuals
 from twin.models.joints import check_tree, read_joint, unique, without_idle_mimics
 from twin.models.kinematics import rigid_groups
 from twin.models.line_table import LineTable
@@ -19,6 +23,7 @@ from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
 from twin.models.packages import PackagePath, Packages
 from twin.models.sensors import read_sensors
+from twin.models.transmissions import read_transmissions
 from twin.models.xml_text import as_utf8, read_utf8
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")
@@ -71,6 +76,7 @@ def parse_urdf(
         report.add(
             root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
         )
+    colour_visuals(root)
     surfaces = read_surfaces(root, report)
     packages = Packages(PackagePath.of(source, options))
     links = _read_links(root, surfaces, packages, report, options)
@@ -87,11 +93,16 @@ def parse_urdf(
         joints=joints,
         root=root_link,
         drive=read_drive(root, joints, report),
-        commands=read_commands(root, joints, report),
-        sensors=read_sensors(root, links, report),
+        commands=read_transmissions(root, joints, report, read_commands(root, joints, report)),
+        states=read_states(root, joints),
+        sensors=(sensors := read_sensors(root, links, report)),
+        cameras=read_cameras(root, links, report, taken=[sensor.name for sensor in sensors]),
+        springs=read_springs(root, joints),
+        static=read_static(root),
+        self_collide=read_self_collide(root),
+        skipped_meshes=tuple(report.skipped_meshes),
         warnings=tuple(dict.fromkeys(report.warnings)),
         lines=lines,
-        skipped_meshes=tuple(report.skipped_meshes),
     )
     if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
         _refuse_impossible(description, root, report)

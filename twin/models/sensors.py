@@ -3,52 +3,87 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
+from dataclasses import replace
 from typing import TypedDict
 
-from twin.errors import nearest
+from twin.geometry import Pose3
 from twin.models.description import ContactSpec, ImuSpec, LidarSpec, Link, RangeSpec, SensorSpec
 from twin.models.document import Element, Report, first, text_of
+from twin.models.drives import library_of
+from twin.models.gazebo import value_of
 
 LIDAR = ("gpu_lidar", "lidar", "ray", "gpu_ray")
 SONAR = ("sonar", "ray-cone")
-TOPICS = {"lidar": "scan", "sonar": "range", "imu": "imu", "contact": "bumper"}
-DEFAULT_RATE_HZ = {"lidar": 10.0, "sonar": 10.0, "imu": 100.0, "contact": 50.0}
+PLUGIN_IMU = "gazebo_ros_imu"
+"""An IMU of ROS 1 that is a plugin of the robot, with the name of its link in <bodyName>."""
+TOPICS = {"lidar": "scan", "sonar": "range", "imu": "imu", "contact": "bumper", "camera": "image_raw"}
+DEFAULT_RATE_HZ = {"lidar": 10.0, "sonar": 10.0, "imu": 100.0, "contact": 50.0, "camera": 30.0}
+TOPIC_TAGS = (
+    "topic",
+    "plugin/ros/remapping",
+    "plugin/topicName",
+    "plugin/bumperTopicName",
+    "plugin/imageTopicName",
+    "plugin/topic",
+    "topicName",
+)
 RAY = ("lidar", "ray")
 """The element with <scan> and <range>: new and classic name."""
 
 
-class _Common(TypedDict):
+class Common(TypedDict):
+    """What all sensors have."""
+
     name: str
     link: str
     topic: str
     rate_hz: float
+    T_link_sensor: Pose3
     line: int
 
 
 def read_sensors(root: Element, links: Mapping[str, Link], report: Report) -> tuple[SensorSpec, ...]:
-    """Return the sensors in file order; types that twin does not simulate (cameras) are left out."""
+    """Return the sensors that `twin.sim` samples, in file order; those of unknown links are left out."""
     sensors: list[SensorSpec] = []
-    for gazebo in root.findall("gazebo"):
-        for element in gazebo.findall("sensor"):
-            link = gazebo.get("reference", "")
-            if link not in links:
-                missing = f"sensor '{element.get('name', '')}' is on link '{link}', which does not exist"
-                report.add(gazebo, f"{missing}; {nearest(link, links)}", code="bad-sensor")
-                continue
-            sensor = _read_sensor(element, link, report)
-            if sensor is None:
-                continue
-            if any(sensor.name == other.name for other in sensors):
-                report.add(
-                    element, f"sensor '{sensor.name}' is defined twice; names are unique", code="bad-sensor"
-                )
-            sensors.append(sensor)
+    for link, element in sensor_elements(root, links):
+        sensor = _read_sensor(element, link, report)
+        if sensor is None:
+            continue
+        if any((sensor.name, sensor.link) == (other.name, other.link) for other in sensors):
+            report.add(
+                element, f"sensor '{sensor.name}' is defined twice; names are unique", code="bad-sensor"
+            )
+        name = unique_name(sensor.name, link, [other.name for other in sensors])
+        sensors.append(replace(sensor, name=name))
     return tuple(sensors)
 
 
+def sensor_elements(root: Element, links: Container[str]) -> Iterator[tuple[str, Element]]:
+    """Yield the sensors of known links with their link: `<sensor>`s, and IMUs that are but a plugin."""
+    for gazebo in root.findall("gazebo"):
+        link = gazebo.get("reference", "").strip()
+        for element in gazebo:
+            if element.tag == "sensor" and link in links:
+                yield link, element
+            elif element.tag == "plugin" and library_of(element) == PLUGIN_IMU:
+                body = text_of(element, "bodyName") or ""
+                if body in links:
+                    yield body, element
+
+
+def unique_name(name: str, link: str, taken: Collection[str]) -> str:
+    """Return a sensor's name, with its link's if it is taken: Gazebo's are unique within a link only."""
+    return f"{link}_{name}" if name in taken else name
+
+
+def kind_of(element: Element) -> str:
+    """Return the type of a sensor or sensor plugin as Gazebo spells it."""
+    return "imu" if element.tag == "plugin" else str(element.get("type", "")).strip()
+
+
 def _read_sensor(element: Element, link: str, report: Report) -> SensorSpec | None:
-    kind = element.get("type", "")
+    kind = kind_of(element)
     if kind in LIDAR:
         if _is_range(element):
             return _read_range(element, link, report)
@@ -58,7 +93,7 @@ def _read_sensor(element: Element, link: str, report: Report) -> SensorSpec | No
     if kind == "imu":
         return _read_imu(element, link, report)
     if kind == "contact":
-        return ContactSpec(**_common(element, link, "contact", report))
+        return ContactSpec(**read_common(element, link, "contact", report))
     return None
 
 
@@ -72,27 +107,42 @@ def _is_range(element: Element) -> bool:
     return False
 
 
-def _common(element: Element, link: str, kind: str, report: Report) -> _Common:
-    rate = report.child_number(element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate")
-    rate = DEFAULT_RATE_HZ[kind] if rate is None else rate
-    if rate <= 0.0:
+def read_common(element: Element, link: str, kind: str, report: Report) -> Common:
+    """Return what all sensors have; a rate of 0, which is every step in Gazebo, becomes the usual one."""
+    rate = report.child_number(
+        element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate"
+    )
+    rate = rate or DEFAULT_RATE_HZ[kind]
+    if rate < 0.0:
         report.add(
             element,
             f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; it is positive",
             code="bad-sensor",
         )
         rate = 1.0
-    topic = (
-        text_of(element, "topic", "plugin/ros/remapping", "plugin/topicName", "plugin/topic") or TOPICS[kind]
-    )
+    topic = text_of(element, *TOPIC_TAGS) or TOPICS[kind]
     return {
         "name": report.required(element, "name"),
-        "link": text_of(element, "gz_frame_id", "ignition_frame_id", "plugin/frame_name", "plugin/frameName")
-        or link,
-        "topic": topic.rpartition(":=")[2].strip("/~"),
+        "link": link,
+        "topic": topic.rpartition(":=")[2].strip("/~") or TOPICS[kind],
         "rate_hz": rate,
+        "T_link_sensor": read_pose(element),
         "line": report.line(element),
     }
+
+
+def read_pose(element: Element) -> Pose3:
+    """Return an SDFormat `<pose>` in its parent's frame, the identity if there is none that can be read."""
+    pose = element.find("pose")
+    try:
+        x, y, z, *rpy = (float(word) for word in value_of(pose).split())
+        roll, pitch, yaw = rpy
+    except ValueError:
+        return Pose3.from_xyz_rpy()
+    if pose is not None and pose.get("degrees") in ("true", "1"):
+        roll, pitch, yaw = (math.radians(angle) for angle in (roll, pitch, yaw))
+    read = Pose3.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
+    return read if all(map(math.isfinite, (*read.xyz, *read.quat_wxyz))) else Pose3.from_xyz_rpy()
 
 
 def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
@@ -114,7 +164,7 @@ def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
         )
     low, high = _read_reach(element, report)
     return LidarSpec(
-        **_common(element, link, "lidar", report),
+        **read_common(element, link, "lidar", report),
         angle_min=angle_min,
         angle_max=angle_max,
         samples=int(samples),
@@ -127,6 +177,10 @@ def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
 def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
     scan = _ray_child(element, "scan/horizontal")
     field_of_view = report.child_number(element, "plugin/fov", "sonar/fov")
+    low, high = _read_reach(element, report)
+    radius = report.child_number(element, "sonar/radius")
+    if field_of_view is None and radius is not None and high > 0.0:
+        field_of_view = 2.0 * math.atan2(radius, high)
     if field_of_view is None:
         field_of_view = _need(element, scan, "max_angle", report) - _need(element, scan, "min_angle", report)
     if not 0.0 < field_of_view < math.pi:
@@ -135,9 +189,8 @@ def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
             f"sensor '{element.get('name', '')}' has a cone of {field_of_view:g} rad; 0 to pi is valid",
             code="bad-sensor",
         )
-    low, high = _read_reach(element, report)
     return RangeSpec(
-        **_common(element, link, "sonar", report),
+        **read_common(element, link, "sonar", report),
         field_of_view=field_of_view,
         range_min=low,
         range_max=high,
@@ -146,13 +199,21 @@ def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
 
 
 def _read_imu(element: Element, link: str, report: Report) -> ImuSpec:
-    gyro, accel = "imu/angular_velocity/x/noise", "imu/linear_acceleration/x/noise"
+    both = report.child_number(element, "plugin/gaussianNoise", "gaussianNoise") or 0.0
+    gyro = report.child_number(element, *_imu_noise("angular_velocity", "rate", "stddev"))
+    bias = report.child_number(element, *_imu_noise("angular_velocity", "rate", "bias_stddev"))
+    accel = report.child_number(element, *_imu_noise("linear_acceleration", "accel", "stddev"))
     return ImuSpec(
-        **_common(element, link, "imu", report),
-        gyro_noise_stddev=report.child_number(element, f"{gyro}/stddev") or 0.0,
-        gyro_bias_stddev=report.child_number(element, f"{gyro}/bias_stddev") or 0.0,
-        accel_noise_stddev=report.child_number(element, f"{accel}/stddev") or 0.0,
+        **read_common(element, link, "imu", report),
+        gyro_noise_stddev=both if gyro is None else gyro,
+        gyro_bias_stddev=bias or 0.0,
+        accel_noise_stddev=both if accel is None else accel,
     )
+
+
+def _imu_noise(axes: str, classic: str, name: str) -> tuple[str, str]:
+    """Return where new and classic Gazebo have a parameter of the noise."""
+    return f"imu/{axes}/x/noise/{name}", f"imu/noise/{classic}/{name}"
 
 
 def _read_reach(element: Element, report: Report) -> tuple[float, float]:
@@ -174,7 +235,8 @@ def _ray_child(element: Element, path: str) -> Element | None:
 
 
 def _noise(element: Element, report: Report) -> float:
-    return report.child_number(element, *(f"{ray}/noise/stddev" for ray in RAY)) or 0.0
+    paths = (*(f"{ray}/noise/stddev" for ray in RAY), "plugin/gaussianNoise")
+    return report.child_number(element, *paths) or 0.0
 
 
 def _need(sensor: Element, parent: Element | None, name: str, report: Report) -> float:

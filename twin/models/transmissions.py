@@ -1,0 +1,107 @@
+"""`<transmission>` of ros_control and of the PR2: which joint a motor drives, and how it is commanded.
+
+Spellings as in ros_control's transmission_parser.cpp (element <type>, <hardwareInterface> of the joint or, as
+it was first, of the actuator, with or without its package) and in the PR2's files (type=, effort alone).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from twin.models.description import CommandSpec, Interface, Joint
+from twin.models.document import Element, Report, text_of
+from twin.models.gazebo import number_in
+
+HARDWARE: Mapping[str, Interface] = {
+    "EffortJointInterface": "effort",
+    "VelocityJointInterface": "velocity",
+    "PositionJointInterface": "position",
+    "PosVelJointInterface": "position",
+    "PosVelAccJointInterface": "position",
+}
+SIMPLE = "SimpleTransmission"
+PR2 = "pr2_mechanism_model"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transmission:
+    """One `<transmission>` and what becomes of it."""
+
+    element: Element
+    kind: str
+    """Without its package, such as `SimpleTransmission`."""
+    joint: str | None
+    """The joint that it commands; None if it has no effect."""
+    interface: Interface | None
+    interfaces: tuple[str, ...]
+    """All hardware interfaces that it names, without their package."""
+    reduction: float
+    fault: str
+    """Why it has no effect; empty if it has one."""
+
+
+def transmissions(root: Element, joints: Mapping[str, Joint]) -> Iterator[Transmission]:
+    """Yield every `<transmission>` below `<robot>` in file order."""
+    for element in root.findall("transmission"):
+        spelled = text_of(element, "type") or element.get("type", "")
+        kind = spelled.rpartition("/")[2]
+        names = [joint.get("name", "") for joint in element.findall("joint")]
+        interfaces = tuple(
+            (item.text or "").strip().rpartition("/")[2] for item in element.iter("hardwareInterface")
+        )
+        known = [HARDWARE[name] for name in interfaces if name in HARDWARE]
+        interface: Interface | None = known[0] if known else None
+        if interface is None and not interfaces and PR2 in spelled:
+            interface = "effort"
+        reduction = number_in(next(element.iter("mechanicalReduction"), None))
+        fault = _fault(kind, names, interface, interfaces, joints)
+        yield Transmission(
+            element=element,
+            kind=kind,
+            joint=None if fault else names[0],
+            interface=None if fault else interface,
+            interfaces=interfaces,
+            reduction=1.0 if reduction is None else reduction,
+            fault=fault,
+        )
+
+
+def read_transmissions(
+    root: Element, joints: Mapping[str, Joint], report: Report, commands: Mapping[str, CommandSpec]
+) -> dict[str, CommandSpec]:
+    """Return `commands` and the joints that only a `<transmission>` commands."""
+    known = dict(commands)
+    spoken_of = {element.get("name") for element in root.iterfind("ros2_control/joint")}
+    for item in transmissions(root, joints):
+        if item.joint is None or item.interface is None or item.joint in spoken_of:
+            continue
+        spec = CommandSpec(joint=item.joint, interface=item.interface, line=report.line(item.element))
+        known.setdefault(item.joint, spec)
+    return known
+
+
+def _fault(
+    kind: str,
+    names: list[str],
+    interface: Interface | None,
+    interfaces: tuple[str, ...],
+    joints: Mapping[str, Joint],
+) -> str:
+    if kind != SIMPLE:
+        return f"its type is {kind or 'not given'}; only {SIMPLE} has an effect"
+    if len(names) != 1:
+        return f"it names {len(names)} joints, not one"
+    joint = joints.get(names[0])
+    if joint is None:
+        return f"joint '{names[0]}' does not exist"
+    if joint.type not in ("revolute", "continuous", "prismatic"):
+        return f"joint '{names[0]}' is {joint.type}"
+    if joint.mimic is not None:
+        return f"joint '{names[0]}' follows '{joint.mimic.joint}'"
+    if interface is None:
+        named = ", ".join(interfaces)
+        return (
+            f"its hardware interface {named} commands nothing" if named else "it has no <hardwareInterface>"
+        )
+    return ""
