@@ -115,6 +115,27 @@ FOUND = {
     "ignored-tag": (arm(AXIS + LIMIT + "<limits/>"), 3, "<limits> in <joint> is not URDF"),
     "ignored-attribute": (arm(AXIS + LIMIT.replace("/>", " uper='3'/>")), 3, "<limit uper='…'> is not URDF"),
     "repeated-tag": (arm(AXIS + AXIS + LIMIT), 3, "<axis> stands here twice"),
+    "not-simulated": (
+        cart(extra="<gazebo><plugin filename='libgazebo_ros_planar_move.so' name='p'/></gazebo>"),
+        9,
+        "plugin 'gazebo_ros_planar_move' is not simulated",
+    ),
+    "unknown-reference": (cart(extra="<gazebo reference='bas'/>"), 9, "extends 'bas', which is neither"),
+    "ignored-value": (cart(extra="<gazebo reference='base'><mu1/></gazebo>"), 9, "<mu1> of 'base' is ''"),
+    "several-interfaces": (
+        cart(
+            extra="<ros2_control><joint name='left_joint'><command_interface name='velocity'/>"
+            "<command_interface name='effort'/></joint></ros2_control>"
+        ),
+        9,
+        "interfaces velocity, effort; velocity counts",
+    ),
+    "camera-frame": (
+        cart(extra="<gazebo reference='base'><sensor name='c' type='camera'><camera/></sensor></gazebo>")
+        .replace("'base'", "'optical_base'"),
+        9,
+        "looks along +x of 'optical_base'",
+    ),
 }  # fmt: skip
 
 BY_COLLISION_DETECTION = {"overlap", "wheel-rubs"}

@@ -8,6 +8,7 @@ from twin.models.checks.angles import rounded_angle
 from twin.models.checks.axes import axis_length
 from twin.models.checks.codes import ERRORS, WARNINGS
 from twin.models.checks.diagnostic import Diagnostic, from_problems, in_file_order
+from twin.models.checks.gazebo import gazebo
 from twin.models.checks.ground import ground
 from twin.models.checks.ignored import ignored
 from twin.models.checks.inertia import impossible_inertia, inertia
@@ -39,6 +40,7 @@ CHECKS: tuple[Check, ...] = (
     rounded_angle,
     material_elsewhere,
     ignored,
+    gazebo,
 )
 """All of them; each yields its findings in file order."""
 

@@ -82,6 +82,11 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "ignored-tag": "an element that URDF does not have here; it has no effect",
         "repeated-tag": "an element that stands twice where URDF has it once",
         "ignored-attribute": "an attribute that URDF does not have here; it has no effect",
+        "not-simulated": "a plugin, sensor, transmission or value without the effect that it has in Gazebo",
+        "unknown-reference": "`<gazebo reference=''>` names neither a link nor a joint",
+        "ignored-value": "the value of a tag in `<gazebo>` is no number",
+        "several-interfaces": "a joint can be commanded in several ways, of which the first counts",
+        "camera-frame": "the camera is on an optical frame and looks sideways",
     }
 )
 """Faults that a robot can be simulated with, and what they mean."""
