@@ -68,6 +68,8 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
         return container_fate(element, lambda child: sensor_fate(child, sensor, link, description))
     if isinstance(spec, CameraSpec) and path.startswith("noise"):
         return "dropped", f"MuJoCo's images are free of noise; {ELSEWHERE}"
+    if path.endswith("bias_stddev"):
+        return "dropped", ELSEWHERE
     if path.startswith(("angular_velocity/", "linear_acceleration/")) and path.endswith("/stddev"):
         return _axis_noise(element, path, sensor)
     if path in TAGS:
@@ -112,8 +114,6 @@ def _axis_noise(element: Element, path: str, sensor: Element) -> Fate:
     """Return the fate of an IMU's noise about one axis: that of x holds for all."""
     quantity, axis = path.split("/")[:2]
     x = sensor.find(f"imu/{quantity}/x/noise/{element.tag}")
-    if element.tag == "bias_stddev":
-        return "dropped", ELSEWHERE
     if axis == "x" or (x is not None and value_of(x) == value_of(element)):
         return NOISE
     return "dropped", "the noise of the x axis holds for all axes"

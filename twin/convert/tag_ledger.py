@@ -87,6 +87,9 @@ def _path(element: Element) -> str:
 def _name(element: Element) -> str:
     if element.getparent() is None:
         return f"robot '{element.get('name', '')}'"
+    chain = [element, *element.iterancestors()][:-1][::-1]
+    if chain[0].tag in ("transmission", "ros2_control"):
+        return "/".join(f"{e.tag} '{e.get('name')}'" if e.get("name") else str(e.tag) for e in chain)
     owner = place(element)
     below = [element.tag]
     for parent in element.iterancestors():
