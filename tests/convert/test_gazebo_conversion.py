@@ -140,7 +140,8 @@ def rover(plugin: str = "") -> RobotDescription:
     """Return two wheels and a caster; without a plugin, ros2_control commands the wheels' velocity."""
     wheels = "".join(
         f"<link name='{side}'><inertial><mass value='0.2'/><inertia ixx='2e-4' iyy='3e-4' izz='2e-4'/>"
-        "</inertial><collision><origin rpy='1.5707963267948966 0 0'/><geometry><cylinder radius='0.05' length='0.02'/>"
+        "</inertial><collision><origin rpy='1.5707963267948966 0 0'/><geometry>"
+        "<cylinder radius='0.05' length='0.02'/>"
         f"</geometry></collision></link><joint name='{side}_joint' type='continuous'>"
         f"<parent link='base'/><child link='{side}'/><origin xyz='0 {y} 0.05'/><axis xyz='0 1 0'/>"
         "<limit effort='2' velocity='20'/></joint>"

@@ -21,7 +21,7 @@ from twin.models.gazebo import (
     value_of,
 )
 from twin.models.sensors import LIDAR, PLUGIN_IMU, RAY, SONAR, kind_of
-from twin.models.transmissions import transmissions
+from twin.models.transmissions import HARDWARE, transmissions
 
 OWN_PLUGINS = ("joint_state_publisher", "joint-state-publisher-system", "_control", "_control-system")
 """Ends of the names of libraries whose work twin's own nodes do: joint states, and running controllers."""
@@ -149,7 +149,7 @@ class _Check:
 
     def transmissions(self, root: Element) -> Iterator[Diagnostic]:
         for item in transmissions(root, self._description.joints):
-            named = list(dict.fromkeys(item.interfaces))
+            named = list(dict.fromkeys(name for name in item.interfaces if name in HARDWARE))
             title = f"transmission '{item.element.get('name', '')}'"
             if item.fault and "commands nothing" not in item.fault:
                 message = f"{title} has no effect: {item.fault}"
