@@ -197,3 +197,20 @@ def test_a_lidar_of_very_many_rays_is_in_the_report_alone(tmp_path: Path) -> Non
 def test_the_simulations_own_model_has_no_sensors(description: RobotDescription) -> None:
     spec = convert(description).spec
     assert (list(spec.sensors), list(spec.sites), list(spec.cameras)) == ([], [], [])
+
+
+def test_sensors_that_share_a_name_and_stand_nowhere_still_load(tmp_path: Path) -> None:
+    pose = "<pose>1e300 nan 0 0 0 inf</pose>"
+    eyes = f"<sensor name='eye' type='camera'>{pose}<camera/></sensor>" * 3
+    imu = f"<sensor name='scan-000' type='imu'>{pose}</sensor><sensor name='a' type='imu'/>"
+    extra = f"<gazebo reference='arm'>{eyes}{imu}<sensor name='a_gyro' type='contact'/></gazebo></robot>"
+    (tmp_path / "odd.urdf").write_text(URDF.replace("</robot>", extra), encoding="utf-8")
+    export(load(tmp_path / "odd.urdf"), tmp_path / "out")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml"))
+    assert [model.camera(index).name for index in range(model.ncam)] == [
+        "eye",
+        "arm_eye",
+        "arm_eye_2",
+        "arm_eye_3",
+    ]
+    assert model.sensor("a_gyro_2").type == mujoco.mjtSensor.mjSENS_CONTACT

@@ -143,15 +143,15 @@ class _SensorBuilder:
 
     def _camera(self, camera: CameraSpec) -> Iterator[str]:
         tangent = math.tan(camera.horizontal_fov / 2.0) * camera.height / camera.width
-        pose = camera.T_link_sensor
+        pose, name = camera.T_link_sensor, self._free(camera.name)
         self._spec.body(camera.link).add_camera(
-            name=camera.name,
+            name=name,
             pos=pose.xyz,
             quat=multiply_wxyz(pose.quat_wxyz, LENS_ALONG_X),
             fovy=math.degrees(2.0 * math.atan(tangent)),
             resolution=[camera.width, camera.height],
         )
-        yield camera.name
+        yield name
 
     def _site(self, sensor: SensorSpec, name: str, turn: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)) -> str:
         pose = sensor.T_link_sensor

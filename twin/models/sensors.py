@@ -9,7 +9,7 @@ from typing import TypedDict
 
 from twin.geometry import Pose3
 from twin.models.description import ContactSpec, ImuSpec, LidarSpec, Link, RangeSpec, SensorSpec
-from twin.models.document import Element, Report, first, text_of
+from twin.models.document import LARGEST, Element, Report, first, text_of
 from twin.models.drives import library_of
 from twin.models.gazebo import value_of
 
@@ -141,8 +141,9 @@ def read_pose(element: Element) -> Pose3:
         return Pose3.from_xyz_rpy()
     if pose is not None and pose.get("degrees") in ("true", "1"):
         roll, pitch, yaw = (math.radians(angle) for angle in (roll, pitch, yaw))
-    read = Pose3.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
-    return read if all(map(math.isfinite, (*read.xyz, *read.quat_wxyz))) else Pose3.from_xyz_rpy()
+    if not all(abs(value) <= LARGEST for value in (x, y, z, roll, pitch, yaw)):
+        return Pose3.from_xyz_rpy()
+    return Pose3.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
 
 
 def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
