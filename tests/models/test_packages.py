@@ -9,7 +9,9 @@ import pytest
 from tests.oracles.installed import example_robots
 from twin.errors import ModelError
 from twin.models import ReadOptions, load
+from twin.models.document import Report, parse
 from twin.models.packages import PackagePath, Packages
+from twin.models.resources import locate
 
 STL = b"\0" * 84
 LINK = "<link name='a'><visual><geometry><mesh filename='{}'/></geometry></visual></link>"
@@ -151,7 +153,7 @@ def test_a_mesh_in_an_allowed_folder(tmp_path: Path) -> None:
         ("http://example.com/arm.stl", "is no local file"),
         ("package://own/meshes/leg.stl", "does not exist"),
         ("package://", "no package ''"),
-        ("a" * 300, "does not exist"),
+        ("a" * 300, "mesh 'aaa"),
     ],
 )
 def test_meshes_that_are_not_there(tmp_path: Path, reference: str, reason: str) -> None:
@@ -169,8 +171,13 @@ def test_names_are_looked_up_only_when_asked_for(tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.skipif(not example_robots(), reason="example-robot-data is not installed")
-def test_the_package_of_example_robot_data_is_found_by_its_folder() -> None:
+def test_example_robot_data_finds_its_meshes() -> None:
+    missing = {}
     for file in example_robots():
         packages = Packages(PackagePath.of(file, ReadOptions()))
-        assert "example-robot-data" in packages
-        assert packages.allows(file)
+        for mesh in parse(file.read_bytes(), Report(file)).iter("mesh"):
+            found = locate(mesh.get("filename"), file, packages)
+            if found.path is None:
+                missing[file.name, found.code] = mesh.get("filename")
+    # Its meshes are in a folder of the SDK of the robot's maker: file:///usr/Romeo/...
+    assert list(missing) == [("romeo_laas_small.urdf", "missing-mesh")]

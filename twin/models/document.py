@@ -164,8 +164,11 @@ def parse(text: bytes, report: Report) -> Element:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         line = error.lineno if report.table is None else None
+        message = " ".join(error.msg.split()).partition(", line ")[0]
+        if "prefix" in message:
+            message += "; declare it in the outermost element: xmlns:PREFIX='...'"
         raise ModelError(
-            Problem(f"not well-formed XML: {error.msg}", report.source, line, code="bad-xml")
+            Problem(f"not well-formed XML: {message}", report.source, line, code="bad-xml")
         ) from None
     _drop_default_namespace(root)
     report.locate(root, lines)

@@ -35,17 +35,17 @@ def locate(reference: str, source: Path, packages: Packages) -> Resource:
     if isinstance(path, Resource):
         return path
     try:
+        if not path.is_file():
+            return Resource(code="missing-mesh", reason="does not exist")
         if not packages.allows(path):
             folder = path.resolve().parent
             reason = "is outside of the file's folder and packages"
             return Resource(
                 code="outside-path", reason=f"{reason}; if you trust it, give --allow-path {folder}"
             )
-        if path.is_file():
-            return Resource(path=path)
-    except (OSError, ValueError):  # a name that no file can have
-        pass
-    return Resource(code="missing-mesh", reason="does not exist")
+        return Resource(path=path)
+    except (OSError, ValueError):
+        return Resource(code="missing-mesh", reason="is no name of a file")
 
 
 def _path(reference: str, source: Path, packages: Mapping[str, Path]) -> Path | Resource:

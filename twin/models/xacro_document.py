@@ -83,14 +83,14 @@ class _Builder(expatbuilder.ExpatBuilderNS):
         self._depth = 0
 
     def start_doctype_decl_handler(self, *_: object) -> None:
-        raise self._fault("the file has a DOCTYPE; remove it, a robot needs none", "doctype")
+        raise self._fault("the file has a DOCTYPE; remove it, a robot needs none", code="doctype")
 
     def start_element_handler(self, name: str, attributes: list[Any]) -> None:
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise self._fault(f"more than {MAX_DEPTH} elements inside of each other", "too-large")
+            raise self._fault(f"more than {MAX_DEPTH} elements inside of each other", code="too-large")
         if len(attributes) > 2 * MAX_ATTRIBUTES:
-            raise self._fault(f"more than {MAX_ATTRIBUTES} attributes in one element", "too-large")
+            raise self._fault(f"more than {MAX_ATTRIBUTES} attributes in one element", code="too-large")
         super().start_element_handler(name, attributes)
         self._sources.count()
         self.curNode.setUserData(PLACE, (self._file, self.getParser().CurrentLineNumber), self._sources)
@@ -99,5 +99,5 @@ class _Builder(expatbuilder.ExpatBuilderNS):
         self._depth -= 1
         super().end_element_handler(name)
 
-    def _fault(self, message: str, code: str) -> Refused:
+    def _fault(self, message: str, *, code: str) -> Refused:
         return Refused(message, code=code, file=self._file, line=self.getParser().CurrentLineNumber)

@@ -15,6 +15,10 @@ MAX_DEPTH = 100
 """Elements inside of each other; robots have about ten."""
 MAX_ATTRIBUTES = 100
 """Of one element."""
+MAX_CHARACTERS = 1_000_000
+"""Of one attribute's value."""
+SHOWN = 40
+"""Characters of a name in a message."""
 
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -89,42 +93,55 @@ def scan(text: bytes, source: Path, *, has_lines: bool = True) -> list[int]:
         )
     if not text.strip():
         raise _fault("the file is empty; a URDF file has <robot name='...'>", source)
-    lines: list[int] = []
+    return _Scanner(source, has_lines).scan(text)
+
+
+class _Scanner:
     # expat, not lxml: libxml2 expands internal entities inside attributes even with resolve_entities=False.
-    parser = expat.ParserCreate("utf-8")
-    depth = 0
 
-    def line() -> int | None:
-        return parser.CurrentLineNumber if has_lines else None
+    def __init__(self, source: Path, has_lines: bool) -> None:
+        self._source = source
+        self._has_lines = has_lines
+        self._lines: list[int] = []
+        self._open: list[tuple[str, int]] = []
+        self._parser = expat.ParserCreate("utf-8")
+        self._parser.StartDoctypeDeclHandler = self._refuse_doctype
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
 
-    def refuse_doctype(*_: object) -> None:
-        raise _fault("the file has a DOCTYPE; remove it, a robot needs none", source, line(), code="doctype")
+    def scan(self, text: bytes) -> list[int]:
+        try:
+            self._parser.Parse(text, True)
+        except expat.ExpatError as error:
+            reason = expat.ErrorString(error.code).removeprefix("not well-formed (").removesuffix(")")
+            if self._open and reason in ("mismatched tag", "no element found", "unclosed token"):
+                tag, line = self._open[-1]
+                reason += f"; <{tag[:SHOWN]}>{f' of line {line}' if self._has_lines else ''} is not closed"
+            raise self._fault(f"not well-formed XML: {reason}", error.lineno) from None
+        return self._lines
 
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        lines.append(parser.CurrentLineNumber)
-        for what, number, most in (
-            ("elements", len(lines), MAX_ELEMENTS),
-            (f"elements inside of each other, down to <{tag[:40]}>", depth, MAX_DEPTH),
-            (f"attributes in <{tag[:40]}>", len(attributes), MAX_ATTRIBUTES),
+    def _refuse_doctype(self, *_: object) -> None:
+        raise self._fault("the file has a DOCTYPE; remove it, a robot needs none", code="doctype")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self._lines.append(self._parser.CurrentLineNumber)
+        self._open.append((tag, self._parser.CurrentLineNumber))
+        shown = f"<{tag[:SHOWN]}>"
+        for number, most, what in (
+            (len(self._lines), MAX_ELEMENTS, "elements"),
+            (len(self._open), MAX_DEPTH, f"elements inside of each other, down to {shown}"),
+            (len(attributes), MAX_ATTRIBUTES, f"attributes in {shown}"),
+            (max(map(len, (tag, *attributes.values()))), MAX_CHARACTERS, f"characters in a value of {shown}"),
         ):
             if number > most:
-                raise _fault(f"the file has more than {most} {what}", source, line(), code="too-large")
+                raise self._fault(f"the file has more than {most} {what}", code="too-large")
 
-    def end(_: str) -> None:
-        nonlocal depth
-        depth -= 1
+    def _end(self, _: str) -> None:
+        self._open.pop()
 
-    parser.StartDoctypeDeclHandler = refuse_doctype
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    try:
-        parser.Parse(text, True)
-    except expat.ExpatError as error:
-        message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise _fault(message, source, error.lineno if has_lines else None) from None
-    return lines
+    def _fault(self, message: str, line: int | None = None, *, code: str = "bad-xml") -> ModelError:
+        place = line or self._parser.CurrentLineNumber
+        return _fault(message, self._source, place if self._has_lines else None, code=code)
 
 
 def _encoding(raw: bytes, source: Path) -> tuple[str, bytes]:
