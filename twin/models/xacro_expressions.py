@@ -102,7 +102,8 @@ class Expressions:
             Exception: Whatever the evaluation raises.
         """
         code = compiled(expression.strip())
-        variables.update(__builtins__=self._builtins)
+        # A copy each time: the table of an include's namespace can be named, and changed, by an expression.
+        variables.update(__builtins__=dict(self._builtins))
         return self.weigh(eval(code, variables, more))
 
     def weigh(self, value: Any) -> Any:
