@@ -27,7 +27,8 @@ import yaml  # noqa: F401  (xacro imports it when asked for; the door is closed 
 from twin.models.packages import PackagePath, Packages, unknown_package
 from twin.models.sandbox import Refused, close_the_door, limit_resources, refuse_outside
 from twin.models.xacro_document import Sources, elements, place
-from twin.models.xacro_expressions import Expressions, checked, guarded_symbols
+from twin.models.xacro_expressions import Expressions
+from twin.models.xacro_values import checked, guarded_symbols
 from twin.models.xml_text import MAX_BYTES
 
 MAX_MACROS = 300
