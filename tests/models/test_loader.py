@@ -96,10 +96,6 @@ FAULTS = {
         link_c("<visual><geometry><mesh filename='arm.stl'/></geometry></visual>"),
         "mesh 'arm.stl' of link 'c' does not exist",
     ),
-    "undefined material": (
-        link_c(sphere("<material name='red'/>")),
-        "material 'red' of link 'c' is not defined",
-    ),
     "drive joint": (
         "<gazebo><plugin filename='libgazebo_ros_diff_drive.so'><left_joint>j</left_joint>"
         "<right_joint>jj</right_joint><wheel_separation>1</wheel_separation>"

@@ -160,9 +160,9 @@ def _read_material(element: Element, context: LinkContext) -> Rgba:
         return context.materials[name]
     if material.find("texture") is None:
         valid = nearest(name, context.materials) if context.materials else "the file defines none"
-        context.report.add(
+        context.report.warn(
             material,
-            f"material '{name}' of {owner(element)} is not defined; {valid}",
+            f"material '{name}' of {owner(element)} is not defined and shown gray; {valid}",
             code="undefined-material",
         )
     return DEFAULT_RGBA

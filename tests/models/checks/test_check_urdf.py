@@ -115,7 +115,6 @@ ONLY_TWIN_REFUSES = {
     "no inertia": (link_c("<inertial><mass value='1'/></inertial>"), "bad-inertial"),
     "unknown geometry": (link_c("<visual><geometry><cone/></geometry></visual>"), "bad-geometry"),
     "bad box": (link_c("<visual><geometry><box size='1 1'/></geometry></visual>"), "bad-number"),
-    "undefined material": (link_c(f"<visual>{SPHERE}<material name='m'/></visual>"), "undefined-material"),
     "lower above upper": (robot(joint(LIMIT.replace("-1", "2"), "revolute")), "swapped-limits"),
 }  # fmt: skip
 """Files that check_urdf lets pass with a message at most, and twin's code."""

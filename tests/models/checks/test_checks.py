@@ -93,6 +93,7 @@ FOUND = {
     "visual-collision": (arm(AXIS + LIMIT, RAISED), 4, "0.05 m apart"),
     "inertia-too-large": (cart(left=wheel("left", "0", inertial=HEAVY)[0]), 3, "0.812 m from the axis"),
     "inertia-too-small": (cart(left=wheel("left", "0", inertial=LIGHT)[0]), 3, "0.01 times"),
+    "undefined-material": (arm(AXIS + LIMIT, CUBE + RED.format("")), 4, "'red' of link 'tip' is not defined"),
     "idle-mimic": (arm(AXIS + LIMIT + "<mimic joint='q'/>"), 3, "mimics 'q', which does not exist"),
     "lumped-inertia": (arm(AXIS + LIMIT).replace("</robot>", TRINKET), 5, "0.0001, 0.0001, 0.001 kg m²"),
     "repaired-inertia": (arm(AXIS + LIMIT, CUBE.replace("izz='0.001'", "izz='0.0020005'")), 4, "or rounded"),
