@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree
+from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
 from twin.errors import TwinError
 
@@ -28,11 +28,12 @@ _COMMANDS = (
     ("tree", tree.tree, "twin tree my_robot.urdf"),
     ("graph", graph.graph, "twin graph my_robot.urdf -o my_robot.svg"),
     ("convert", convert.convert, "twin convert my_robot.urdf -o my_robot"),
+    ("view", view.view, "twin view my_robot.urdf --joint lift_joint=0.5"),
     ("schema", schema.schema, "twin schema -o scenario.schema.json"),
     ("robots", robots.robots, "twin robots"),
 )
 
-_NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert")
+_NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
 
 for _name, _function, _example in _COMMANDS:
     app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in _NEED_ARGUMENTS)(

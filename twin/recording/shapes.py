@@ -20,7 +20,7 @@ FLOOR_COLOUR = (96, 100, 106, 255)
 FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
-FillMode = Literal["solid", "majorwireframe"]
+FillMode = Literal["solid", "majorwireframe", "transparentfillmajorwireframe"]
 Rgba8 = tuple[int, int, int, int]
 
 

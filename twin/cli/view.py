@@ -1,0 +1,76 @@
+"""`twin view`: a robot in the Rerun viewer, and a page with a slider for every joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twin.cli.model_options import RobotFile, reads_robot
+from twin.errors import ModelError
+from twin.models.options import ReadOptions
+
+
+class Layer(StrEnum):
+    """What can be seen of a robot."""
+
+    VISUAL = "visual"
+    COLLISION = "collision"
+    FRAMES = "frames"
+    JOINT_AXES = "joint_axes"
+    INERTIA = "inertia"
+    CENTRE_OF_MASS = "centre_of_mass"
+
+
+@reads_robot
+def view(
+    file: RobotFile,
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--joint", metavar="NAME=VALUE", help="Position of a joint [rad or m]; may be repeated."
+        ),
+    ] = None,
+    show: Annotated[
+        list[Layer],
+        typer.Option(help="A layer to see at first; may be repeated. The viewer can switch each of them."),
+    ] = [Layer.VISUAL],  # noqa: B006
+    save: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Write a recording instead of opening anything."),
+    ] = None,
+    *,
+    read: ReadOptions,
+) -> None:
+    """Look at a robot file, and move its joints.
+
+    Exit code 0, or 2 for a file with errors; `twin check` names warnings too.
+    """
+    from twin.models import load
+    from twin.recording.posture import Posture
+    from twin.recording.robot_view import save as save_recording
+
+    description = load(file, read)
+    posture = Posture(description)
+    posture.set(joint_values(joint or ()))
+    if save is not None:
+        save_recording(save, posture, description, [layer.value for layer in show])
+
+
+def joint_values(words: Sequence[str]) -> dict[str, float]:
+    """Return the numbers of `NAME=VALUE` words; raises ModelError for a word of another form."""
+    values = {}
+    for word in words:
+        name, _, text = word.rpartition("=")
+        try:
+            values[name] = float(text)
+        except ValueError:
+            name = ""
+        if not name:
+            raise ModelError(
+                f"--joint {word}: must be NAME=VALUE in rad or m, such as --joint lift_joint=0.5"
+            )
+    return values

@@ -1,0 +1,195 @@
+"""Where the joints of a robot stand, as one number per degree of freedom: what sliders and `--joint` set.
+
+Limits, Center, Randomize and Zero are those of joint_state_publisher_gui (ROS, joint_state_publisher 2.4).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from twin.errors import ModelError, nearest
+from twin.geometry import Array, Pose3
+from twin.models.description import Joint, JointType, RobotDescription
+from twin.models.kinematics import joint_positions
+
+Preset = Literal["center", "random", "zero"]
+PRESETS: tuple[Preset, ...] = ("center", "random", "zero")
+REACH_M = 1.0
+"""Range of the sliders of planar and floating joints, which have no limits, to either side."""
+
+_PARTS: Mapping[str, tuple[str, ...]] = {
+    "planar": ("x", "y", "yaw"),
+    "floating": ("x", "y", "z", "roll", "pitch", "yaw"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coordinate:
+    """One number that can be set."""
+
+    name: str
+    """The joint's name; of a planar or floating joint with a part, such as `base_joint/yaw`."""
+    type: JointType
+    unit: Literal["rad", "m"]
+    lower: float
+    """[rad] or [m]"""
+    upper: float
+    """[rad] or [m]"""
+    limited: bool
+    """Whether the file's limits say so; else values beyond are fine, and the bounds are those of a slider."""
+
+    @property
+    def middle(self) -> float:
+        """Of the range; zero without limits."""
+        return (self.lower + self.upper) / 2.0
+
+    @property
+    def zero(self) -> float:
+        """Zero if the joint can be there, else the middle of its range."""
+        return 0.0 if self.lower <= 0.0 <= self.upper else self.middle
+
+
+def coordinates(description: RobotDescription) -> tuple[Coordinate, ...]:
+    """Return what can be set, in file order: no fixed joints, no followers of others."""
+    free = (joint for joint in description.joints.values() if joint.type != "fixed" and joint.mimic is None)
+    return tuple(coordinate for joint in free for coordinate in _of_joint(joint))
+
+
+def _of_joint(joint: Joint) -> tuple[Coordinate, ...]:
+    if joint.type in _PARTS:
+        return tuple(_part(joint, part) for part in _PARTS[joint.type])
+    limit = joint.limit
+    reach = REACH_M if joint.type == "prismatic" else math.pi
+    limited = joint.type != "continuous" and limit.lower is not None and limit.upper is not None
+    return (
+        Coordinate(
+            name=joint.name,
+            type=joint.type,
+            unit="m" if joint.type == "prismatic" else "rad",
+            lower=limit.lower if limited and limit.lower is not None else -reach,
+            upper=limit.upper if limited and limit.upper is not None else reach,
+            limited=limited,
+        ),
+    )
+
+
+def _part(joint: Joint, part: str) -> Coordinate:
+    turns = part in ("roll", "pitch", "yaw")
+    reach = math.pi if turns else REACH_M
+    return Coordinate(
+        name=f"{joint.name}/{part}",
+        type=joint.type,
+        unit="rad" if turns else "m",
+        lower=-reach,
+        upper=reach,
+        limited=False,
+    )
+
+
+class Posture:
+    """The values of all coordinates of a robot; starts at zero where the limits allow it."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        """Take the coordinates from a description."""
+        self._description = description
+        self._coordinates = {coordinate.name: coordinate for coordinate in coordinates(description)}
+        self._values = {name: coordinate.zero for name, coordinate in self._coordinates.items()}
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """By the name of the coordinate [rad or m]."""
+        return dict(self._values)
+
+    @property
+    def positions(self) -> dict[str, float]:
+        """Of every joint with one degree of freedom, followers too [rad or m]."""
+        joints = self._description.joints
+        every = joint_positions(self._description, self._values)
+        return {
+            name: position
+            for name, position in every.items()
+            if joints[name].type in ("revolute", "continuous", "prismatic")
+        }
+
+    def set(self, values: Mapping[str, float]) -> None:
+        """Set some coordinates; on an error none.
+
+        Args:
+            values: By the name of the coordinate [rad or m].
+
+        Raises:
+            ModelError: Of every name that cannot be set and every value that is out of range.
+        """
+        faults = [fault for name, value in values.items() if (fault := self._fault(name, value))]
+        if faults:
+            raise ModelError("; ".join(faults))
+        self._values.update((name, float(value)) for name, value in values.items())
+
+    def preset(self, preset: Preset, rng: np.random.Generator) -> None:
+        """Set all coordinates: to the middle of their ranges, anywhere in them, or to zero."""
+        for name, coordinate in self._coordinates.items():
+            if preset == "random":
+                self._values[name] = float(rng.uniform(coordinate.lower, coordinate.upper))
+            else:
+                self._values[name] = coordinate.middle if preset == "center" else coordinate.zero
+
+    def keep(self, other: Posture) -> None:
+        """Take over the values of another posture, as far as the names exist and the limits allow it."""
+        known = {name: value for name, value in other.values.items() if self._fault(name, value) is None}
+        self._values.update(known)
+
+    def placed(self) -> RobotDescription:
+        """Return the robot with its planar and floating joints moved to where they stand.
+
+        Forward kinematics leaves them at zero; with `positions` it gives all poses of what is returned.
+        """
+        joints = {
+            name: replace(joint, T_parent_joint=joint.T_parent_joint @ self._motion(joint))
+            if joint.type in _PARTS and joint.mimic is None
+            else joint
+            for name, joint in self._description.joints.items()
+        }
+        return replace(self._description, joints=joints)
+
+    def _motion(self, joint: Joint) -> Pose3:
+        value = {part: self._values[f"{joint.name}/{part}"] for part in _PARTS[joint.type]}
+        if joint.type == "floating":
+            return Pose3.from_xyz_rpy(
+                (value["x"], value["y"], value["z"]), (value["roll"], value["pitch"], value["yaw"])
+            )
+        along, across, normal = plane_axes(joint.axis)
+        half = value["yaw"] / 2.0
+        return Pose3(
+            value["x"] * along + value["y"] * across,
+            np.concatenate(([math.cos(half)], math.sin(half) * normal)),
+        )
+
+    def _fault(self, name: str, value: float) -> str | None:
+        coordinate = self._coordinates.get(name)
+        if coordinate is None:
+            joint = self._description.joints.get(name)
+            if joint is not None and joint.mimic is not None:
+                return f"joint '{name}' follows '{joint.mimic.joint}', set that one"
+            if joint is not None and joint.type == "fixed":
+                return f"joint '{name}' is fixed"
+            return f"no joint '{name}' to set: {nearest(name, self._coordinates)}"
+        if not math.isfinite(value):
+            return f"joint '{name}': {value} is not a finite number"
+        if coordinate.limited and not coordinate.lower <= value <= coordinate.upper:
+            bounds = f"[{coordinate.lower:g}, {coordinate.upper:g}] {coordinate.unit}"
+            return f"joint '{name}': {value:g} is outside of its limits {bounds}"
+        return None
+
+
+def plane_axes(normal: tuple[float, float, float]) -> tuple[Array, Array, Array]:
+    """Return x, y and z of the plane of a planar joint, in its frame; x and y themselves for normal z."""
+    z = np.array(normal)
+    leading = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
+    x = leading - (leading @ z) * z
+    x /= np.linalg.norm(x)
+    return x, np.cross(z, x), z
