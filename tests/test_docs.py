@@ -41,6 +41,7 @@ NOT_RUN = {
     r"make (?P<target>\w+)": "sets up an environment of its own: only its recipe is looked at",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
+    r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
 }
 """Commands that are shown but not run here, and why."""
 

@@ -19,8 +19,9 @@ from rosbags.typesys import Stores, get_typestore
 os.environ["RERUN_ANALYTICS"] = "0"
 os.environ["RERUN_STRICT"] = "1"
 
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2, Pose3, wxyz_from_xyzw
 from twin.models.description import Box, Capsule, Cylinder, Sphere
+from twin.recording.read_back import Recording
 from twin.recording.sink import RecordingConfig, RerunSink
 
 ROS = get_typestore(Stores.ROS2_JAZZY)
@@ -458,3 +459,28 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
         sink.on_tick(run.world)
     sink.close(VERDICT)
     return Recorded(path, samples)
+
+
+def _recorded_poses(recording: Recording, root: str) -> dict[str, Pose3]:
+    """Return `T_root_link` of every frame, from the transforms in a recording alone."""
+    columns = {
+        name: [row[0] for row in recording.column("/tf", f"Transform3D:{name}").values]
+        for name in ("translation", "quaternion", "parent_frame", "child_frame")
+    }
+    edges = {
+        child: (parent, Pose3(np.array(xyz, dtype=float), wxyz_from_xyzw(xyzw)))
+        for xyz, xyzw, parent, child in zip(*columns.values(), strict=True)
+    }
+
+    def pose(frame: str) -> Pose3:
+        if frame == root:
+            return Pose3.from_xyz_rpy()
+        parent, T_parent_frame = edges[frame]
+        return pose(parent) @ T_parent_frame
+
+    return {frame: pose(frame) for frame in (root, *edges)}
+
+
+@pytest.fixture
+def recorded_poses() -> Any:
+    return _recorded_poses

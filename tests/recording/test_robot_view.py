@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from twin.errors import ModelError
-from twin.geometry import Pose3, matrix_from_quat_wxyz, wxyz_from_xyzw
+from twin.geometry import Pose3, matrix_from_quat_wxyz
 from twin.models import link_poses, load
 from twin.models.description import Inertial, RobotDescription
 from twin.recording.posture import Posture, plane_axes
-from twin.recording.read_back import Recording, content_digest, read
+from twin.recording.read_back import content_digest, read
 from twin.recording.robot_layers import LAYERS, inertia_box
 from twin.recording.robot_meshes import file_unit, has_materials
 from twin.recording.robot_view import save
@@ -45,30 +45,10 @@ def robot(tmp_path: Path) -> RobotDescription:
     return load(file)
 
 
-def recorded_poses(recording: Recording, root: str) -> dict[str, Pose3]:
-    """Return `T_root_link` of every frame, from the transforms in a recording alone."""
-    columns = {
-        name: [row[0] for row in recording.column("/tf", f"Transform3D:{name}").values]
-        for name in ("translation", "quaternion", "parent_frame", "child_frame")
-    }
-    edges = {
-        child: (parent, Pose3(np.array(xyz, dtype=float), wxyz_from_xyzw(xyzw)))
-        for xyz, xyzw, parent, child in zip(*columns.values(), strict=True)
-    }
-
-    def pose(frame: str) -> Pose3:
-        if frame == root:
-            return Pose3.from_xyz_rpy()
-        parent, T_parent_frame = edges[frame]
-        return pose(parent) @ T_parent_frame
-
-    return {frame: pose(frame) for frame in (root, *edges)}
-
-
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("name", ["every.urdf", "warehouse_bot", "r2d2"])
 def test_recorded_frames_are_forward_kinematics(
-    name: str, seed: int, robot: RobotDescription, tmp_path: Path
+    name: str, seed: int, robot: RobotDescription, tmp_path: Path, recorded_poses: Any
 ) -> None:
     description = robot if name == "every.urdf" else load(name)
     posture = Posture(description)
@@ -143,7 +123,7 @@ def test_layers_are_all_there_and_only_visuals_are_seen_at_first(
     save(tmp_path / "a.rrd", Posture(robot), robot)
     recording = read(tmp_path / "a.rrd")
     tops = {entity.split("/")[1] for entity in recording.entities}
-    assert tops - {"tf", ""} == set(LAYERS)
+    assert tops - {"tf", "tf_static", ""} == set(LAYERS)
     (size,) = recording.column(r"/visual/a\ b", "Boxes3D:half_sizes").values[0]
     (centre,) = recording.column(r"/visual/a\ b", "Boxes3D:centers").values[0]
     assert size == pytest.approx((0.1, 0.05, 0.05))

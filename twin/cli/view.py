@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -42,13 +43,22 @@ def view(
         Path | None,
         typer.Option(metavar="FILE.rrd", help="Write a recording instead of opening anything."),
     ] = None,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show the robot in the page too, instead of a window of its own.")
+    ] = False,
+    port: Annotated[int, typer.Option(help="Port of the page with the sliders.", min=0, max=65535)] = 9091,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Only print the address of the page.")] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Read the file again whenever it is written.")
+    ] = False,
     *,
     read: ReadOptions,
 ) -> None:
     """Look at a robot file, and move its joints.
 
-    Exit code 0, or 2 for a file with errors; `twin check` names warnings too.
+    Ctrl-C ends it, and so does closing the viewer. Exit code 0, or 2 for a file with errors.
     """
+    from twin.cli.console import stderr
     from twin.models import load
     from twin.recording.posture import Posture
     from twin.recording.robot_view import save as save_recording
@@ -56,8 +66,17 @@ def view(
     description = load(file, read)
     posture = Posture(description)
     posture.set(joint_values(joint or ()))
+    layers = [layer.value for layer in show]
     if save is not None:
-        save_recording(save, posture, description, [layer.value for layer in show])
+        save_recording(save, posture, description, layers)
+        return
+    from twin.recording.live_view import LiveViewConfig, live_view
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the viewer too
+    config = LiveViewConfig(web=web, port=port, open_page=not no_open, watch=watch, show=layers, read=read)
+    raise typer.Exit(
+        live_view(file, description, posture, config, on_ready=lambda url: stderr().print(f"open {url}"))
+    )
 
 
 def joint_values(words: Sequence[str]) -> dict[str, float]:

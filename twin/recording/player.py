@@ -48,7 +48,7 @@ def play(
         command += ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(port)]
         on_ready(f"http://{LOCALHOST}:{port}/?url=rerun%2Bhttp://{LOCALHOST}:{data_port}/proxy")
     else:
-        _check_display()
+        check_display()
         command += ["--port", str(free_port())]
     viewer = subprocess.Popen([*command, str(path)], env=viewer_environment())
     try:
@@ -100,7 +100,7 @@ def headless_viewer(path: Path, *, time_s: float | None = None) -> Iterator[View
         command, env=viewer_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as viewer:
         try:
-            _wait_for(lambda: _listens(port) or viewer.poll() is not None)
+            wait_for(lambda: listens(port) or viewer.poll() is not None)
             if viewer.poll() is not None:
                 raise RecordingError("the viewer did not start; is there a working Vulkan driver?")
             client = ViewerClient(f"rerun+http://{LOCALHOST}:{port}/proxy")
@@ -152,28 +152,38 @@ def free_port() -> int:
 
 def _open(client: ViewerClient, path: Path, time_s: float | None) -> None:
     client.open(str(path.resolve()))
-    _wait_for(lambda: not client.get_state().loading and bool(client.get_state().recordings))
+    wait_for(lambda: not client.get_state().loading and bool(client.get_state().recordings))
     if time_s is not None:
         client.set_time("sim_time", duration=time_s, play_state="paused")
     sleep(1.0)  # a view shows what it queried one frame earlier
 
 
-def _check_display() -> None:
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise RecordingError("no display to open the viewer on; `twin play --web` serves it to a browser")
+def has_display() -> bool:
+    """Tell whether a window can be opened."""
+    if sys.platform != "linux":
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def check_display() -> None:
+    """Raise RecordingError if no window can be opened."""
+    if not has_display():
+        raise RecordingError("no display to open the viewer on; --web serves it to a browser")
 
 
 def _check_port(port: int) -> None:
-    if _listens(port):
+    if listens(port):
         raise RecordingError(f"port {port} is in use; choose another one with --port")
 
 
-def _listens(port: int) -> bool:
+def listens(port: int) -> bool:
+    """Tell whether a server listens on a port of this computer."""
     with socket.socket() as probe:
         return probe.connect_ex((LOCALHOST, port)) == 0
 
 
-def _wait_for(condition: Callable[[], bool]) -> None:
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait for something that the viewer does; raises RecordingError if it takes too long."""
     deadline = monotonic() + _LOAD_TIMEOUT_S
     while not condition():
         if monotonic() > deadline:

@@ -21,6 +21,8 @@ from twin.recording.stream import open_recording
 APPLICATION_ID = "twin-view"
 TIMELINE = "posture"
 """The one timeline: the postures that were shown, counted."""
+FLOOR_FRAME = "floor of twin view"
+"""Parent of the root link, and where it is: the screen does not depend on what a robot calls its root."""
 SHOWN = ("visual",)
 """Layers that can be seen at first."""
 LEAST_SIZE_M = 0.1
@@ -39,8 +41,13 @@ class RobotView:
         """
         self._recording = recording
         self._count = 0
+        recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, rr.CoordinateFrame(FLOOR_FRAME), static=True)
         recording.log(
-            "/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, rr.CoordinateFrame(description.root), static=True
+            "/tf_static",
+            rr.Transform3D(
+                translation=(0.0, 0.0, 0.0), parent_frame=FLOOR_FRAME, child_frame=description.root
+            ),
+            static=True,
         )
         low, high = extent(description, Posture(description))
         canvas = Canvas(recording=recording, size=float(np.max(high - low)))
@@ -73,6 +80,10 @@ class RobotView:
         self._recording.flush()
         self._count += 1
 
+    def close(self) -> None:
+        """Send what waits and end the recording."""
+        self._recording.disconnect()
+
 
 def save(path: Path, posture: Posture, description: RobotDescription, show: Collection[str] = SHOWN) -> None:
     """Write a recording of a robot in one posture.
@@ -88,24 +99,25 @@ def save(path: Path, posture: Posture, description: RobotDescription, show: Coll
     """
     blueprint = robot_layout(description, posture, show)
     recording = open_recording(path, APPLICATION_ID, description.name, blueprint)
-    RobotView(recording, description).move(posture)
-    recording.disconnect()
+    view = RobotView(recording, description)
+    view.move(posture)
+    view.close()
 
 
 def robot_layout(
     description: RobotDescription, posture: Posture, show: Collection[str] = SHOWN
 ) -> rrb.Blueprint:
-    """Return the screen: one 3-D view of the whole robot in its root frame, with the layers beside it."""
+    """Return the screen: one 3-D view of the whole robot, with the layers beside it."""
     low, high = extent(description, posture)
     centre, size = (low + high) / 2.0, float(np.max(high - low))
     view = rrb.Spatial3DView(
-        name=description.name or "robot",
+        name="Robot",
         origin="/",
         contents="/**",
         overrides={f"/{layer}": rrb.EntityBehavior(visible=layer in show) for layer in LAYERS},
         background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=_grid_spacing(size), color=(110, 110, 110, 110)),
-        spatial_information=rrb.SpatialInformation(target_frame=description.root),
+        spatial_information=rrb.SpatialInformation(target_frame=FLOOR_FRAME),
         eye_controls=rrb.EyeControls3D(
             kind="Orbital",
             position=centre + size * np.array((0.95, -0.95, 0.55)),
@@ -117,7 +129,7 @@ def robot_layout(
         view,
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        rrb.TimePanel(state="hidden", timeline=TIMELINE),
         auto_views=False,
         auto_layout=False,
     )
