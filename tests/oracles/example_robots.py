@@ -29,7 +29,7 @@ class Outcome:
 
 
 def outcomes(base: Base) -> Iterator[Outcome]:
-    """Convert and compare them one by one; with a free base all shapes are read, else only what is touched."""
+    """Convert and compare them one by one; with a free base, what is only seen is read too."""
     for file in example_robots():
         try:
             description = load(file)
