@@ -50,7 +50,7 @@ def inspect_robot(description: RobotDescription) -> tuple[Diagnostic, ...]:
     if not any(diagnostic.severity == "error" for diagnostic in found):
         base_is_massless = any(diagnostic.code == "massless-base" for diagnostic in found)
         try:
-            convert(description, base="fixed" if base_is_massless else "free")
+            convert(description, base="fixed" if base_is_massless else "free", visuals=False)
         except ConversionError as fault:
             found += from_problems(fault.problems, description.source)
     return in_file_order(found)

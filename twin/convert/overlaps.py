@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,8 +13,10 @@ import numpy as np
 from twin.convert.geoms import primitive
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.wheels import wheels_of
-from twin.models.description import Mesh, RobotDescription
+from twin.models.description import Geometry, Mesh, RobotDescription
+from twin.models.hulls import hull_of
 from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.solids import is_solid
 
 LEAST_DEPTH = 1e-4
 """Shapes that just touch are meant to [m]."""
@@ -24,12 +28,24 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield parts whose shapes are inside of each other, and wheels that touch the part beside them.
 
     Parts that a joint connects may overlap, as MuJoCo lets them pass through each other; wheels may not, as a
-    real one would rub. Meshes are left out.
+    real one would rub. A mesh counts as its convex hull, as in the simulation; but a wheel inside the hull of
+    its neighbour, such as a mudguard, does not rub.
     """
     heads = rigid_groups(description)
     wheels = {wheel.link for wheel in wheels_of(description)}
     joined = {frozenset((heads[joint.parent], heads[joint.child])) for joint in description.joints.values()}
-    for (a, b), distance in _distances(description, heads).items():
+
+    def may_touch(a: _Solid, b: _Solid) -> bool:
+        if heads[a.link] == heads[b.link]:
+            return False
+        if frozenset((heads[a.link], heads[b.link])) not in joined:
+            return True
+        return any(
+            wheel.link in wheels and not isinstance(beside.geometry, Mesh)
+            for wheel, beside in ((a, b), (b, a))
+        )
+
+    for (a, b), distance in _distances(description, may_touch).items():
         neighbours = frozenset((heads[a], heads[b])) in joined
         line = _line(description, b)
         if not neighbours and distance < -LEAST_DEPTH:
@@ -55,33 +71,55 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
             )
 
 
-def _distances(description: RobotDescription, heads: dict[str, str]) -> dict[tuple[str, str], float]:
-    """Return the least distance [m], negative inside, of each pair of links of different rigid parts."""
+@dataclass(frozen=True, kw_only=True)
+class _Solid:
+    """A collision shape."""
+
+    link: str
+    geometry: Geometry
+
+
+def _distances(
+    description: RobotDescription, may_touch: Callable[[_Solid, _Solid], bool]
+) -> dict[tuple[str, str], float]:
+    """Return the least distance [m], negative inside, of each pair of links with shapes that `may_touch`."""
     spec = mujoco.MjSpec()
-    owners: list[str] = []
+    solids: list[_Solid] = []
     for name, pose in link_poses(description).items():
         for collision in description.links[name].collisions:
-            if isinstance(collision.geometry, Mesh):
-                continue
-            placed = pose @ collision.T_link_geometry
-            kind, size = primitive(collision.geometry)
-            spec.worldbody.add_geom(type=kind, size=size, pos=placed.xyz, quat=placed.quat_wxyz)
-            owners.append(name)
+            if is_solid(collision):
+                placed = pose @ collision.T_link_geometry
+                shape = _shape(spec, collision.geometry)
+                spec.worldbody.add_geom(**shape, pos=placed.xyz, quat=placed.quat_wxyz)
+                solids.append(_Solid(link=name, geometry=collision.geometry))
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     least: dict[tuple[str, str], float] = {}
-    for i, j in combinations(range(len(owners)), 2):
-        if heads[owners[i]] == heads[owners[j]] or not _may_touch(model, data, i, j):
+    for (i, a), (j, b) in combinations(enumerate(solids), 2):
+        if not may_touch(a, b) or not _are_near(model, data, i, j):
             continue
         distance = mujoco.mj_geomDistance(model, data, i, j, WHEEL_GAP, None)
         if distance < WHEEL_GAP:
-            pair = (owners[i], owners[j])
+            pair = (a.link, b.link)
             least[pair] = min(distance, least.get(pair, np.inf))
     return least
 
 
-def _may_touch(model: mujoco.MjModel, data: mujoco.MjData, i: int, j: int) -> bool:
+def _shape(spec: mujoco.MjSpec, geometry: Geometry) -> dict[str, Any]:
+    if not isinstance(geometry, Mesh):
+        kind, size = primitive(geometry)
+        return {"type": kind, "size": size}
+    hull = hull_of(geometry)
+    assert hull is not None, "asked for only where is_solid"
+    name = str(len(spec.meshes))
+    spec.add_mesh(
+        name=name, uservert=hull.points.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    )
+    return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
+
+
+def _are_near(model: mujoco.MjModel, data: mujoco.MjData, i: int, j: int) -> bool:
     gap = float(np.linalg.norm(data.geom_xpos[i] - data.geom_xpos[j]))
     return gap < model.geom_rbound[i] + model.geom_rbound[j] + WHEEL_GAP
 

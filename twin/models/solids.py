@@ -1,4 +1,4 @@
-"""Size and mass properties of primitive shapes; meshes are not looked into."""
+"""Size and mass properties of shapes; a mesh counts as its convex hull, which is what it touches with."""
 
 from __future__ import annotations
 
@@ -7,20 +7,34 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from twin.errors import ModelError
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
+from twin.models.hulls import Hull, hull_of
 
 Shape = Visual | Collision
 Primitive = Box | Cylinder | Sphere | Capsule
 
 
-def only_primitives(shapes: Iterable[Shape]) -> bool:
-    """Tell whether the size of all shapes is known."""
-    return not any(isinstance(shape.geometry, Mesh) for shape in shapes)
+def all_solid(shapes: Iterable[Shape]) -> bool:
+    """Tell whether the size and volume of all shapes are known: no mesh is unreadable or flat."""
+    return all(is_solid(shape) for shape in shapes)
+
+
+def is_solid(shape: Shape) -> bool:
+    """Tell whether the size and volume of a shape are known."""
+    if not isinstance(shape.geometry, Mesh):
+        return True
+    try:
+        return hull_of(shape.geometry) is not None
+    except ModelError:
+        return False
 
 
 def reach(geometry: Geometry, direction: Array) -> float:
-    """Return how far a primitive reaches from its centre along a unit vector of its own frame [m]."""
+    """Return how far a shape reaches from its origin along a unit vector of its own frame [m]."""
+    if isinstance(geometry, Mesh):
+        return float(np.max(_hull(geometry).points @ direction))
     x, y, z = (abs(float(value)) for value in direction)
     if isinstance(geometry, Box):
         return (x * geometry.size[0] + y * geometry.size[1] + z * geometry.size[2]) / 2.0
@@ -28,29 +42,31 @@ def reach(geometry: Geometry, direction: Array) -> float:
         return math.hypot(x, y) * geometry.radius + z * geometry.length / 2.0
     if isinstance(geometry, Capsule):
         return geometry.radius + z * geometry.length / 2.0
-    assert isinstance(geometry, Sphere)
     return geometry.radius
 
 
 def lowest(geometry: Geometry, T_root_geometry: Pose3) -> float:
-    """Return the z of the lowest point of a primitive [m]."""
-    down = matrix_from_quat_wxyz(T_root_geometry.quat_wxyz)[2]
-    return float(T_root_geometry.xyz[2]) - reach(geometry, down)
+    """Return the z of the lowest point of a shape [m]."""
+    up = matrix_from_quat_wxyz(T_root_geometry.quat_wxyz)[2]
+    return float(T_root_geometry.xyz[2]) - reach(geometry, -up)
 
 
 def bounds(shapes: Sequence[Shape]) -> tuple[Array, Array]:
-    """Return the corners of the box around primitives, along the link's axes [m], shapes (3,)."""
+    """Return the corners of the box around shapes, along the link's axes [m], shapes (3,)."""
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for shape in shapes:
         R = matrix_from_quat_wxyz(shape.T_link_geometry.quat_wxyz)
-        half = np.array([reach(shape.geometry, R[axis]) for axis in range(3)])
-        lower = np.minimum(lower, shape.T_link_geometry.xyz - half)
-        upper = np.maximum(upper, shape.T_link_geometry.xyz + half)
+        behind = np.array([reach(shape.geometry, -R[axis]) for axis in range(3)])
+        ahead = np.array([reach(shape.geometry, R[axis]) for axis in range(3)])
+        lower = np.minimum(lower, shape.T_link_geometry.xyz - behind)
+        upper = np.maximum(upper, shape.T_link_geometry.xyz + ahead)
     return lower, upper
 
 
 def volume(geometry: Geometry) -> float:
-    """Return the volume of a primitive [m³]."""
+    """Return the volume of a shape [m³]."""
+    if isinstance(geometry, Mesh):
+        return _hull(geometry).volume
     if isinstance(geometry, Box):
         return math.prod(geometry.size)
     assert isinstance(geometry, Primitive)
@@ -61,28 +77,42 @@ def volume(geometry: Geometry) -> float:
     return math.pi * r * r * geometry.length + (ball if isinstance(geometry, Capsule) else 0.0)
 
 
+def centre(geometry: Geometry) -> Array:
+    """Return the centroid of a shape in its own frame [m], shape (3,)."""
+    return _hull(geometry).centroid if isinstance(geometry, Mesh) else np.zeros(3)
+
+
 def gyration(geometry: Geometry) -> Array:
-    """Return the moments of a homogeneous primitive per mass, about its own axes [m²], shape (3,)."""
+    """Return the inertia of a homogeneous shape per mass, about its centroid [m²], shape (3, 3)."""
+    return _hull(geometry).gyration if isinstance(geometry, Mesh) else np.diag(_moments(geometry))
+
+
+def _moments(geometry: Primitive) -> tuple[float, float, float]:
     if isinstance(geometry, Box):
         x, y, z = (edge * edge / 12.0 for edge in geometry.size)
-        return np.array([y + z, x + z, x + y])
-    assert isinstance(geometry, Primitive)
+        return y + z, x + z, x + y
     r = geometry.radius
     if isinstance(geometry, Sphere):
-        return np.full(3, 0.4 * r * r)
+        return 0.4 * r * r, 0.4 * r * r, 0.4 * r * r
     length = geometry.length
     if isinstance(geometry, Cylinder):
         across = r * r / 4.0 + length * length / 12.0
-        return np.array([across, across, r * r / 2.0])
+        return across, across, r * r / 2.0
     ball = (4.0 / 3.0 * r) / (length + 4.0 / 3.0 * r)  # share of the two half balls in the mass
     middle = r * r / 4.0 + length * length / 12.0
     ends = 0.4 * r * r + length * length / 4.0 + 0.375 * length * r
     across = (1.0 - ball) * middle + ball * ends
-    return np.array([across, across, (1.0 - ball) * r * r / 2.0 + ball * 0.4 * r * r])
+    return across, across, (1.0 - ball) * r * r / 2.0 + ball * 0.4 * r * r
+
+
+def _hull(mesh: Mesh) -> Hull:
+    hull = hull_of(mesh)
+    assert hull is not None, "asked for only where is_solid"
+    return hull
 
 
 def homogeneous_inertia(shapes: Sequence[Shape], mass: float, about: Array) -> Array:
-    """Return the inertia of `mass` [kg] spread evenly over primitives [kg m²], shape (3, 3), in link axes.
+    """Return the inertia of `mass` [kg] spread evenly over shapes [kg m²], shape (3, 3), in link axes.
 
     Args:
         shapes: Overlapping ones count twice.
@@ -93,8 +123,8 @@ def homogeneous_inertia(shapes: Sequence[Shape], mass: float, about: Array) -> A
     inertia = np.zeros((3, 3))
     for shape in shapes:
         R = matrix_from_quat_wxyz(shape.T_link_geometry.quat_wxyz)
-        arm = shape.T_link_geometry.xyz - about
-        own = R @ np.diag(gyration(shape.geometry)) @ R.T
+        arm = shape.T_link_geometry.apply(centre(shape.geometry)) - about
+        own = R @ gyration(shape.geometry) @ R.T
         steiner = float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
         inertia += mass * volume(shape.geometry) / total * (own + steiner)
     return inertia

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.wheels import Wheel, wheels_of
-from twin.models.description import Capsule, Link, Mesh, RobotDescription, Sphere
+from twin.models.description import Capsule, Link, RobotDescription, Sphere
 from twin.models.kinematics import link_poses
-from twin.models.solids import Shape, lowest
+from twin.models.solids import Shape, is_solid, lowest
 
 CLEARANCE = 1e-3
 """Least height of the body over the ground [m]."""
@@ -54,7 +54,7 @@ def _feet(description: RobotDescription, wheels: tuple[Wheel, ...]) -> list[_Foo
     feet = []
     for link in description.links.values():
         shapes: tuple[Shape, ...] = link.collisions if solid else link.visuals
-        known = [shape for shape in shapes if not isinstance(shape.geometry, Mesh)]
+        known = [shape for shape in shapes if is_solid(shape)]
         if not known or link.name in turning:
             continue
         heights = [

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Inertial, Link, RobotDescription
+from twin.models.description import Inertial, Link, Mesh, RobotDescription
 from twin.models.mass_properties import LEAST, describe_repair, inertia_as_urdf, inertia_fault
-from twin.models.solids import homogeneous_inertia, only_primitives
+from twin.models.solids import Shape, all_solid, bounds, homogeneous_inertia
 
 ATTAINABLE = 3.0
 """A box with all its mass in the corners has three times the homogeneous moment; no shape reaches more."""
 TINY = 0.1
 ALIKE = 1.2
 """Up to this ratio of its moments, a shape counts as the same about every axis."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Fit:
+    """How an inertia compares with shapes."""
+
+    expected: Array
+    """Of a homogeneous body [kg m²], shape (3, 3), in link axes."""
+    low: float
+    high: float
+    """Least and largest ratio of the moments about any one axis, the inertia's to `expected`."""
+    share: float
+    """Of the largest inertia that mass inside the shapes can have."""
 
 
 def impossible_inertia(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -49,42 +63,52 @@ def impossible_inertia(description: RobotDescription) -> Iterator[Diagnostic]:
 
 
 def inertia(description: RobotDescription) -> Iterator[Diagnostic]:
-    """Yield inertias that do not fit the link's shapes; links with meshes are left alone."""
+    """Yield inertias that do not fit the link's shapes."""
     for link in description.links.values():
         if link.inertial is None or inertia_fault(link.inertial.inertia) or link.inertial.mass <= LEAST:
             continue
-        expected = [
-            homogeneous_inertia(shapes, link.inertial.mass, link.inertial.T_link_com.xyz)
+        R = matrix_from_quat_wxyz(link.inertial.T_link_com.quat_wxyz)
+        actual = R @ link.inertial.inertia @ R.T
+        fits = [
+            _fit(actual, shapes, link.inertial)
             for shapes in (link.collisions, link.visuals)
-            if shapes and only_primitives(shapes)
+            if shapes and all_solid(shapes)
         ]
-        if expected:
-            yield from _compare(description, link, link.inertial, expected)
+        if fits:
+            # Of visual and collision, the one that speaks for the file.
+            best = min(fits, key=lambda fit: max(fit.high, 1 / fit.low))
+            yield from _compare(description, link, link.inertial, actual, best)
+
+
+def _fit(actual: Array, shapes: Sequence[Shape], inertial: Inertial) -> _Fit:
+    expected = homogeneous_inertia(shapes, inertial.mass, inertial.T_link_com.xyz)
+    low, high = _ratios(actual, expected)
+    share = high / ATTAINABLE
+    if any(isinstance(shape.geometry, Mesh) for shape in shapes):
+        # Hulls come in all forms. In a box, the variance of mass along an edge is at most edge²/4.
+        lower, upper = bounds(shapes)
+        variance = (upper - lower) ** 2 / 4.0
+        share = float(np.max(np.diag(actual) / (inertial.mass * (variance.sum() - variance))))
+    return _Fit(expected=expected, low=low, high=high, share=share)
 
 
 def _compare(
-    description: RobotDescription, link: Link, inertial: Inertial, expected: list[Array]
+    description: RobotDescription, link: Link, inertial: Inertial, actual: Array, fit: _Fit
 ) -> Iterator[Diagnostic]:
     R = matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz)
-    actual = R @ inertial.inertia @ R.T
-    # Of visual and collision, the one that speaks for the file.
-    low, high, nearest = min(
-        ((*_ratios(actual, matrix), matrix) for matrix in expected),
-        key=lambda item: max(item[1], 1 / item[0]),
-    )
-    moments = np.linalg.eigvalsh(actual)
-    largest = float(moments[2])
-    if high > ATTAINABLE:
+    low, high = fit.low, fit.high
+    largest = float(np.linalg.eigvalsh(actual)[2])
+    if fit.share > 1.0:
         radius = np.sqrt(largest / inertial.mass)
         code = "inertia-too-large"
         message = (
             f"moment {largest:.4g} kg m² at {inertial.mass:g} kg needs mass {radius:.3g} m from the axis: "
-            f"{high:.3g} times what the shapes give, and {ATTAINABLE:g} times is the most they can hold"
+            f"{fit.share:.3g} times the most that mass inside the shapes can have"
         )
     elif low < TINY:
         code = "inertia-too-small"
         message = f"a moment of the inertia is {low:.2g} times what the shapes give"
-    elif _is_placeholder(actual, nearest):
+    elif _is_placeholder(actual, fit.expected):
         code = "inertia-placeholder"
         message = (
             f"the same moment {largest:.4g} kg m² about every axis is a placeholder: "
@@ -98,7 +122,7 @@ def _compare(
         f"link '{link.name}'",
         inertial.line,
         message=message,
-        fix=f"a homogeneous body has {inertia_as_urdf(R.T @ nearest @ R)}",
+        fix=f"a homogeneous body has {inertia_as_urdf(R.T @ fit.expected @ R)}",
     )
 
 

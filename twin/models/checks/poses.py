@@ -9,7 +9,7 @@ import numpy as np
 from twin.geometry import matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import Cylinder, Link, RobotDescription
-from twin.models.solids import Shape, bounds, only_primitives
+from twin.models.solids import Shape, all_solid, bounds
 
 SHARE = 0.1
 """Of the visual's diagonal by which the centres may differ."""
@@ -19,9 +19,9 @@ AXIS_DEG = 5.0
 
 
 def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
-    """Yield links that are seen and touched in different places; links with meshes are left alone."""
+    """Yield links that are seen and touched in different places."""
     for link in description.links.values():
-        if not link.visuals or not link.collisions or not only_primitives((*link.visuals, *link.collisions)):
+        if not link.visuals or not link.collisions or not all_solid((*link.visuals, *link.collisions)):
             continue
         message = _moved(link) or _turned(link)
         if message:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from twin.geometry import Array, Pose3, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
+from twin.models.checks.discs import Disc, disc_of
 from twin.models.description import Cylinder, Joint, Link, RobotDescription
 from twin.models.kinematics import link_poses
-from twin.models.solids import Shape
 
 TOLERANCE_DEG = 2.0
 LEVEL = math.cos(math.radians(60.0))
@@ -41,38 +41,37 @@ def wheels_of(description: RobotDescription) -> tuple[Wheel, ...]:
     wheels = []
     for joint in description.joints.values():
         pose, link = poses[joint.child], description.links[joint.child]
-        disc = _disc(link.collisions) or _disc(link.visuals)
         if joint.name in driven:
             assert drive is not None
             wheels.append(Wheel(joint=joint, link=link.name, centre=pose.xyz, radius=drive.wheel_radius))
-        elif disc is not None and _turns_like_a_wheel(description, joint, pose):
-            centre = pose.apply(disc.T_link_geometry.xyz)
-            assert isinstance(disc.geometry, Cylinder)
-            wheels.append(Wheel(joint=joint, link=link.name, centre=centre, radius=disc.geometry.radius))
+        elif _turns_like_a_wheel(description, joint, pose):
+            disc = _disc(link)
+            if disc is not None and _is_round_about(disc, joint):
+                centre = pose.apply(disc.centre)
+                wheels.append(Wheel(joint=joint, link=link.name, centre=centre, radius=disc.radius))
     return tuple(wheels)
 
 
 def wheel_axis(description: RobotDescription) -> Iterator[Diagnostic]:
-    """Yield wheels whose cylinder does not lie along the joint's axis."""
+    """Yield wheels whose cylinder or round mesh does not lie along the joint's axis."""
     for wheel in wheels_of(description):
         link, axis = description.links[wheel.link], np.array(wheel.joint.axis)
-        angles = [
-            (_angle_deg(shape, axis), shape)
-            for shape in (_disc(link.collisions), _disc(link.visuals))
-            if shape is not None
-        ]
-        if not angles or max(angles, key=lambda pair: pair[0])[0] <= TOLERANCE_DEG:
+        discs = [disc for disc in (disc_of(link.collisions), disc_of(link.visuals)) if disc is not None]
+        worst = max(discs, key=lambda disc: _angle_deg(disc.axis, axis), default=None)
+        if worst is None or _angle_deg(worst.axis, axis) <= TOLERANCE_DEG:
             continue
-        angle, shape = max(angles, key=lambda pair: pair[0])
-        roll = _origin_rpy(axis)
+        is_cylinder = isinstance(worst.shape.geometry, Cylinder)
         yield finding(
             description,
             "wheel-axis",
             f"link '{link.name}'",
-            shape.line,
-            message=f"the wheel's cylinder stands {angle:.1f} degrees off the axis of joint "
-            f"'{wheel.joint.name}', so that the wheel tumbles instead of rolling",
-            fix=f"lay it along the axis: <origin rpy='{roll}'/> in its visual and collision",
+            worst.shape.line,
+            message=f"the wheel's {'cylinder' if is_cylinder else 'round mesh'} stands "
+            f"{_angle_deg(worst.axis, axis):.1f} degrees off the axis of joint '{wheel.joint.name}', so that "
+            "the wheel tumbles instead of rolling",
+            fix=f"lay it along the axis: <origin rpy='{_origin_rpy(axis)}'/> in its visual and collision"
+            if is_cylinder
+            else "turn it by the <origin rpy=''/> of its visual and collision, or correct the joint's <axis>",
         )
 
 
@@ -80,8 +79,7 @@ def wheel_fixed(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield discs that are called a wheel and cannot turn."""
     for joint in description.joints.values():
         link = description.links[joint.child]
-        disc = _disc(link.collisions) or _disc(link.visuals)
-        if joint.type != "fixed" or disc is None or not WHEEL_NAME.search(link.name):
+        if joint.type != "fixed" or not WHEEL_NAME.search(link.name) or _disc(link) is None:
             continue
         x, y, z = joint.T_parent_joint.xyz
         where = "at its centre" if not np.any(joint.T_parent_joint.xyz) else f"at {x:g} {y:g} {z:g} m"
@@ -95,17 +93,8 @@ def wheel_fixed(description: RobotDescription) -> Iterator[Diagnostic]:
         )
 
 
-def _disc(shapes: Sequence[Shape]) -> Shape | None:
-    """Return the widest cylinder, if it is wider than long."""
-    cylinders = [shape for shape in shapes if isinstance(shape.geometry, Cylinder)]
-    widest = max(cylinders, key=_radius, default=None)
-    if widest is None or not isinstance(widest.geometry, Cylinder):
-        return None
-    return widest if widest.geometry.length < 2.0 * widest.geometry.radius else None
-
-
-def _radius(shape: Shape) -> float:
-    return shape.geometry.radius if isinstance(shape.geometry, Cylinder) else 0.0
+def _disc(link: Link) -> Disc | None:
+    return disc_of(link.collisions) or disc_of(link.visuals)
 
 
 def _turns_like_a_wheel(description: RobotDescription, joint: Joint, T_root_link: Pose3) -> bool:
@@ -113,21 +102,15 @@ def _turns_like_a_wheel(description: RobotDescription, joint: Joint, T_root_link
         return False
     if any(below.type != "fixed" for below in description.children(joint.child)):
         return False
-    return abs(rotate_wxyz(T_root_link.quat_wxyz, joint.axis)[2]) < LEVEL and _is_round_about(
-        description.links[joint.child], joint
-    )
+    return bool(abs(rotate_wxyz(T_root_link.quat_wxyz, joint.axis)[2]) < LEVEL)
 
 
-def _is_round_about(link: Link, joint: Joint) -> bool:
+def _is_round_about(disc: Disc, joint: Joint) -> bool:
     """Tell whether the disc's centre lies on the joint's axis."""
-    disc = _disc(link.collisions) or _disc(link.visuals)
-    assert disc is not None
-    offset = np.cross(disc.T_link_geometry.xyz, joint.axis)
-    return float(np.linalg.norm(offset)) < 0.2 * _radius(disc)
+    return float(np.linalg.norm(np.cross(disc.centre, joint.axis))) < 0.2 * disc.radius
 
 
-def _angle_deg(shape: Shape, axis: Array) -> float:
-    along = rotate_wxyz(shape.T_link_geometry.quat_wxyz, (0.0, 0.0, 1.0))
+def _angle_deg(along: Array, axis: Array) -> float:
     return math.degrees(math.atan2(float(np.linalg.norm(np.cross(along, axis))), abs(float(along @ axis))))
 
 
