@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.models.description import Mesh
-from twin.models.meshes import is_flat, scaled_points
+from twin.models.meshes import TriangleMesh, is_flat, read_mesh, scaled_points
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,13 +26,17 @@ class Hull:
     """Homogeneous inertia per mass about the centroid [m²], shape (3, 3)."""
 
 
-@lru_cache(maxsize=512)
 def hull_of(mesh: Mesh) -> Hull | None:
     """Return the convex hull of a mesh; None if it is flat.
 
     Raises:
         ModelError: The mesh cannot be read.
     """
+    return _hull_of(mesh, read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis))
+
+
+@lru_cache(maxsize=512)
+def _hull_of(mesh: Mesh, _content: TriangleMesh) -> Hull | None:
     from scipy.spatial import ConvexHull, QhullError  # takes a quarter of a second to import
 
     points = scaled_points(mesh)

@@ -58,10 +58,10 @@ def format_of(data: bytes, suffix: str) -> Format:
         return "msh"
     if suffix in _OTHER_SUFFIXES:
         raise ValueError(f"is {_OTHER_SUFFIXES[suffix]}; {READABLE} are read")
-    if suffix == ".stl":
-        return "stl"
     if b"\0" not in start and re.search(rb"^\s*v\s", data, re.MULTILINE):
         return "obj"
+    if suffix == ".stl":
+        return "stl"
     raise ValueError(f"is no mesh of a known format; {READABLE} are read")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from twin.models.solids import Shape, all_solid, bounds, homogeneous_inertia
 
 ATTAINABLE = 3.0
 """A box with all its mass in the corners has three times the homogeneous moment; no shape reaches more."""
+MESH_SLACK = 1.5
+"""A mesh may leave out covers, motors and cables that weigh something outside of it."""
 TINY = 0.1
 ALIKE = 1.2
 """Up to this ratio of its moments, a shape counts as the same about every axis."""
@@ -77,6 +79,7 @@ def inertia(description: RobotDescription) -> Iterator[Diagnostic]:
         if fits:
             # Of visual and collision, the one that speaks for the file.
             best = min(fits, key=lambda fit: max(fit.high, 1 / fit.low))
+            best = replace(best, share=min(fit.share for fit in fits))
             yield from _compare(description, link, link.inertial, actual, best)
 
 
@@ -88,7 +91,8 @@ def _fit(actual: Array, shapes: Sequence[Shape], inertial: Inertial) -> _Fit:
         # Hulls come in all forms. In a box, the variance of mass along an edge is at most edge²/4.
         lower, upper = bounds(shapes)
         variance = (upper - lower) ** 2 / 4.0
-        share = float(np.max(np.diag(actual) / (inertial.mass * (variance.sum() - variance))))
+        most = MESH_SLACK * inertial.mass * (variance.sum() - variance)
+        share = float(np.max(np.diag(actual) / most))
     return _Fit(expected=expected, low=low, high=high, share=share)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.geometry import matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Cylinder, Link, RobotDescription
+from twin.models.description import Cylinder, Link, Mesh, RobotDescription
 from twin.models.solids import Shape, all_solid, bounds
 
 SHARE = 0.1
@@ -16,6 +16,8 @@ SHARE = 0.1
 LEAST = 5e-3
 """[m]"""
 AXIS_DEG = 5.0
+SIZES = 20.0
+"""Ratio of the diagonals that simplifying does not explain; a forgotten unit does."""
 
 
 def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -23,7 +25,11 @@ def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
     for link in description.links.values():
         if not link.visuals or not link.collisions or not all_solid((*link.visuals, *link.collisions)):
             continue
-        message = _moved(link) or _turned(link)
+        shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)
+        if any(isinstance(shape.geometry, Mesh) for shape in shapes):
+            message = _differs(link)
+        else:
+            message = _moved(link) or _turned(link)
         if message:
             yield finding(
                 description,
@@ -43,6 +49,19 @@ def _moved(link: Link) -> str | None:
         return None
     centres = [" ".join(f"{value + 0.0:.3g}" for value in np.round(point, 9)) for point in (seen, touched)]
     return f"its visual is around {centres[0]}, its collision around {centres[1]}: {distance:.3g} m apart"
+
+
+def _differs(link: Link) -> str | None:
+    """Compare where one is a mesh: simple shapes stand for some part of it, and are not centred on it."""
+    (low, high), (touch_low, touch_high) = bounds(link.visuals), bounds(link.collisions)
+    ratio = float(np.linalg.norm(high - low) / np.linalg.norm(touch_high - touch_low))
+    if max(ratio, 1.0 / ratio) > SIZES:
+        return f"its visual is {ratio:.3g} times as large as its collision: does one of them lack a scale?"
+    outside = np.maximum(np.maximum(low - touch_high, touch_low - high), 0.0)
+    distance = float(np.linalg.norm(outside))
+    if distance <= LEAST:
+        return None
+    return f"its visual and its collision are {distance:.3g} m apart"
 
 
 def _turned(link: Link) -> str | None:
