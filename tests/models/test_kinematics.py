@@ -11,9 +11,9 @@ import pytest
 from twin.errors import ModelError
 from twin.geometry import Pose3, matrix_from_quat_wxyz
 from twin.models import load
-from twin.models.description import RobotDescription
+from twin.models.description import Joint, RobotDescription
 from twin.models.dynamics import degrees_of_freedom
-from twin.models.kinematics import joint_positions
+from twin.models.kinematics import joint_positions, planar_axes
 from twin.models.loader import parse_urdf
 
 TEXT = """<robot name='r'>
@@ -75,6 +75,19 @@ def test_a_planar_joint_moves_in_the_plane_of_its_axis(robot: RobotDescription) 
     start, end = (robot.pose("cart", {"drive": position}) for position in ((0, 0, 0), (3, 4, 1)))
     assert np.linalg.norm(end.xyz - start.xyz) == pytest.approx(5.0)
     assert (end.xyz - start.xyz) @ normal == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8), (0.0, 0.0, -1.0)])
+def test_axes_of_a_plane_are_a_right_handed_frame(normal: tuple[float, float, float]) -> None:
+    joint = Joint(
+        name="j", type="planar", parent="a", child="b", T_parent_joint=Pose3.from_xyz_rpy(), axis=normal
+    )
+    R = np.stack(planar_axes(joint), axis=1)
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    assert R[:, 2] == pytest.approx(normal)
+    if normal == (0.0, 0.0, 1.0):
+        np.testing.assert_array_equal(R, np.eye(3))
 
 
 def test_poses_between_any_two_frames() -> None:

@@ -133,18 +133,18 @@ def test_all_polygons_of_collada_become_triangles(tmp_path: Path, primitives: st
 
 
 @pytest.mark.parametrize("up", ["X_UP", "Y_UP", "Z_UP", None])
-def test_collada_is_scaled_by_its_unit_and_turned_only_on_demand(tmp_path: Path, up: str | None) -> None:
+def test_collada_is_scaled_by_its_unit_and_turned_by_its_up_axis(tmp_path: Path, up: str | None) -> None:
     asset = "<unit name='centimeter' meter='0.01'/>" + (f"<up_axis>{up}</up_axis>" if up else "")
-    as_it_is = read(tmp_path, dae(asset=asset))
+    as_it_is = read(tmp_path, dae(asset=asset), apply_up_axis=False)
     assert_allclose(corners(as_it_is), 0.01 * SORTED)
-    turned = read(tmp_path, dae(asset=asset), "turned.dae", apply_up_axis=True)
+    turned = read(tmp_path, dae(asset=asset), "turned.dae")
     x, y, z = 0.01, 0.02, 0.03
     (low, high) = turned.points.min(axis=0), turned.points.max(axis=0)
     expected = {
         "X_UP": ([-y, -z, 0], [0, 0, x]),
         "Y_UP": ([0, -z, 0], [x, 0, y]),
         "Z_UP": ([0, 0, 0], [x, y, z]),
-    }[up or "Y_UP"]
+    }[up or "Z_UP"]
     assert_allclose([low, high], expected, atol=1e-12)
     assert volume(turned) == pytest.approx(1e-6)
 

@@ -13,7 +13,7 @@ from twin.errors import ModelError
 from twin.geometry import Pose3, matrix_from_quat_wxyz
 from twin.models import link_poses, load
 from twin.models.description import Inertial, RobotDescription
-from twin.recording.posture import Posture, plane_axes
+from twin.recording.posture import Posture
 from twin.recording.read_back import content_digest, read
 from twin.recording.robot_layers import LAYERS, inertia_box
 from twin.recording.robot_meshes import file_unit, has_materials
@@ -55,8 +55,7 @@ def test_recorded_frames_are_forward_kinematics(
     posture.preset("random", np.random.default_rng(seed))
     save(tmp_path / "a.rrd", posture, description)
     poses = recorded_poses(read(tmp_path / "a.rrd"), description.root)
-    # The planar and the floating joint are where forward kinematics leaves them at zero: a test below.
-    expected = link_poses(posture.placed() if name == "every.urdf" else description, posture.values)
+    expected = link_poses(description, posture.positions)
     assert poses.keys() == expected.keys()
     for link, pose in expected.items():
         assert poses[link].xyz == pytest.approx(pose.xyz, abs=1e-6), link
@@ -68,19 +67,11 @@ def test_recorded_frames_are_forward_kinematics(
 def test_followers_planes_and_free_bodies_move(robot: RobotDescription) -> None:
     posture = Posture(robot)
     posture.set({"turn": 1.0, "plane/x": 0.5, "plane/y": -0.25, "plane/yaw": math.pi / 2, "fly/z": 2.0})
-    assert posture.positions["follow"] == pytest.approx(-2.0 * 1.0 + 0.25)
-    poses = link_poses(posture.placed(), posture.positions)
+    assert posture.followers["follow"] == pytest.approx(-2.0 * 1.0 + 0.25)
+    poses = link_poses(robot, posture.positions)
     assert poses["p"].xyz == pytest.approx((0.5, -0.25, 0.0))
     assert poses["p"].apply((1.0, 0.0, 0.0)) == pytest.approx((0.5, 0.75, 0.0))
     assert poses["o"].xyz == pytest.approx((0.0, 0.0, 2.0))
-
-
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)])
-def test_axes_of_a_plane_are_a_right_handed_frame(normal: tuple[float, float, float]) -> None:
-    R = np.stack(plane_axes(normal), axis=1)
-    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
-    assert np.linalg.det(R) == pytest.approx(1.0)
-    assert R[:, 2] == pytest.approx(normal)
 
 
 def test_presets_are_those_of_joint_state_publisher(robot: RobotDescription) -> None:

@@ -36,7 +36,7 @@ class Screen:
 
     def __init__(self) -> None:
         self.robots: list[RobotDescription] = []
-        self.postures: list[dict[str, float]] = []
+        self.postures: list[dict[str, Any]] = []
         self.closed = 0
 
     def draw(self, description: RobotDescription, posture: Posture) -> Screen:

@@ -49,6 +49,9 @@ def _options(
     missing_mesh: Annotated[
         MissingMesh, typer.Option(help="skip: leave out shapes whose mesh is missing or unreadable.")
     ] = MissingMesh.ERROR,
+    ignore_up_axis: Annotated[
+        bool, typer.Option("--ignore-up-axis", help="Ignore what COLLADA meshes call up, as RViz does.")
+    ] = False,
     repair: Annotated[
         bool,
         typer.Option("--repair", help="Take the nearest possible inertia where the file's is not."),
@@ -61,6 +64,7 @@ def _options(
         allow_env=tuple(allow_env or ()),
         allow_paths=tuple(allow_path or ()),
         missing_mesh=missing_mesh.value,
+        apply_up_axis=not ignore_up_axis,
         repair=repair,
     )
 

@@ -10,6 +10,7 @@ from twin.convert.mesh_assets import mesh_asset
 from twin.convert.roles import Roles
 from twin.geometry import Pose3
 from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Link, Mesh, Sphere, Visual
+from twin.models.meshes import read_mesh
 
 GROUP_VISUAL = 2
 GROUP_COLLISION = 3
@@ -50,7 +51,7 @@ class GeomBuilder:
         for visual in link.visuals if self._visuals else ():
             body.add_geom(
                 **self._shape(visual),
-                rgba=visual.rgba,
+                rgba=_rgba(visual),
                 group=GROUP_VISUAL,
                 contype=0,
                 conaffinity=0,
@@ -106,6 +107,15 @@ class GeomBuilder:
 
 
 _TYPE = mujoco.mjtGeom
+
+
+def _rgba(visual: Visual) -> tuple[float, float, float, float]:
+    """Return the material's colour; without a material, that of most of the mesh, if its file tells."""
+    mesh = visual.geometry
+    if visual.has_material or not isinstance(mesh, Mesh):
+        return visual.rgba
+    colour = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis).colour
+    return visual.rgba if colour is None else (*colour, 1.0)
 
 
 def _placed(pose: Pose3) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Mesh files as what MuJoCo reads: binary STL, OBJ and MSH stay as they are, others become binary STL."""
+"""Mesh files as what MuJoCo reads: binary STL, OBJ and MSH mostly stay, others become binary STL."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def mesh_asset(mesh: Mesh) -> tuple[str, bytes]:
 @lru_cache(maxsize=128)
 def _content(path: Path, triangles: TriangleMesh) -> tuple[str, bytes]:
     few = len(triangles.faces) <= MOST_STL_FACES
-    if triangles.format in _KEPT and (few or triangles.format != "stl"):
+    if triangles.format in _KEPT and triangles.is_verbatim and (few or triangles.format != "stl"):
         return _KEPT[triangles.format], path.read_bytes()
     if few:
         return ".stl", write_stl(triangles.points, triangles.faces)

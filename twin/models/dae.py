@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from xml.parsers import expat
 
 import numpy as np
@@ -33,17 +34,31 @@ _INSTANCES = ("instance_geometry", "instance_controller", "instance_node")
 Rgb = tuple[float, float, float]
 
 
-def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> tuple[Array, Faces, Rgb | None]:
-    """Return points [m], shape (n, 3), triangles, and the diffuse colour of most of them, if any.
+@dataclass(frozen=True, kw_only=True)
+class Collada:
+    """The triangles of a COLLADA file."""
 
-    `<unit meter>` and the nodes' transforms are applied. `<up_axis>` is so only on demand: RViz, Gazebo,
-    MoveIt and pinocchio take the axes as they are (rviz_rendering's assimp_loader sets
-    IMPORT_COLLADA_IGNORE_UP_DIRECTION, gz-common's ColladaLoader does not read the tag), and robots rely on
-    it: TIAGo's and Baxter's meshes that say Y_UP fit their STL twins only as they are.
+    points: Array
+    """Shape (n, 3) [m]."""
+    faces: Faces
+    """Shape (m, 3)."""
+    colour: Rgb | None
+    """The diffuse colour of most of the triangles."""
+    up_axis: str
+    """`X_UP`, `Y_UP` or `Z_UP`."""
+
+
+def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
+    """Return what a COLLADA file shows.
+
+    `<unit meter>` and the nodes' transforms are applied, and `<up_axis>` if it is there and wanted. RViz,
+    Gazebo, MoveIt and pinocchio ignore it (rviz_rendering's assimp_loader sets
+    IMPORT_COLLADA_IGNORE_UP_DIRECTION, gz-common's ColladaLoader does not read the tag), and some robots
+    rely on that: TIAGo's and Baxter's meshes that say Y_UP fit their STL twins only unturned.
 
     Args:
         data: The file.
-        apply_up_axis: Turn the mesh so that its up axis (by default y) becomes z.
+        apply_up_axis: Turn the mesh so that what it calls up becomes z.
         most_faces: More triangles are an error.
 
     Raises:
@@ -68,9 +83,11 @@ def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> tuple[Arra
         raise ValueError("has no triangles in its scene")
     points, faces = _joined(parts)
     points *= _unit(root)
+    up_axis = _up_axis(root)
     if apply_up_axis:
-        points = points @ _up(root).T
-    return points, faces, colours.most_common(1)[0][0] if colours else None
+        points = points @ UP_AXES[up_axis].T
+    colour = colours.most_common(1)[0][0] if colours else None
+    return Collada(points=points, faces=faces, colour=colour, up_axis=up_axis)
 
 
 def _parse(data: bytes) -> Element:
@@ -116,11 +133,12 @@ def _unit(root: Element) -> float:
     return metres
 
 
-def _up(root: Element) -> Array:
-    up = (root.findtext("{*}asset/{*}up_axis") or "Y_UP").strip()
+def _up_axis(root: Element) -> str:
+    # By the specification the default is Y_UP; robots' files without the tag mean that z is up.
+    up = (root.findtext("{*}asset/{*}up_axis") or "Z_UP").strip()
     if up not in UP_AXES:
         raise ValueError(f"has the up axis '{up}'; valid: {', '.join(UP_AXES)}")
-    return UP_AXES[up]
+    return up
 
 
 def _target(element: Element, attribute: str, by_id: dict[str, Element]) -> Element:

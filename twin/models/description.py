@@ -60,8 +60,7 @@ class Mesh:
     path: Path
     """Resolved, existing file."""
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Along x, y, z; none is zero, negative ones mirror."""
-    apply_up_axis: bool = False
+    apply_up_axis: bool = True
     """Turn a COLLADA file as its `<up_axis>` says."""
 
 
@@ -89,6 +88,8 @@ class Visual:
     geometry: Geometry
     rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
     """Resolved from the file's materials."""
+    has_material: bool = True
+    """Without one, a mesh may have a colour of its own."""
     name: str = ""
     line: int = 0
 
@@ -112,7 +113,6 @@ class SkippedMesh:
     reference: str
     """The mesh as the file names it."""
     reason: str
-    """Such as `does not exist`."""
     line: int = 0
 
 

@@ -143,6 +143,7 @@ def _read_visual(element: Element, geometry: Geometry, context: LinkContext) -> 
         T_link_geometry=read_origin(element, context.report),
         geometry=geometry,
         rgba=_read_material(element, context),
+        has_material=element.find("material") is not None,
         name=element.get("name", ""),
         line=context.report.line(element),
     )

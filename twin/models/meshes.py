@@ -39,11 +39,15 @@ class TriangleMesh:
     faces: Faces
     """Shape (m, 3), counter-clockwise seen from outside."""
     format: Format
+    is_verbatim: bool
+    """The file has no other points; MuJoCo would take them into the convex hull."""
     colour: Rgb | None = None
     """Of most of the triangles; only COLLADA files tell."""
+    up_axis: str = "Z_UP"
+    """What the file calls up; other axes are those of COLLADA files only."""
 
 
-def read_mesh(path: Path, *, apply_up_axis: bool = False) -> TriangleMesh:
+def read_mesh(path: Path, *, apply_up_axis: bool = True) -> TriangleMesh:
     """Return the triangles of an STL, OBJ, COLLADA or MSH file; the same object while the file is the same.
 
     Args:
@@ -74,7 +78,7 @@ def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> Tria
         data = path.read_bytes()
         kind = format_of(data, path.suffix.lower())
         with np.errstate(over="ignore", invalid="ignore"):
-            points, faces, colour = _parse(data, kind, apply_up_axis)
+            points, faces, colour, up_axis = _parse(data, kind, apply_up_axis)
     except OSError as error:
         raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
     except (ValueError, OverflowError, RecursionError, MemoryError) as error:
@@ -83,16 +87,20 @@ def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> Tria
     if flaw:
         raise _fault(path, flaw, code="bad-mesh")
     used, faces = np.unique(faces, return_inverse=True)
+    is_verbatim = len(used) == len(points)
     points, faces = points[used], faces.reshape(-1, 3)
     points.flags.writeable = faces.flags.writeable = False  # it is shared
-    return TriangleMesh(points=points, faces=faces, format=kind, colour=colour)
+    return TriangleMesh(
+        points=points, faces=faces, format=kind, is_verbatim=is_verbatim, colour=colour, up_axis=up_axis
+    )
 
 
-def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> tuple[Array, Faces, Rgb | None]:
+def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> tuple[Array, Faces, Rgb | None, str]:
     if kind == "dae":
-        return read_dae(data, apply_up_axis=apply_up_axis, most_faces=MOST_FACES)
+        collada = read_dae(data, apply_up_axis=apply_up_axis, most_faces=MOST_FACES)
+        return collada.points, collada.faces, collada.colour, collada.up_axis
     readers = {"stl": read_stl, "ascii-stl": read_ascii_stl, "obj": read_obj, "msh": read_msh}
-    return *readers[kind](data), None
+    return *readers[kind](data), None, "Z_UP"
 
 
 def _flaw(points: Array, faces: Faces) -> str | None:

@@ -22,7 +22,7 @@ class ReadOptions:
     """Folders, beside that of the file and its packages, below which files may be read."""
     missing_mesh: Literal["error", "skip"] = "error"
     """`skip`: a shape whose mesh is missing or unreadable is left out, with a warning."""
-    apply_up_axis: bool = False
+    apply_up_axis: bool = True
     """Turn COLLADA meshes as their `<up_axis>` says, which RViz and Gazebo ignore."""
     repair: bool = False
     """Take the nearest physical inertia for a moving part whose own is impossible, with a warning."""

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from twin.errors import ModelError, nearest
-from twin.geometry import Array, Pose3
+from twin.geometry import Array, quat_wxyz_from_rpy
 from twin.models.description import Joint, JointType, RobotDescription
 from twin.models.kinematics import joint_positions
 
@@ -106,15 +106,20 @@ class Posture:
         return dict(self._values)
 
     @property
-    def positions(self) -> dict[str, float]:
-        """Of every joint with one degree of freedom, followers too [rad or m]."""
-        joints = self._description.joints
-        every = joint_positions(self._description, self._values)
-        return {
-            name: position
-            for name, position in every.items()
-            if joints[name].type in ("revolute", "continuous", "prismatic")
+    def positions(self) -> dict[str, Array]:
+        """Of every joint, followers too, as `twin.models.kinematics.joint_positions` returns them."""
+        given = {
+            joint.name: self._position(joint)
+            for joint in self._description.joints.values()
+            if joint.type != "fixed" and joint.mimic is None
         }
+        return joint_positions(self._description, given)
+
+    @property
+    def followers(self) -> dict[str, float]:
+        """Position of every joint that follows another [rad or m]."""
+        joints, every = self._description.joints, self.positions
+        return {name: float(every[name][0]) for name, joint in joints.items() if joint.mimic is not None}
 
     def set(self, values: Mapping[str, float]) -> None:
         """Set some coordinates; on an error none.
@@ -143,31 +148,13 @@ class Posture:
         known = {name: value for name, value in other.values.items() if self._fault(name, value) is None}
         self._values.update(known)
 
-    def placed(self) -> RobotDescription:
-        """Return the robot with its planar and floating joints moved to where they stand.
-
-        Forward kinematics leaves them at zero; with `positions` it gives all poses of what is returned.
-        """
-        joints = {
-            name: replace(joint, T_parent_joint=joint.T_parent_joint @ self._motion(joint))
-            if joint.type in _PARTS and joint.mimic is None
-            else joint
-            for name, joint in self._description.joints.items()
-        }
-        return replace(self._description, joints=joints)
-
-    def _motion(self, joint: Joint) -> Pose3:
-        value = {part: self._values[f"{joint.name}/{part}"] for part in _PARTS[joint.type]}
-        if joint.type == "floating":
-            return Pose3.from_xyz_rpy(
-                (value["x"], value["y"], value["z"]), (value["roll"], value["pitch"], value["yaw"])
-            )
-        along, across, normal = plane_axes(joint.axis)
-        half = value["yaw"] / 2.0
-        return Pose3(
-            value["x"] * along + value["y"] * across,
-            np.concatenate(([math.cos(half)], math.sin(half) * normal)),
-        )
+    def _position(self, joint: Joint) -> Array:
+        if joint.type not in _PARTS:
+            return np.array([self._values[joint.name]])
+        values = np.array([self._values[f"{joint.name}/{part}"] for part in _PARTS[joint.type]])
+        if joint.type == "planar":
+            return values
+        return np.concatenate((values[:3], quat_wxyz_from_rpy(*values[3:])))
 
     def _fault(self, name: str, value: float) -> str | None:
         coordinate = self._coordinates.get(name)
@@ -184,12 +171,3 @@ class Posture:
             bounds = f"[{coordinate.lower:g}, {coordinate.upper:g}] {coordinate.unit}"
             return f"joint '{name}': {value:g} is outside of its limits {bounds}"
         return None
-
-
-def plane_axes(normal: tuple[float, float, float]) -> tuple[Array, Array, Array]:
-    """Return x, y and z of the plane of a planar joint, in its frame; x and y themselves for normal z."""
-    z = np.array(normal)
-    leading = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
-    x = leading - (leading @ z) * z
-    x /= np.linalg.norm(x)
-    return x, np.cross(z, x), z

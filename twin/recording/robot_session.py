@@ -121,7 +121,7 @@ class RobotSession:
             "revision": self._revision,
             "robot_revision": self._robot_revision,
             "values": values,
-            "followers": {k: v for k, v in self._posture.positions.items() if k not in values},
+            "followers": self._posture.followers,
         }
 
     def _mimics(self) -> list[dict[str, Any]]:
@@ -135,7 +135,7 @@ class RobotSession:
                 **asdict(joint.mimic),
             }
             for joint in self._description.joints.values()
-            if joint.mimic is not None and joint.name in self._posture.positions
+            if joint.mimic is not None
         ]
 
 

@@ -49,6 +49,7 @@ class RobotView:
             ),
             static=True,
         )
+        self._joints = tuple(description.joints.values())
         low, high = extent(description, Posture(description))
         canvas = Canvas(recording=recording, size=float(np.max(high - low)))
         for draw in LAYERS.values():
@@ -60,21 +61,17 @@ class RobotView:
         All joints are sent, not only those that moved: a viewer that connects late finds the last posture in
         one piece, whatever the server has dropped to save memory.
         """
-        robot = posture.placed()
-        positions = posture.positions
-        if robot.joints:
-            poses = [
-                joint.T_parent_joint @ joint_motion(joint, positions.get(name, 0.0))
-                for name, joint in robot.joints.items()
-            ]
+        joints, positions = self._joints, posture.positions
+        if joints:
+            poses = [joint.T_parent_joint @ joint_motion(joint, positions[joint.name]) for joint in joints]
             self._recording.send_columns(
                 "/tf",
                 [rr.TimeColumn(TIMELINE, sequence=[self._count] * len(poses))],
                 rr.Transform3D.columns(
                     translation=np.array([pose.xyz for pose in poses], dtype=np.float32),
                     quaternion=np.array([xyzw_from_wxyz(pose.quat_wxyz) for pose in poses], dtype=np.float32),
-                    parent_frame=pa.array([joint.parent for joint in robot.joints.values()], pa.string()),
-                    child_frame=pa.array([joint.child for joint in robot.joints.values()], pa.string()),
+                    parent_frame=pa.array([joint.parent for joint in joints], pa.string()),
+                    child_frame=pa.array([joint.child for joint in joints], pa.string()),
                 ),
             )
         self._recording.flush()
@@ -140,7 +137,7 @@ def extent(description: RobotDescription, posture: Posture) -> tuple[Array, Arra
 
     Of meshes, only the place counts.
     """
-    poses = link_poses(posture.placed(), posture.positions)
+    poses = link_poses(description, posture.positions)
     corners: list[Array] = [pose.xyz for pose in poses.values()]
     for name, link in description.links.items():
         shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)

@@ -141,7 +141,7 @@ FOUND = {
 
 BY_COLLISION_DETECTION = {"overlap", "wheel-rubs"}
 """Tested with the conversion, where MuJoCo is."""
-BY_OPTION = {"skipped-mesh"}
+BY_OPTION = {"skipped-mesh", "turned-mesh"}
 """Tested with the meshes."""
 
 

@@ -64,6 +64,7 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "visual-collision": "what is seen and what is touched are in different places",
         "inertia-too-large": "no mass distribution inside the link's shapes has this inertia",
         "inertia-too-small": "less than a tenth of what the shapes would give: simulations get unstable",
+        "turned-mesh": "a COLLADA file says that another axis than z is up, which RViz and Gazebo ignore",
         "undefined-material": "no color of the material is defined; the shape is gray",
         "idle-mimic": "a <mimic> without effect: its leader does not exist, or its joint cannot follow",
         "lumped-inertia": "no body has this inertia; it counts as part of the link to which it is fixed",
