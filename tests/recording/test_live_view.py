@@ -51,10 +51,14 @@ def test_the_viewer_follows_the_posture(tmp_path: Path) -> None:
             posture.set({"swivel": 1.5})
             view.move(posture)
             player.wait_for(lambda: times(client) == [1])
-            assert [report for shown in client.get_state().views for report in shown.reports] == []
+            player.wait_for(lambda: complaints(client) == [])
             view.close()
         finally:
             process.terminate()
+
+
+def complaints(client: Any) -> list[Any]:
+    return [report for shown in client.get_state().views for report in shown.reports]
 
 
 def times(client: Any) -> list[int]:

@@ -16,7 +16,6 @@ from twin.models.description import Inertial, RobotDescription
 from twin.recording.posture import Posture
 from twin.recording.read_back import content_digest, read
 from twin.recording.robot_layers import LAYERS, inertia_box
-from twin.recording.robot_meshes import file_unit, has_materials
 from twin.recording.robot_view import save
 
 BOX = "<geometry><box size='0.2 0.1 0.1'/></geometry>"
@@ -144,26 +143,48 @@ def test_inertia_box_has_the_inertia() -> None:
     assert abs(longest @ R[:, 0]) == pytest.approx(1.0)
 
 
-def test_mesh_files(tmp_path: Path) -> None:
-    dae = tmp_path / "a.dae"
-    dae.write_text('<COLLADA><asset><unit name="millimeter" meter="0.001"/></asset></COLLADA>')
-    stl = tmp_path / "a.stl"
-    stl.write_bytes(b"\0" * 84)
-    assert (file_unit(dae), has_materials(dae)) == (0.001, False)
-    dae.write_text('<COLLADA><instance_material symbol="a" target="#a"/></COLLADA>')
-    assert (file_unit(dae), has_materials(dae)) == (1.0, True)
-    assert (file_unit(stl), has_materials(stl)) == (1.0, False)
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_effects><effect id="e"><profile_COMMON><technique><lambert><diffuse><color>1 0 0 1</color></diffuse>
+</lambert></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12">0 0 0 100 0 0 0 200 0
+0 0 300</float_array><technique_common><accessor source="#a" count="4" stride="3"><param type="float"/>
+<param type="float"/><param type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="3"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2</p></triangles>
+<triangles count="1" material="red"><input semantic="VERTEX" source="#v" offset="0"/><p>1 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"><bind_material>
+<technique_common>
+<instance_material symbol="red" target="#m"/></technique_common></bind_material></instance_geometry></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def test_meshes_have_their_size_their_colours_and_their_outside(tmp_path: Path) -> None:
+    (tmp_path / "a.dae").write_text(COLLADA, encoding="utf-8")
+    shape = "<geometry><mesh filename='a.dae' scale='2 2 -2'/></geometry>"
     (tmp_path / "r.urdf").write_text(
-        "<robot name='r'><link name='a'><visual><geometry><mesh filename='a.dae' scale='2 2 -2'/></geometry>"
-        "</visual></link></robot>"
+        f"<robot name='r'><link name='a'><visual><origin xyz='0 0 1'/>{shape}"
+        f"<material name='m'><color rgba='0 0 1 1'/></material></visual><collision>{shape}</collision>"
+        "</link></robot>"
     )
-    dae.write_text('<COLLADA><asset><unit meter="0.01"/></asset></COLLADA>')
     robot = load(tmp_path / "r.urdf")
     save(tmp_path / "a.rrd", Posture(robot), robot)
     recording = read(tmp_path / "a.rrd")
-    assert recording.column("/visual/a/mesh_0", "Asset3D:media_type").values == [["model/vnd.collada+xml"]]
-    (scale,) = recording.column("/visual/a/mesh_0", "InstancePoses3D:scales").values[0]
-    assert scale == pytest.approx((0.02, 0.02, -0.02))
+
+    def logged(layer: str, what: str) -> np.ndarray:
+        return np.array(recording.column(f"/{layer}/a/mesh_0", f"Mesh3D:{what}").values[0])
+
+    points = logged("visual", "vertex_positions")
+    np.testing.assert_allclose(points.min(axis=0), (0.0, 0.0, 1.0 - 6.0), atol=1e-6)
+    np.testing.assert_allclose(points.max(axis=0), (2.0, 4.0, 1.0), atol=1e-6)
+    inside = np.mean(np.unique(points, axis=0), axis=0)
+    outwards = np.sum((points - inside) * logged("visual", "vertex_normals"), axis=1)
+    assert np.all(outwards > 0.0)
+    blue, red = 0x0000FFFF, 0xFF0000FF
+    assert logged("visual", "vertex_colors").tolist() == [blue] * 9 + [red] * 3
+    assert len(set(logged("collision", "vertex_colors").tolist())) == 1
 
 
 def test_a_robot_of_one_link(tmp_path: Path, recwarn: Any) -> None:

@@ -32,6 +32,7 @@ UP_AXES = {
 _INSTANCES = ("instance_geometry", "instance_controller", "instance_node")
 
 Rgb = tuple[float, float, float]
+NO_COLOUR = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +45,8 @@ class Collada:
     """Shape (m, 3)."""
     colour: Rgb | None
     """The diffuse colour of most of the triangles."""
+    face_colours: Array | None
+    """The diffuse colour of each triangle, shape (m, 3), not a number where it has none."""
     up_axis: str
     """`X_UP`, `Y_UP` or `Z_UP`."""
 
@@ -67,7 +70,7 @@ def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
     root = _parse(data)
     by_id = {element.get("id"): element for element in root.iter("{*}*") if element.get("id")}
     parts: list[tuple[Part, Array]] = []
-    colours: Counter[Rgb] = Counter()
+    colours: list[Rgb | None] = []
     count = 0
     for instance, transform in _instances(root, by_id):
         geometry, bind = _geometry(instance, by_id)
@@ -76,9 +79,7 @@ def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
             if count > most_faces:
                 raise ValueError(f"has more than {most_faces} triangles")
             parts.append((part, transform @ bind))
-            colour = _colour(instance, part.material, by_id)
-            if colour is not None:
-                colours[colour] += len(part.faces)
+            colours += [_colour(instance, part.material, by_id)] * len(part.faces)
     if not count:
         raise ValueError("has no triangles in its scene")
     points, faces = _joined(parts)
@@ -86,8 +87,14 @@ def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
     up_axis = _up_axis(root)
     if apply_up_axis:
         points = points @ UP_AXES[up_axis].T
-    colour = colours.most_common(1)[0][0] if colours else None
-    return Collada(points=points, faces=faces, colour=colour, up_axis=up_axis)
+    known = Counter(colour for colour in colours if colour is not None)
+    return Collada(
+        points=points,
+        faces=faces,
+        colour=known.most_common(1)[0][0] if known else None,
+        face_colours=np.array([colour or NO_COLOUR for colour in colours]) if known else None,
+        up_axis=up_axis,
+    )
 
 
 def _parse(data: bytes) -> Element:

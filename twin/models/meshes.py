@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -39,10 +39,12 @@ class TriangleMesh:
     faces: Faces
     """Shape (m, 3), counter-clockwise seen from outside."""
     format: Format
-    is_verbatim: bool
+    is_verbatim: bool = True
     """The file has no other points; MuJoCo would take them into the convex hull."""
     colour: Rgb | None = None
     """Of most of the triangles; only COLLADA files tell."""
+    face_colours: Array | None = None
+    """Of each triangle, shape (m, 3), not a number where it has none; only COLLADA files tell."""
     up_axis: str = "Z_UP"
     """What the file calls up; other axes are those of COLLADA files only."""
 
@@ -78,29 +80,27 @@ def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> Tria
         data = path.read_bytes()
         kind = format_of(data, path.suffix.lower())
         with np.errstate(over="ignore", invalid="ignore"):
-            points, faces, colour, up_axis = _parse(data, kind, apply_up_axis)
+            read = _parse(data, kind, apply_up_axis)
     except OSError as error:
         raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
     except (ValueError, OverflowError, RecursionError, MemoryError) as error:
         raise _fault(path, " ".join(str(error).split()) or "is too complex", code="mesh-format") from None
-    flaw = _flaw(points, faces)
+    flaw = _flaw(read.points, read.faces)
     if flaw:
         raise _fault(path, flaw, code="bad-mesh")
-    used, faces = np.unique(faces, return_inverse=True)
-    is_verbatim = len(used) == len(points)
-    points, faces = points[used], faces.reshape(-1, 3)
+    used, faces = np.unique(read.faces, return_inverse=True)
+    points, faces = read.points[used], faces.reshape(-1, 3)
     points.flags.writeable = faces.flags.writeable = False  # it is shared
-    return TriangleMesh(
-        points=points, faces=faces, format=kind, is_verbatim=is_verbatim, colour=colour, up_axis=up_axis
-    )
+    return replace(read, points=points, faces=faces, is_verbatim=len(used) == len(read.points))
 
 
-def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> tuple[Array, Faces, Rgb | None, str]:
+def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> TriangleMesh:
     if kind == "dae":
         collada = read_dae(data, apply_up_axis=apply_up_axis, most_faces=MOST_FACES)
-        return collada.points, collada.faces, collada.colour, collada.up_axis
+        return TriangleMesh(format=kind, **vars(collada))
     readers = {"stl": read_stl, "ascii-stl": read_ascii_stl, "obj": read_obj, "msh": read_msh}
-    return *readers[kind](data), None, "Z_UP"
+    points, faces = readers[kind](data)
+    return TriangleMesh(points=points, faces=faces, format=kind)
 
 
 def _flaw(points: Array, faces: Faces) -> str | None:

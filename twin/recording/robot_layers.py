@@ -12,8 +12,9 @@ import rerun as rr
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.description import Inertial, Joint, Link, RobotDescription
-from twin.recording.robot_meshes import declare_mesh
-from twin.recording.shapes import FillMode, Rgba8, Solid, primitives, rgba8
+from twin.recording.meshes import declare_mesh
+from twin.recording.shapes import FillMode, primitives, rgba8
+from twin.recording.solids import Rgba8, Solid
 
 COLLISION_COLOUR: Rgba8 = (255, 140, 0, 110)
 """See-through, so that what is meant can be compared with what is touched."""
@@ -145,7 +146,7 @@ def _draw_solids(
     frame = rr.CoordinateFrame(link.name)
     canvas.recording.log(path, frame, *primitives(solids, fill_mode), static=True)
     for number, solid in enumerate(solids):
-        declare_mesh(canvas.recording, f"{path}/mesh_{number}", frame, solid, own_materials=layer == "visual")
+        declare_mesh(canvas.recording, f"{path}/mesh_{number}", frame, solid, own_colours=layer == "visual")
 
 
 def _draw_axis(canvas: Canvas, joint: Joint) -> None:

@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import rerun as rr
 
 from twin.geometry import Array, Pose3, xyzw_from_wxyz
-from twin.models.description import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
+from twin.models.description import Box, Capsule, Cylinder, Sphere
 from twin.recording.frames import WORLD
+from twin.recording.meshes import declare_mesh
+from twin.recording.solids import Rgba8, Solid
 from twin.recording.sources import BodyShape
-
-DRAWABLE_MESHES = frozenset({".stl", ".obj", ".dae", ".glb", ".gltf"})
-"""Mesh formats that the Rerun viewer reads."""
 
 FLOOR_COLOUR = (96, 100, 106, 255)
 FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
 FillMode = Literal["solid", "majorwireframe", "transparentfillmajorwireframe"]
-Rgba8 = tuple[int, int, int, int]
-
-
-@dataclass(frozen=True)
-class Solid:
-    """A shape in the frame of the entity it is drawn in."""
-
-    geometry: Geometry
-    pose: Pose3
-    colour: Rgba8
 
 
 def body_entity(body: str, static: bool) -> str:
@@ -60,7 +48,7 @@ def declare_shapes(
         frame = rr.CoordinateFrame(WORLD if static else body)
         recording.log(entity, frame, *primitives(drawn, "solid"), static=True)
         for i, solid in enumerate(drawn):
-            _declare_mesh(recording, f"{entity}/mesh_{i}", frame, solid)
+            declare_mesh(recording, f"{entity}/mesh_{i}", frame, solid, own_colours=True)
 
 
 def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
@@ -126,23 +114,3 @@ def _look(solids: Sequence[tuple[Solid, object]], fill_mode: FillMode) -> dict[s
         "colors": [solid.colour for solid, _ in solids],
         "fill_mode": fill_mode,
     }
-
-
-def _declare_mesh(
-    recording: rr.RecordingStream, entity: str, frame: rr.CoordinateFrame, solid: Solid
-) -> None:
-    """Log a mesh file; it needs an entity of its own, since an entity holds one asset."""
-    mesh = solid.geometry
-    if not isinstance(mesh, Mesh) or mesh.path.suffix.lower() not in DRAWABLE_MESHES:
-        return
-    recording.log(
-        entity,
-        frame,
-        rr.Asset3D(path=mesh.path, albedo_factor=solid.colour),
-        rr.InstancePoses3D(
-            translations=[solid.pose.xyz],
-            quaternions=[rr.Quaternion(xyzw=xyzw_from_wxyz(solid.pose.quat_wxyz))],
-            scales=[mesh.scale],
-        ),
-        static=True,
-    )
