@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test check bench scenarios smoke docs clean
+.PHONY: run test check bench oracle scenarios smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
@@ -28,6 +28,11 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 
 bench: $(VENV)/.ready  ## the run's CPU time as a ratio to the raw limit of physics and rays
 	$(BIN)/python -m tests.benchmarks.run_cost
+
+oracle: $(VENV)/.ready  ## conversions against pinocchio, and the table in docs/fidelity.md
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
+	$(BIN)/python -m pytest tests/convert/test_pinocchio.py tests/models/test_kinematics.py
+	$(BIN)/python -m tests.oracles.example_robots
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios
