@@ -13,6 +13,7 @@ from twin.convert.conversion import Conversion, LedgerEntry
 from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
 from twin.convert.roles import roles_of
+from twin.convert.tyres import carry_load
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 
@@ -51,6 +52,7 @@ def convert(description: RobotDescription, *, base: Base = "free", timestep: flo
     )
     add_excludes(spec, description)
     model = _compile(spec, description)
+    carry_load(spec, model, roles)
     entries = add_actuators(spec, description, model, timestep=timestep)
     _compile(spec, description)
     return Conversion(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from twin.models.description import RobotDescription
+from twin.models.checks.ground import CASTER_NAME, LEVEL
+from twin.models.description import Mesh, RobotDescription, Sphere
+from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.solids import lowest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,6 +19,8 @@ class Roles:
     """Links that the drive turns."""
     gripping: frozenset[str]
     """Links that a commanded joint presses against things: they have a declared friction."""
+    casters: frozenset[str]
+    """Balls and casters without joints on which a driven robot slides; the file gives them no friction."""
     skid_steer: bool
 
 
@@ -29,7 +35,32 @@ def roles_of(description: RobotDescription) -> Roles:
         if (link.surface.friction or 0.0) > 0.0 and name not in wheels and _is_commanded(description, name)
     )
     skid_steer = drive is not None and drive.kind == "skid_steer"
-    return Roles(wheels=wheels, gripping=gripping, skid_steer=skid_steer)
+    casters = frozenset() if drive is None else _casters(description, wheels)
+    return Roles(wheels=wheels, gripping=gripping, casters=casters, skid_steer=skid_steer)
+
+
+def _casters(description: RobotDescription, wheels: frozenset[str]) -> frozenset[str]:
+    heads, poses = rigid_groups(description), link_poses(description)
+    bottoms = {
+        name: min(
+            lowest(collision.geometry, poses[name] @ collision.T_link_geometry)
+            for collision in link.collisions
+        )
+        for name, link in description.links.items()
+        if link.collisions and not any(isinstance(c.geometry, Mesh) for c in link.collisions)
+    }
+    floor = min((bottoms[name] for name in wheels if name in bottoms), default=math.inf)
+    return frozenset(
+        name
+        for name, bottom in bottoms.items()
+        if heads[name] == heads[description.root]
+        and description.links[name].surface.friction is None
+        and bottom < floor + LEVEL
+        and (
+            CASTER_NAME.search(name)
+            or all(isinstance(c.geometry, Sphere) for c in description.links[name].collisions)
+        )
+    )
 
 
 def _is_commanded(description: RobotDescription, link: str) -> bool:

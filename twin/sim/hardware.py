@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
@@ -90,6 +91,7 @@ class Hardware:
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
         self._commands = data.ctrl[self._actuators].copy()
+        self._anti_windup = _AntiWindup(model, data, self._actuators)
         self.refused = 0
         """Commands ignored because they were not finite."""
 
@@ -137,6 +139,47 @@ class Hardware:
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
         self._data.ctrl[self._actuators] = self._commands
+        self._anti_windup.apply()
 
     def _count(self) -> Array:
         return np.round(self._data.qpos[self._qpos] * self._scale / self._tick)
+
+
+class _AntiWindup:
+    """Keeps the integrals of velocity servos where the motor's full torque is.
+
+    Else a wheel that is held up, at a wall say, would later make up for all the angle that it owes.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp]) -> None:
+        self._data = data
+        limits = {
+            i: min(_torque_limit(model, i), _joint_torque_limit(model, i))
+            for i in actuators
+            if model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+        }
+        servos = np.array([i for i, limit in limits.items() if math.isfinite(limit)], dtype=np.intp)
+        joints = model.actuator_trnid[servos, 0]
+        self._act = model.actuator_actadr[servos]
+        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        stiffness = model.actuator_gainprm[servos, 0]
+        self._lead = np.array([limits[i] for i in servos]) / stiffness
+        self._lag_s = -model.actuator_biasprm[servos, 2] / stiffness
+
+    def apply(self) -> None:
+        """Limit the integrals."""
+        if not self._act.size:
+            return
+        data = self._data
+        middle = data.qpos[self._qpos] + self._lag_s * data.qvel[self._dof]
+        data.act[self._act] = np.clip(data.act[self._act], middle - self._lead, middle + self._lead)
+
+
+def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:
+    limited = model.actuator_forcelimited[actuator]
+    return float(model.actuator_forcerange[actuator, 1]) if limited else math.inf
+
+
+def _joint_torque_limit(model: mujoco.MjModel, actuator: int) -> float:
+    joint = model.actuator_trnid[actuator, 0]
+    return float(model.jnt_actfrcrange[joint, 1]) if model.jnt_actfrclimited[joint] else math.inf
