@@ -26,7 +26,6 @@ def track_ratio(wheels_xy: ArrayLike, is_left: ArrayLike, separation: float) -> 
     """
     xy = np.asarray(wheels_xy, dtype=float)
     rolling = np.where(np.asarray(is_left, dtype=bool), -1.0, 1.0)
-    xy = xy - xy.mean(axis=0)
     scale = float(np.max(np.abs(xy)))
     turn = _least_friction(xy / scale, rolling)
     return 2.0 * scale / (turn * separation)
