@@ -80,5 +80,5 @@ def test_heavy_robot_follows_a_speed_step_within_its_tyres_grip(bare_world: Call
     world.step(0.5)
     for joint in ("wheel_left_joint", "wheel_right_joint"):
         world.command(joint, 5.0)
-    world.step(0.3)
+    world.step(0.2)
     assert world.data.qvel[0] == pytest.approx(0.5, abs=0.01)

@@ -30,7 +30,7 @@ def drive_text(report: DriveReport) -> Group:
         lines.append(
             Text(
                 f"effective track: {report.track_ratio:.4f} times {report.drive.wheel_separation:g} m, "
-                f"measured by one spin; {report.analytic_track_ratio:.4f} by theory ({100.0 * ratio:+.2f} %)"
+                f"measured by spinning; {report.analytic_track_ratio:.4f} by theory ({100.0 * ratio:+.2f} %)"
             )
         )
     for item in report.manoeuvres:

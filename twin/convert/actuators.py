@@ -5,15 +5,15 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from twin.convert.bodies import WHEEL_ARMATURE
 from twin.convert.conversion import LedgerEntry
 from twin.models.description import CommandSpec, DriveSpec, Joint, RobotDescription
 
+WHEEL_KV = 5.0
+"""Least gain of a wheel's velocity servo [Nm s/rad]."""
 WHEEL_TIME_CONSTANT_S = 0.01
-"""Within which a wheel servo, while the wheel does not slip, brings the robot's whole mass to speed [s].
-
-A faster servo runs into the motor's torque limit at every new command, and then drives anything but true.
-"""
+"""Within which a wheel servo, while the wheel does not slip, brings the robot's whole mass to speed [s]."""
+SKID_STEER_STIFFNESS = 10.0
+"""Wheels that scrub are under load all the time, to which a velocity servo yields: so much stiffer."""
 SERVO_BANDWIDTH = 100.0
 """Natural frequency of a position servo [rad/s]: a joint sags by g/100², 1 mm, under its links' weight."""
 FOLLOWER_SOLIMP = [0.99, 0.999, 0.001, 0.5, 2.0]
@@ -48,35 +48,20 @@ def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[Ledg
     gain = _wheel_gain(description, drive, len(wheels))
     for name in wheels:
         actuator = _add(spec, description.joints[name])
-        _hold_velocity(actuator, gain)
+        actuator.set_to_velocity(gain)
         _limit_force(actuator, drive.max_wheel_torque)
         velocity = description.joints[name].limit.velocity
         if velocity:
             actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
             actuator.ctrlrange = [-velocity, velocity]
-    note = f"velocity actuators that hold at zero, gain {gain:.3g} Nm s/rad"
+    note = f"velocity actuators, gain {gain:.3g} Nm s/rad"
     return [LedgerEntry(element=f"wheels of the {drive.kind}", outcome="guessed", note=note)]
 
 
-def _hold_velocity(actuator: mujoco.MjsActuator, gain: float) -> None:
-    """Make a velocity servo with integral action, as motor controllers have: it also holds at zero.
-
-    The command [rad/s] is integrated to the angle that the wheel ought to have (MuJoCo's `intvelocity`); the
-    spring to it is as stiff as critical damping allows. A plain velocity servo yields to a steady load: on a
-    slope it creeps downhill, in a curve the outer wheel slows down.
-    """
-    stiffness = gain / (4.0 * WHEEL_TIME_CONSTANT_S)
-    actuator.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
-    actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
-    actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    actuator.gainprm[0] = stiffness
-    actuator.biasprm[1:3] = -stiffness, -gain
-    actuator.actearly = True
-
-
 def _wheel_gain(description: RobotDescription, drive: DriveSpec, wheels: int) -> float:
-    mass = sum(link.inertial.mass for link in description.links.values() if link.inertial is not None)
-    return (mass * drive.wheel_radius**2 / wheels + WHEEL_ARMATURE) / WHEEL_TIME_CONSTANT_S
+    masses = [link.inertial.mass for link in description.links.values() if link.inertial is not None]
+    gain = sum(masses) * drive.wheel_radius**2 / wheels / WHEEL_TIME_CONSTANT_S
+    return max(WHEEL_KV, gain * (SKID_STEER_STIFFNESS if drive.kind == "skid_steer" else 1.0))
 
 
 def _add_commanded(

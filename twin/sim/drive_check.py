@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,7 +29,9 @@ HOLD_BAR_M = 0.005
 SLOPE_DEG = 5.0
 HEADINGS = (("uphill", 0.0), ("across", math.pi / 2.0), ("downhill", math.pi))
 RADII = (0.5, 2.0)
-"""Of circles, each driven to the left and to the right [m]."""
+"""Of circles, each driven to the left and to the right; at least the effective track [m]."""
+CALIBRATIONS, CALIBRATED_DEG = 4, 5.0
+"""A skid steer is calibrated by one spin, and by more while one turned by so much too far or too little."""
 PLAUSIBLE_CALIBRATION = (0.5, 2.0)
 """Measured over analytic track ratio; a robot beyond does not turn like a skid steer at all."""
 
@@ -88,9 +90,26 @@ def check_drive(description: RobotDescription, *, timestep: float = 0.002) -> Dr
     return _check(description, timestep, _manoeuvres)
 
 
-def quick_check(description: RobotDescription, *, timestep: float = 0.002) -> DriveReport | None:
-    """Drive 1 m and turn once; None for a robot without a drive plugin."""
-    return None if description.drive is None else _check(description, timestep, _quick)
+def drive_self_check(description: RobotDescription) -> dict[str, Any] | None:
+    """Drive 1 m and turn once, for a report in JSON; None for a robot without a drive plugin.
+
+    Returns:
+        `passed`, `straight_1_m_error` [m], `spin_360_error` [deg], null if the physics diverged, rounded; and
+        `words` on what missed its bar.
+
+    Raises:
+        ConversionError: The robot cannot be converted.
+    """
+    if description.drive is None:
+        return None
+    report = _check(description, 0.002, _quick)
+    straight, spin = report.manoeuvres[0].error, report.manoeuvres[-1].error
+    return {
+        "passed": report.passed,
+        "straight_1_m_error": None if straight is None else round(straight, 6),
+        "spin_360_error": None if spin is None else round(spin, 4),
+        "words": [item.words for item in report.manoeuvres if not item.passed],
+    }
 
 
 def calibrated_track_ratio(conversion: Conversion, *, timestep: float) -> float | None:
@@ -101,15 +120,20 @@ def calibrated_track_ratio(conversion: Conversion, *, timestep: float) -> float 
     drive = conversion.description.drive
     if drive is None or drive.kind == "diff_drive" or conversion.root_joint is None:
         return None
-    config = drive_config(drive, conversion.description)
-    try:
-        turn = ProvingGround(conversion, config, physics=Physics(timestep=timestep)).spin(2.0 * math.pi)
-    except SimulationError:
-        return None
-    low, high = PLAUSIBLE_CALIBRATION
-    if not low < turn.true_angle / turn.ideal_angle < high:
-        return None
-    return config.wheel_separation_multiplier * turn.ideal_angle / turn.true_angle
+    ratio = analytic_track_ratio(drive, conversion.description)
+    for _ in range(CALIBRATIONS):
+        config = drive_config(drive, conversion.description, calibrated_ratio=ratio)
+        try:
+            turn = ProvingGround(conversion, config, physics=Physics(timestep=timestep)).spin(2.0 * math.pi)
+        except SimulationError:
+            return None
+        low, high = PLAUSIBLE_CALIBRATION
+        if not low < turn.true_angle / turn.ideal_angle < high:
+            return None
+        ratio *= turn.ideal_angle / turn.true_angle
+        if abs(math.degrees(turn.angle_error)) < CALIBRATED_DEG:
+            break
+    return ratio
 
 
 def _check(
@@ -158,7 +182,8 @@ def _manoeuvres(ground: ProvingGround, drive: DriveSpec, mass: float) -> Iterato
     yield _spin(ground, 1)
     yield _spin(ground, -1)
     circle_bar = CIRCLE_BAR_PERCENT if drive.kind == "diff_drive" else SKID_CIRCLE_BAR_PERCENT
-    for radius in RADII:
+    for least in RADII:
+        radius = max(least, round(ground.track, 1))
         yield _circle(ground, radius, circle_bar)
         yield _circle(ground, -radius, circle_bar)
     for name, heading in HEADINGS:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -89,7 +89,12 @@ class ProvingGround:
         self.config = config or ProvingGroundConfig()
         self.drive = drive
         self._sides = ((spec.left_joints, 0), (spec.right_joints, 1))
-        placement = RobotPlacement(name=_ROBOT, conversion=conversion, pose=Pose2(0.0, 0.0, 0.0))
+        without_sensors = replace(conversion.description, sensors=())  # their rates are nothing to a drive
+        placement = RobotPlacement(
+            name=_ROBOT,
+            conversion=replace(conversion, description=without_sensors),
+            pose=Pose2(0.0, 0.0, 0.0),
+        )
         self._world = World.compose(Scene(name="proving_ground"), [placement], physics)
         self._robot = self._world.robots[_ROBOT]
         self._base = self._robot.body(_base_frame(conversion))
@@ -98,6 +103,11 @@ class ProvingGround:
         model, data = self._world.model, self._world.data
         self._rest = np.zeros(mujoco.mj_stateSize(model, int(_STATE)))
         mujoco.mj_getState(model, data, self._rest, int(_STATE))
+
+    @property
+    def track(self) -> float:
+        """Effective wheel separation [m]."""
+        return self.drive.wheel_separation * self.drive.wheel_separation_multiplier
 
     def straight(self, distance: float) -> Driven:
         """Drive `distance` [m], backwards if it is negative."""
@@ -155,7 +165,7 @@ class ProvingGround:
             wheels = controller.update(period)
             self._command(wheels.left, wheels.right)
             self._world.step(self._steps)
-            turn = (wheels.right - wheels.left) * self.drive.wheel_radius / controller.track * period
+            turn = (wheels.right - wheels.left) * self.drive.wheel_radius / self.track * period
             ideal_angle += turn
             ideal = ideal @ _arc((wheels.left + wheels.right) * self.drive.wheel_radius / 2.0 * period, turn)
             now = self._pose()
@@ -189,6 +199,7 @@ class ProvingGround:
     def _restore(self) -> None:
         mujoco.mj_setState(self._world.model, self._world.data, self._rest, int(_STATE))
         mujoco.mj_forward(self._world.model, self._world.data)
+        self._robot.hardware.reset()
 
     def _pose(self) -> Pose2:
         return self._world.pose(self._base).to_pose2()
