@@ -30,7 +30,8 @@ def drive_text(report: DriveReport) -> Group:
         lines.append(
             Text(
                 f"effective track: {report.track_ratio:.4f} times {report.drive.wheel_separation:g} m, "
-                f"measured by spinning; {report.analytic_track_ratio:.4f} by theory ({100.0 * ratio:+.2f} %)"
+                f"measured by spinning; by theory {report.analytic_track_ratio:.4f} "
+                f"({100.0 * ratio:+.2f} %), with equal loads {report.equal_load_track_ratio:.4f}"
             )
         )
     for item in report.manoeuvres:
@@ -54,6 +55,7 @@ def drive_json(report: DriveReport) -> dict[str, Any]:
         "wheel_separation": drive.wheel_separation,
         "track_ratio": report.track_ratio,
         "analytic_track_ratio": report.analytic_track_ratio,
+        "equal_load_track_ratio": report.equal_load_track_ratio,
         "manoeuvres": [
             {
                 "name": item.name,

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
-from twin.controllers.skid_steer import track_ratio
+from twin.controllers.skid_steer import track_ratio, weight_shares
+from twin.geometry import Array, Pose3
 from twin.models.description import DriveSpec, RobotDescription
 from twin.models.kinematics import link_poses
 
@@ -35,12 +40,32 @@ def drive_config(
     )
 
 
-def analytic_track_ratio(drive: DriveSpec, description: RobotDescription) -> float:
-    """Return effective over geometric track; not 1 for a skid steer, see `track_ratio`."""
+def analytic_track_ratio(
+    drive: DriveSpec, description: RobotDescription, *, equal_loads: bool = False
+) -> float:
+    """Return effective over geometric track; not 1 for a skid steer, see `track_ratio`.
+
+    Args:
+        drive: The drive of `description`.
+        description: The robot; where its centre of mass is decides about the loads of its wheels.
+        equal_loads: Take them as equal all the same; four wheels then have 1 + (a/b)².
+    """
     if drive.kind == "diff_drive":
         return 1.0
     poses = link_poses(description)
-    wheels = [poses[description.joints[name].child].xyz[:2] for name in drive.left_joints]
-    wheels += [poses[description.joints[name].child].xyz[:2] for name in drive.right_joints]
+    joints = (*drive.left_joints, *drive.right_joints)
+    wheels = np.array([poses[description.joints[name].child].xyz[:2] for name in joints])
     is_left = [True] * len(drive.left_joints) + [False] * len(drive.right_joints)
-    return track_ratio(wheels, is_left, drive.wheel_separation)
+    shares = None if equal_loads else weight_shares(wheels, _centre_of_mass(description, poses)[:2])
+    return track_ratio(wheels, is_left, drive.wheel_separation, shares)
+
+
+def _centre_of_mass(description: RobotDescription, poses: Mapping[str, Pose3]) -> Array:
+    """Return the centre of mass at joint position zero in the root frame [m], shape (3,)."""
+    parts = [
+        (link.inertial.mass, poses[name].apply(link.inertial.T_link_com.xyz))
+        for name, link in description.links.items()
+        if link.inertial is not None
+    ]
+    masses = np.array([mass for mass, _ in parts])
+    return np.asarray(masses @ np.array([point for _, point in parts]) / masses.sum())

@@ -8,12 +8,14 @@ import numpy as np
 from twin.convert.conversion import LedgerEntry
 from twin.models.description import CommandSpec, DriveSpec, Joint, RobotDescription
 
-WHEEL_KV = 5.0
-"""Least gain of a wheel's velocity servo [Nm s/rad]."""
+WHEEL_KV = 1.0
+"""Least gain of a wheel's velocity servo [Nm s/rad].
+
+A much stiffer one takes the motors of a small robot to their limit at every new command, and then drives
+anything but true.
+"""
 WHEEL_TIME_CONSTANT_S = 0.01
 """Within which a wheel servo, while the wheel does not slip, brings the robot's whole mass to speed [s]."""
-SKID_STEER_STIFFNESS = 10.0
-"""Wheels that scrub are under load all the time, to which a velocity servo yields: so much stiffer."""
 SERVO_BANDWIDTH = 100.0
 """Natural frequency of a position servo [rad/s]: a joint sags by g/100², 1 mm, under its links' weight."""
 FOLLOWER_SOLIMP = [0.99, 0.999, 0.001, 0.5, 2.0]
@@ -61,7 +63,7 @@ def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[Ledg
 def _wheel_gain(description: RobotDescription, drive: DriveSpec, wheels: int) -> float:
     masses = [link.inertial.mass for link in description.links.values() if link.inertial is not None]
     gain = sum(masses) * drive.wheel_radius**2 / wheels / WHEEL_TIME_CONSTANT_S
-    return max(WHEEL_KV, gain * (SKID_STEER_STIFFNESS if drive.kind == "skid_steer" else 1.0))
+    return max(WHEEL_KV, gain)
 
 
 def _add_commanded(

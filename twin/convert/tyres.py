@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from twin.controllers.skid_steer import weight_shares
 from twin.convert.roles import Roles
 from twin.geometry import Array
 
@@ -58,9 +59,10 @@ def carry_load(spec: mujoco.MjSpec, model: mujoco.MjModel, roles: Roles) -> None
     mujoco.mj_comPos(model, data)
     names = sorted(roles.wheels)
     bodies = [model.body(name).id for name in names]
-    masses = _loads(data.xpos[bodies, :2], data.subtree_com[1, :2], float(model.body_subtreemass[1]))
-    for name, body, mass in zip(names, bodies, masses, strict=True):
-        load = max(mass, 0.0) * 9.81 * float(model.body_invweight0[body, 0])
+    weight = 9.81 * float(model.body_subtreemass[1])
+    shares = weight_shares(data.xpos[bodies, :2], data.subtree_com[1, :2])
+    for name, body, share in zip(names, bodies, shares, strict=True):
+        load = share * weight * float(model.body_invweight0[body, 0])
         for geom in spec.body(name).geoms:
             if geom.contype:
                 geom.margin = static_sink(load, np.array(geom.solref), np.array(geom.solimp))
@@ -100,14 +102,3 @@ def _impedance(depth: float, solimp: Array) -> float:
     else:
         y = 1.0 - (1.0 - x) ** power / (1.0 - middle) ** (power - 1.0)
     return float(np.clip(start + y * (end - start), 1e-4, 0.9999))
-
-
-def _loads(wheels_xy: Array, centre_of_mass: Array, mass: float) -> Array:
-    """Return the mass [kg] on each wheel, shape (n,), as equal springs under a rigid body share it.
-
-    Two wheels share evenly; what casters carry is not known, and little.
-    """
-    centre = wheels_xy.mean(axis=0)
-    balance = np.vstack([np.ones(len(wheels_xy)), (wheels_xy - centre).T])
-    wanted = mass * np.concatenate([[1.0], centre_of_mass - centre])
-    return np.asarray(np.linalg.lstsq(balance, wanted, rcond=None)[0])

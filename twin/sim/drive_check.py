@@ -67,7 +67,9 @@ class DriveReport:
     track_ratio: float
     """Effective over geometric track, measured by one spin if it is a skid steer; else 1."""
     analytic_track_ratio: float
-    """By least friction power; 1 + (a/b)² for four wheels."""
+    """By least friction power with the robot's own loads on its wheels."""
+    equal_load_track_ratio: float
+    """The same with equal loads: 1 + (a/b)² for four wheels."""
     manoeuvres: tuple[Manoeuvre, ...]
 
     @property
@@ -163,6 +165,7 @@ def _check(
         guessed=guessed,
         track_ratio=config.wheel_separation_multiplier,
         analytic_track_ratio=analytic_track_ratio(drive, description),
+        equal_load_track_ratio=analytic_track_ratio(drive, description, equal_loads=True),
         manoeuvres=lines,
     )
 

@@ -158,9 +158,9 @@ class _WheelServos:
     """Integral action of the wheels' motor controllers, on top of the model's velocity servos.
 
     A velocity servo alone yields to a steady load: on a slope it creeps downhill, in a curve the outer wheel
-    slows down. Motor controllers add the integral of the speed error, which is the angle that the wheel owes; at a
-    command of zero it holds the wheel. It is limited to what the motor's torque can make good at once (no
-    wind-up): a wheel held up by a wall does not make up for the angle later.
+    slows down. Motor controllers add the integral of the speed error, which is the angle that the wheel owes;
+    at a command of zero it holds the wheel. It is limited to what the motor's torque can make good at once
+    (no wind-up): a wheel held up by a wall does not make up for the angle later.
     """
 
     def __init__(
