@@ -6,8 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import mujoco
 import pytest
 
+from twin.convert import convert
 from twin.models import load
 from twin.models.description import RobotDescription
 
@@ -60,9 +62,30 @@ def test_skid_steer_turns_as_coulomb_friction_says(speed: float, bare_world: Cal
     """Four equal wheels under Coulomb friction turn as if the track were wider by 1 + (a/b)²."""
     world = bare_world(load("sp1s"))
     world.step(0.5)
-    commanded = 4 * math.pi
-    turned = world.travel(commanded / speed, w=speed)
-    assert commanded / turned == pytest.approx(1 + (0.085 / 0.0925) ** 2, rel=0.02)
+    turned = world.travel(4 * math.pi / speed, w=speed)
+    left, right = (world.position(f"base_to_front_{side}") for side in ("left", "right"))
+    track = 0.034 * (right - left) / turned
+    assert track / 0.185 == pytest.approx(1 + (0.085 / 0.0925) ** 2, rel=0.006)
+
+
+@pytest.mark.parametrize("timestep", [0.002, 0.005])
+@pytest.mark.parametrize("robot", ["diff_bot", "sp1s", "warehouse_bot"])
+def test_wheels_carry_the_robot_where_they_touch(robot: str, timestep: float) -> None:
+    """A wheel that sinks in rolls with a smaller radius: 23 mm of 5 m were missing."""
+    conversion = convert(load(robot), timestep=timestep)
+    spec = mujoco.MjSpec()
+    spec.option.timestep = timestep
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[20, 20, 1])
+    spec.attach(conversion.spec.copy(), prefix="r/", frame=spec.worldbody.add_frame())
+    spec.body(f"r/{conversion.description.root}").pos = [0, 0, conversion.spawn_height]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, round(2.0 / timestep))
+    wheels = [i for i in range(model.ngeom) if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_ELLIPSOID]
+    gaps = [c.dist for c in data.contact[: data.ncon] if set(c.geom) & set(wheels)]
+    assert len(gaps) == len(wheels)
+    assert max(map(abs, gaps)) < 4e-5
 
 
 @pytest.mark.parametrize("robot", ["diff_bot", "sp1s", "warehouse_bot"])

@@ -37,10 +37,12 @@ def convert(
     from twin.cli.diagnostics import counted
     from twin.convert.export import export
     from twin.models import load
+    from twin.sim.drive_check import drive_self_check
     from twin.sim.physics import Physics
 
     description = load(file, read)
-    report = export(description, output, base=base.value, set_options=Physics(sleep=False).apply)
+    options = Physics(sleep=False).apply
+    report = export(description, output, base=base.value, set_options=options, drive_check=drive_self_check)
     tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
     size = ", ".join(counted(len(report[noun + "s"]), noun) for noun in ("link", "joint"))
     guesses, warnings = (len(report[key]) for key in ("guesses", "diagnostics"))
@@ -48,5 +50,9 @@ def convert(
         f"{output / 'robot.xml'}: {size}, {report['mass']:.6g} kg; tags: {tags}; "
         f"{guesses} guess{'' if guesses == 1 else 'es'}"
     )
+    driven = report["self_check"].get("drive")
+    if driven is not None and not driven["passed"]:
+        missed = ", ".join(driven["words"])
+        stdout().print(f"does not drive as its plugin says: {missed}; see `twin check --drive {file}`")
     if warnings:
         stdout().print(f"{counted(warnings, 'warning')}: see `twin check {file}` or report.json", style="dim")

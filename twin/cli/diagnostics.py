@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -37,14 +39,15 @@ def inspection_text(found: Inspection) -> Text:
     return text.append(_summary(found))
 
 
-def inspection_json(found: Inspection) -> str:
-    """Return the inspection as a JSON document."""
+def inspection_json(found: Inspection, more: Mapping[str, Any] = MappingProxyType({})) -> str:
+    """Return the inspection, and `more` after it, as a JSON document."""
     document = {
         "file": str(found.file),
         "robot": None if found.description is None else found.description.name,
         "errors": found.count("error"),
         "warnings": found.count("warning"),
         "diagnostics": [{**asdict(item), "file": str(item.file)} for item in found.diagnostics],
+        **more,
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 

@@ -14,8 +14,12 @@ from twin.models.description import CommandSpec, Joint, RobotDescription
 from twin.models.document import LARGEST
 from twin.models.kinematics import ONE_DOF
 
-WHEEL_KV = 5.0
-"""Least gain of a wheel's velocity servo [Nm s/rad]."""
+WHEEL_KV = 1.0
+"""Least gain of a wheel's velocity servo [Nm s/rad].
+
+A much stiffer one takes the motors of a small robot to their limit at every new command, and then drives
+anything but true.
+"""
 WHEEL_TIME_CONSTANT_S = 0.01
 """Within which a wheel servo, while the wheel does not slip, brings the robot's whole mass to speed [s]."""
 SERVO_BANDWIDTH = 100.0

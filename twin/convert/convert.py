@@ -16,6 +16,7 @@ from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
 from twin.convert.roles import roles_of
 from twin.convert.stand_ins import refuse_singular
+from twin.convert.tyres import carry_load
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 from twin.models.meshes import mesh_faults
@@ -62,6 +63,7 @@ def convert(
     add_extensions(spec, description)
     model = _compile(spec, description)
     refuse_singular(model, description)
+    carry_load(spec, model, roles)
     entries = add_actuators(spec, description, model, timestep=timestep)
     _compile(spec, description)
     return Conversion(

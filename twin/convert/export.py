@@ -29,10 +29,16 @@ from twin.models.description import RobotDescription
 MODEL, REPORT, ASSETS = "robot.xml", "report.json", "assets"
 
 SetOptions = Callable[[mujoco.MjSpec], None]
+DriveCheck = Callable[[RobotDescription], "dict[str, Any] | None"]
 
 
 def export(
-    description: RobotDescription, folder: Path, *, base: Base = "free", set_options: SetOptions | None = None
+    description: RobotDescription,
+    folder: Path,
+    *,
+    base: Base = "free",
+    set_options: SetOptions | None = None,
+    drive_check: DriveCheck | None = None,
 ) -> dict[str, Any]:
     """Write a robot as MJCF with its meshes and a report, and return the report; on an error, write nothing.
 
@@ -43,6 +49,8 @@ def export(
         folder: Is created; an earlier conversion in it is replaced.
         base: As for `convert`.
         set_options: Sets the physics options that the model is meant for; else MuJoCo's defaults hold.
+        drive_check: Drives a robot with a free base and returns what becomes `drive` in the report's
+            `self_check`; None for a robot that does not drive.
 
     Raises:
         ConversionError: As by `convert`; or the folder holds other files; or the model that was written is
@@ -66,6 +74,8 @@ def export(
         if not checked.passed:
             raise ConversionError(f"{description.source}: the model differs from the file: {checked}")
         report = _report(description, conversion, model, assets, checked) | {"sensors": sensors}
+        if drive_check is not None and conversion.root_joint is not None:
+            report["self_check"]["drive"] = drive_check(description)
         text = json.dumps(report, indent=2, ensure_ascii=False) + "\n"
         (staging / REPORT).write_text(text, encoding="utf-8")
         staging.chmod(0o755)  # mkdtemp's 0700 would lock out other users

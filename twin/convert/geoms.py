@@ -8,18 +8,13 @@ import mujoco
 
 from twin.convert.mesh_assets import mesh_asset
 from twin.convert.roles import Roles
+from twin.convert.tyres import stiff, wheel_contact
 from twin.geometry import Pose3
 from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Link, Mesh, Sphere, Visual
 from twin.models.meshes import read_mesh
 
 GROUP_VISUAL = 2
 GROUP_COLLISION = 3
-STIFF_SOLREF_S = 0.004
-"""Contact time constant of wheels and gripping surfaces [s]; at least two time steps.
-
-Softer, a wheel sinks in and rolls with a smaller radius, and a gripped box creeps: measured 7.7 mm against
-1.0 mm per 5 m, and 0.68 mm against 0.23 mm in a shaken grasp.
-"""
 TORSION, ROLLING = 0.005, 0.0001
 """MuJoCo's default torsional and rolling friction; without effect at condim 3."""
 
@@ -39,7 +34,8 @@ class GeomBuilder:
         self._spec = spec
         self._roles = roles
         self._visuals = visuals
-        self._stiff = [max(STIFF_SOLREF_S, 2.0 * timestep), 1.0]
+        self._stiff = stiff(timestep)
+        self._wheel_contact = wheel_contact(roles, timestep)
         self._meshes: dict[Mesh, str] = {}
 
     def add(self, body: mujoco.MjsBody, link: Link) -> None:
@@ -76,11 +72,11 @@ class GeomBuilder:
             contact |= {"priority": 1, "friction": [friction, TORSION, ROLLING]}
             if friction == 0.0:
                 contact["condim"] = 1
-        rolls = link.name in self._roles.wheels
-        if rolls:
-            contact["priority"] = 1
-        # Stiff wheels make a skid-steer robot's arcs worse (the four load shares jump).
-        if link.name in self._roles.gripping or (rolls and not self._roles.skid_steer):
+        if link.name in self._roles.casters:
+            contact |= {"priority": 1, "condim": 1}
+        if link.name in self._roles.wheels:
+            contact |= {"priority": 1, **self._wheel_contact}
+        elif link.name in self._roles.gripping:
             contact["solref"] = self._stiff
         return contact
 

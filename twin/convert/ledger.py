@@ -38,9 +38,12 @@ def _link(link: Link, roles: Roles) -> Iterator[LedgerEntry]:
     friction = link.surface.friction
     if link.name in roles.wheels:
         yield _entry(f"collision of {element}", "translated", "ellipsoid: a wheel touches in a point")
+        yield _entry(f"contact of {element}", "guessed", "carries the robot without sinking in")
     if friction is not None:
         outcome: Outcome = "kept" if link.collisions else "dropped"
         yield _entry(f"mu1 of {element}", outcome, f"friction {friction:g}, whatever it touches")
+    elif link.name in roles.casters:
+        yield _entry(f"friction of {element}", "guessed", "none: it slides where a caster would roll")
     elif link.collisions:
         yield _entry(f"friction of {element}", "guessed", "the larger of 1 and that of what it touches")
     if link.name in roles.gripping:

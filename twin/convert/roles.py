@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from twin.models.checks.ground import CASTER_NAME, LEVEL
 from twin.models.checks.wheels import Wheel, wheels_of
-from twin.models.description import RobotDescription
+from twin.models.description import Mesh, RobotDescription, Sphere
+from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.solids import lowest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +22,8 @@ class Roles:
     """The joints above them."""
     gripping: frozenset[str]
     """Links that a commanded joint presses against things: they have a declared friction."""
+    casters: frozenset[str]
+    """Balls and casters without joints on which a driven robot slides; the file gives them no friction."""
     skid_steer: bool
 
 
@@ -35,6 +41,7 @@ def roles_of(description: RobotDescription) -> Roles:
         wheels=wheels,
         wheel_joints=frozenset(wheel.joint.name for wheel in driven),
         gripping=gripping,
+        casters=_casters(description, wheels) if driven else frozenset(),
         # without a drive plugin, more than two wheels cannot all roll round a curve
         skid_steer=len(driven) > 2 if drive is None else drive.kind == "skid_steer",
     )
@@ -53,6 +60,30 @@ def commanded_wheels(description: RobotDescription) -> tuple[Wheel, ...]:
         and description.commands[name].interface == "velocity"
     ]
     return (*(known[name] for name in order), *others)
+
+
+def _casters(description: RobotDescription, wheels: frozenset[str]) -> frozenset[str]:
+    heads, poses = rigid_groups(description), link_poses(description)
+    bottoms = {
+        name: min(
+            lowest(collision.geometry, poses[name] @ collision.T_link_geometry)
+            for collision in link.collisions
+        )
+        for name, link in description.links.items()
+        if link.collisions and not any(isinstance(c.geometry, Mesh) for c in link.collisions)
+    }
+    floor = min((bottoms[name] for name in wheels if name in bottoms), default=math.inf)
+    return frozenset(
+        name
+        for name, bottom in bottoms.items()
+        if heads[name] == heads[description.root]
+        and description.links[name].surface.friction is None
+        and bottom < floor + LEVEL
+        and (
+            CASTER_NAME.search(name)
+            or all(isinstance(c.geometry, Sphere) for c in description.links[name].collisions)
+        )
+    )
 
 
 def _is_commanded(description: RobotDescription, link: str) -> bool:

@@ -26,6 +26,7 @@ from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
 from twin.scenario.world import GoodOverride, Obstacle
+from twin.sim.drive_check import calibrated_track_ratio
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
@@ -71,11 +72,12 @@ def build(
     arena = arenas.load(scenario.world.arena) if scenario.world.arena is not None else None
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
-    placements, heights = [], {}
+    placements, heights, ratios = [], {}, {}
     for robot in scenario.robots:
         description = load(robot.model, ReadOptions(args=robot.args))
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
+        ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)
         placements.append(RobotPlacement(name=robot.id, conversion=conversion, pose=starts[robot.id]))
     scene = _scene(scenario, arena)
     maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
@@ -101,6 +103,7 @@ def build(
                     seed=scenario.seed,
                     control_period_ns=control_period_ns,
                     spawn_height=heights[robot.id],
+                    track_ratio=ratios[robot.id],
                     namespace=namespaces[robot.id],
                 )
             )

@@ -1,4 +1,4 @@
-"""What nodes need to know of a robot, read off its description: drive, footprint, arm."""
+"""What nodes need to know of a robot, read off its description: footprint and arm."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.controllers.diff_drive import DiffDriveConfig
-from twin.controllers.limiter import AxisLimits
 from twin.errors import ModelError
 from twin.geometry import Array, Pose3
 from twin.manipulation.telescopic_arm import TelescopicArm, TelescopicArmConfig
 from twin.manipulation.trajectory import JointLimits
-from twin.models.description import Box, Capsule, Cylinder, DriveSpec, Joint, RobotDescription, Sphere
+from twin.models.description import Box, Capsule, Cylinder, Joint, RobotDescription, Sphere
 from twin.models.kinematics import link_poses
 
 GRASP_FRAME = "grasp_frame"
@@ -20,35 +18,6 @@ GRASP_FRAME = "grasp_frame"
 
 _ARM_ACCELERATION = 1.0
 """Of arm joints [m/s² or rad/s²]; URDF has no such limit."""
-
-
-def drive_config(drive: DriveSpec, description: RobotDescription) -> DiffDriveConfig:
-    """Return the kinematics and limits of a robot's drive."""
-    linear, angular = drive.max_linear_velocity or 1.0, drive.max_angular_velocity or 2.0
-    return DiffDriveConfig(
-        wheel_separation=drive.wheel_separation,
-        wheel_radius=drive.wheel_radius,
-        wheel_separation_multiplier=_track_ratio(drive, description),
-        linear=AxisLimits(
-            max_velocity=linear, max_acceleration=drive.max_linear_acceleration or 2.0 * linear
-        ),
-        angular=AxisLimits(
-            max_velocity=angular, max_acceleration=drive.max_angular_acceleration or 3.0 * angular
-        ),
-    )
-
-
-def _track_ratio(drive: DriveSpec, description: RobotDescription) -> float:
-    """Return effective over geometric track: 1 + (a/b)² for a skid steer with half wheelbase a, half track b.
-
-    Isotropic Coulomb friction and equal load on all wheels; independent of friction and speed.
-    """
-    if drive.kind == "diff_drive":
-        return 1.0
-    poses = link_poses(description)
-    axles = [poses[description.joints[name].child].xyz[0] for name in drive.left_joints]
-    half_wheelbase = (max(axles) - min(axles)) / 2.0
-    return float(1.0 + (half_wheelbase / (drive.wheel_separation / 2.0)) ** 2)
 
 
 def footprint(description: RobotDescription, *, padding: float = 0.01) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from twin.bridge.bus import Bus
+from twin.controllers.drive_config import drive_config
 from twin.geometry import Pose2
 from twin.models.description import LidarSpec, RobotDescription
 from twin.navigation.amcl import AmclConfig
@@ -57,6 +58,8 @@ class StackContext:
     control_period_ns: int
     spawn_height: float
     """Of the root link when the robot stands on the floor [m]."""
+    track_ratio: float | None
+    """Effective over geometric track of a skid steer, as calibrated."""
     namespace: str
     """'' for a single robot, '/name' among several."""
 
@@ -107,7 +110,7 @@ class RobotStack:
             context.bus,
             self.handle.hardware,
             DiffDriveNodeConfig(
-                drive=derive.drive_config(drive, description),
+                drive=drive_config(drive, description, calibrated_ratio=context.track_ratio),
                 left_joints=drive.left_joints,
                 right_joints=drive.right_joints,
                 odom_frame=self.frames.odom,

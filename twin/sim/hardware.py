@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
@@ -24,6 +25,8 @@ class HardwareConfig:
     wheel_scale_stddev: float = 1e-3
     """Of the error by which a wheel's travel is misjudged, drawn once a run for each wheel: no tyre is of
     the size that odometry reckons with. It is why dead reckoning drifts even without slip."""
+    wheel_integral_gain: float = 25.0
+    """Of the wheels' motor controllers [1/s]."""
     position_noise_stddev: float = 1e-4
     """Of all other joints [rad] or [m]."""
     velocity_noise_stddev: float = 1e-3
@@ -90,6 +93,10 @@ class Hardware:
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
         self._commands = data.ctrl[self._actuators].copy()
+        driven = [i for i, name in zip(self._actuators, names, strict=True) if name in wheels]
+        self._servos = _WheelServos(
+            model, data, np.array(driven, dtype=np.intp), self.config.wheel_integral_gain
+        )
         self.refused = 0
         """Commands ignored because they were not finite."""
 
@@ -137,6 +144,61 @@ class Hardware:
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
         self._data.ctrl[self._actuators] = self._commands
+        self._servos.apply()
+
+    def reset(self) -> None:
+        """Forget the past; to be called when the state of the physics was set from outside."""
+        self._servos.reset()
 
     def _count(self) -> Array:
         return np.round(self._data.qpos[self._qpos] * self._scale / self._tick)
+
+
+class _WheelServos:
+    """Integral action of the wheels' motor controllers, on top of the model's velocity servos.
+
+    A velocity servo alone yields to a steady load: on a slope it creeps downhill, in a curve the outer wheel
+    slows down. Motor controllers add the integral of the speed error, which is the angle that the wheel owes;
+    at a command of zero it holds the wheel. It is limited to what the motor's torque can make good at once
+    (no wind-up): a wheel held up by a wall does not make up for the angle later.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp], gain: float
+    ) -> None:
+        """Bind to the velocity actuators of the wheels; `gain` of the integral [1/s]."""
+        self._data, self._actuators, self._gain = data, actuators, gain
+        joints = model.actuator_trnid[actuators, 0]
+        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        torque = np.array([_torque_limit(model, i) for i in actuators])
+        self._reach = torque / -model.actuator_biasprm[actuators, 2]
+        limited = model.actuator_ctrllimited[actuators].astype(bool)
+        self._fastest = np.where(limited, model.actuator_ctrlrange[actuators, 1], math.inf)
+        self.reset()
+
+    def reset(self) -> None:
+        """Owe nothing; to be called when the state was set from outside."""
+        self._command = np.zeros(len(self._actuators))
+        self._owed = np.zeros(len(self._actuators))
+        self._position = self._data.qpos[self._qpos]
+        self._time = float(self._data.time)
+
+    def apply(self) -> None:
+        """Add the integral to the commands in `ctrl`."""
+        data, gain = self._data, self._gain
+        position, speed = data.qpos[self._qpos], data.qvel[self._dof]
+        owed = self._owed + self._command * (data.time - self._time) - (position - self._position)
+        command = np.clip(data.ctrl[self._actuators], -self._fastest, self._fastest)
+        low = np.maximum(speed - self._reach, -self._fastest) - command
+        high = np.minimum(speed + self._reach, self._fastest) - command
+        # Where the command alone is out of reach, nothing is owed.
+        self._owed = np.clip(owed, np.minimum(low, 0.0) / gain, np.maximum(high, 0.0) / gain)
+        self._command, self._position, self._time = command, position, float(data.time)
+        data.ctrl[self._actuators] = command + gain * self._owed
+
+
+def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:
+    joint = model.actuator_trnid[actuator, 0]
+    own = model.actuator_forcerange[actuator, 1] if model.actuator_forcelimited[actuator] else math.inf
+    of_joint = model.jnt_actfrcrange[joint, 1] if model.jnt_actfrclimited[joint] else math.inf
+    return float(min(own, of_joint))

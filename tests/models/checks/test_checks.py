@@ -76,6 +76,11 @@ LIGHT = WHEEL_INERTIAL.replace("6.6e-5", "6.6e-7").replace("1.25e-4", "1.25e-6")
 ALIKE = WHEEL_INERTIAL.replace("6.6e-5", "1e-4").replace("1.25e-4", "1e-4")
 RAISED = CUBE.replace("<collision>", "<collision><origin xyz='0 0 0.05'/>")
 RED = "<visual><geometry><sphere radius='0.1'/></geometry><material name='red'>{}</material></visual>"
+PLUGIN = (
+    "<gazebo><plugin name='gz::sim::systems::DiffDrive'><left_joint>left_joint</left_joint>"
+    "<right_joint>right_joint</right_joint><wheel_separation>{}</wheel_separation>"
+    "<wheel_radius>{}</wheel_radius></plugin></gazebo>"
+)
 COLOR = "<color rgba='1 0 0 1'/>"
 
 TRINKET = (
@@ -87,6 +92,11 @@ TRINKET = (
 FOUND = {
     "wheel-axis": (cart(left=TUMBLING), 3, "90.0 degrees off the axis of joint 'left_joint'"),
     "wheel-fixed": (cart(left_joint=FIXED_WHEEL).replace("'left'", "'wheel'"), 4, "to 'base' at 0 0.15 0 m"),
+    "drive-mismatch": (
+        cart(extra=PLUGIN.format(0.3, 0.06)),
+        9,
+        "says wheel_radius 0.06 m, the collision shape of 'left' has 0.05 m",
+    ),
     "base-on-ground": (cart().replace("0.3 0.2 0.06", "0.3 0.2 0.1"), 2, "it ends at z = -0.05 m"),
     "wheels-off-ground": (cart().replace("0 -0.03", "0 -0.04"), 7, "10 mm lower"),
     "few-supports": (cart().replace("0 -0.03", "0 -0.01"), 2, "only 2 on the ground"),
@@ -170,6 +180,35 @@ def test_fault_is_found_with_line_and_number(code: str) -> None:
 def test_sound_robots_are_left_in_peace() -> None:
     assert diagnose(cart()) == ()
     assert diagnose(arm(AXIS + LIMIT)) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (cart(extra=PLUGIN.format(0.34, 0.05)), "says wheel_separation 0.34 m, the wheels are 0.3 m apart"),
+        (
+            cart(extra=PLUGIN.format(0.3, 0.05).replace("left_joint>left", "left_joint>xx"))
+            .replace("left_joint>xx_joint", "left_joint>right_joint")
+            .replace("<right_joint>right_joint", "<right_joint>left_joint"),
+            "left wheels are 0.3 m to the right of its right wheels",
+        ),
+        (
+            cart(
+                extra=PLUGIN.format(0.3, 0.05),
+                right_joint=wheel("right", "-0.15")[1].replace("0 1 0", "0 -1 0"),
+            ),
+            "the axis of wheel joint 'right_joint' points to the right",
+        ),
+    ],
+)
+def test_a_drive_at_odds_with_its_wheels_is_named(text: str, message: str) -> None:
+    found = [diagnostic.message for diagnostic in diagnose(text) if diagnostic.code == "drive-mismatch"]
+    assert len(found) == 1
+    assert message in found[0]
+
+
+def test_a_drive_that_is_its_wheels_is_left_in_peace() -> None:
+    assert [d.code for d in diagnose(cart(extra=PLUGIN.format(0.3, 0.05)))] == []
 
 
 def test_the_fix_of_a_tumbling_wheel_mends_it() -> None:

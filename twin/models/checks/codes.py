@@ -56,6 +56,7 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "wheel-axis": "the wheel's cylinder does not lie along its joint's axis: it tumbles",
         "wheel-fixed": "a wheel that cannot turn",
         "wheel-rubs": "the wheel's collision shape touches its neighbour's",
+        "drive-mismatch": "the drive plugin's numbers are not those of the wheels it names",
         "base-on-ground": "a part that is no wheel and no caster rests on the ground beside the wheels",
         "wheels-off-ground": "something reaches lower than a wheel does",
         "few-supports": "the robot stands on fewer than three points",

@@ -1,0 +1,71 @@
+"""The drive controller's numbers, read off a robot's description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from twin.controllers.diff_drive import DiffDriveConfig
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.skid_steer import track_ratio, weight_shares
+from twin.geometry import Array, Pose3
+from twin.models.description import DriveSpec, RobotDescription
+from twin.models.kinematics import link_poses
+
+
+def drive_config(
+    drive: DriveSpec, description: RobotDescription, *, calibrated_ratio: float | None = None
+) -> DiffDriveConfig:
+    """Return the kinematics and limits of a robot's drive.
+
+    Args:
+        drive: The drive of `description`.
+        description: The robot.
+        calibrated_ratio: Effective over geometric track, where it was measured; else the analytic one.
+    """
+    linear, angular = drive.max_linear_velocity or 1.0, drive.max_angular_velocity or 2.0
+    joints = (description.joints[name] for name in (*drive.left_joints, *drive.right_joints))
+    return DiffDriveConfig(
+        wheel_separation=drive.wheel_separation,
+        wheel_radius=drive.wheel_radius,
+        wheel_separation_multiplier=calibrated_ratio or analytic_track_ratio(drive, description),
+        linear=AxisLimits(
+            max_velocity=linear, max_acceleration=drive.max_linear_acceleration or 2.0 * linear
+        ),
+        angular=AxisLimits(
+            max_velocity=angular, max_acceleration=drive.max_angular_acceleration or 3.0 * angular
+        ),
+        max_wheel_velocity=min(joint.limit.velocity or float("inf") for joint in joints),
+    )
+
+
+def analytic_track_ratio(
+    drive: DriveSpec, description: RobotDescription, *, equal_loads: bool = False
+) -> float:
+    """Return effective over geometric track; not 1 for a skid steer, see `track_ratio`.
+
+    Args:
+        drive: The drive of `description`.
+        description: The robot; where its centre of mass is decides about the loads of its wheels.
+        equal_loads: Take them as equal all the same; four wheels then have 1 + (a/b)².
+    """
+    if drive.kind == "diff_drive":
+        return 1.0
+    poses = link_poses(description)
+    joints = (*drive.left_joints, *drive.right_joints)
+    wheels = np.array([poses[description.joints[name].child].xyz[:2] for name in joints])
+    is_left = [True] * len(drive.left_joints) + [False] * len(drive.right_joints)
+    shares = None if equal_loads else weight_shares(wheels, _centre_of_mass(description, poses)[:2])
+    return track_ratio(wheels, is_left, drive.wheel_separation, shares)
+
+
+def _centre_of_mass(description: RobotDescription, poses: Mapping[str, Pose3]) -> Array:
+    """Return the centre of mass at joint position zero in the root frame [m], shape (3,)."""
+    parts = [
+        (link.inertial.mass, poses[name].apply(link.inertial.T_link_com.xyz))
+        for name, link in description.links.items()
+        if link.inertial is not None
+    ]
+    masses = np.array([mass for mass, _ in parts])
+    return np.asarray(masses @ np.array([point for _, point in parts]) / masses.sum())

@@ -1,0 +1,32 @@
+"""A drive for a robot whose file has wheels and no drive plugin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.models.checks.wheels import wheels_of
+from twin.models.description import DriveSpec, RobotDescription
+
+LEAST_OFFSET = 1e-3
+"""A wheel nearer than this to the middle belongs to no side [m]."""
+
+
+def guess_drive(description: RobotDescription) -> DriveSpec | None:
+    """Return a drive by the wheels to the left and right of the root's x axis; None without both.
+
+    Wheels are what `wheels_of` takes for one. With more than one on a side it is a skid steer.
+    """
+    wheels = [wheel for wheel in wheels_of(description) if abs(wheel.centre[1]) > LEAST_OFFSET]
+    left = [wheel for wheel in wheels if wheel.centre[1] > 0.0]
+    right = [wheel for wheel in wheels if wheel.centre[1] < 0.0]
+    if not left or not right:
+        return None
+    separation = np.mean([w.centre[1] for w in left]) - np.mean([w.centre[1] for w in right])
+    return DriveSpec(
+        kind="skid_steer" if len(wheels) > 2 else "diff_drive",
+        left_joints=tuple(wheel.joint.name for wheel in left),
+        right_joints=tuple(wheel.joint.name for wheel in right),
+        wheel_separation=float(separation),
+        wheel_radius=float(np.mean([wheel.radius for wheel in wheels])),
+        base_frame=description.root,
+    )
