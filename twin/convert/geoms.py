@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from twin.convert.mesh_assets import mesh_asset
 from twin.convert.roles import Roles
 from twin.convert.tyres import stiff, wheel_contact
-from twin.geometry import Pose3
+from twin.geometry import Array, Pose3
+from twin.models.checks.discs import disc_of
 from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Link, Mesh, Sphere, Visual
 from twin.models.meshes import read_mesh
 
@@ -57,12 +59,11 @@ class GeomBuilder:
             body.add_geom(**self._collision(collision, link), **self._contact(link))
 
     def _collision(self, collision: Collision, link: Link) -> dict[str, Any]:
-        geometry = collision.geometry
-        if link.name in self._roles.wheels and isinstance(geometry, Cylinder):
-            # A cylinder touches the floor along a line and scrubs when the robot turns.
-            half = [geometry.radius, geometry.radius, geometry.length / 2.0]
-            return {**_placed(collision.T_link_geometry), "type": _TYPE.mjGEOM_ELLIPSOID, "size": half}
-        return self._shape(collision)
+        ellipsoid = wheel_ellipsoid(collision) if link.name in self._roles.wheels else None
+        if ellipsoid is None:
+            return self._shape(collision)
+        pose, half = ellipsoid
+        return {**_placed(pose), "type": _TYPE.mjGEOM_ELLIPSOID, "size": half}
 
     def _contact(self, link: Link) -> dict[str, Any]:
         contact: dict[str, Any] = {"group": GROUP_COLLISION, "density": 0.0}
@@ -112,6 +113,27 @@ def _rgba(visual: Visual) -> tuple[float, float, float, float]:
         return visual.rgba
     colour = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis).colour
     return visual.rgba if colour is None else (*colour, 1.0)
+
+
+def wheel_ellipsoid(collision: Collision) -> tuple[Pose3, list[float]] | None:
+    """Return pose and half axes [m] of the ellipsoid as which a wheel of this shape rolls; None: as it is.
+
+    A cylinder touches the floor along a line and scrubs when the robot turns; a polygon of a mesh rumbles.
+    """
+    geometry = collision.geometry
+    if isinstance(geometry, Cylinder):
+        return collision.T_link_geometry, [geometry.radius, geometry.radius, geometry.length / 2.0]
+    disc = disc_of([collision])
+    if disc is None:
+        return None
+    return Pose3(disc.centre, _quat_along(disc.axis)), [disc.radius, disc.radius, disc.width / 2.0]
+
+
+def _quat_along(axis: Array) -> Array:
+    """Return the least rotation that takes z to a unit vector; of two opposite ones, as a wheel is alike."""
+    x, y, z = axis if axis[2] >= 0.0 else -axis
+    quat_wxyz = np.array([1.0 + z, -y, x, 0.0])
+    return quat_wxyz / np.linalg.norm(quat_wxyz)
 
 
 def _placed(pose: Pose3) -> dict[str, Any]:

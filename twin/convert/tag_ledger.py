@@ -13,9 +13,10 @@ from twin.convert.conversion import Outcome
 from twin.convert.convert import WORLD
 from twin.convert.fates import Fate, lost_attributes
 from twin.convert.gazebo_fates import gazebo_fate
+from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.roles import Roles
 from twin.models.checks.source import is_repeated, number, read_source
-from twin.models.description import RobotDescription
+from twin.models.description import Cylinder, Mesh, RobotDescription
 from twin.models.document import Element, place
 from twin.models.kinematics import ONE_DOF
 
@@ -218,8 +219,11 @@ def _inertia(element: Element, description: RobotDescription) -> Fate:
 def _shape(element: Element, parent: str, description: RobotDescription, roles: Roles) -> Fate:
     link = next(element.iterancestors("link")).get("name")
     touched = parent == "link/collision/geometry"
-    if touched and element.tag == "cylinder" and link in roles.wheels:
-        return "translated", "ellipsoid: a wheel touches in a point"
+    if touched and link in roles.wheels and element.tag in ("cylinder", "mesh"):
+        kind = Cylinder if element.tag == "cylinder" else Mesh
+        alike = (item for item in description.links[link].collisions if isinstance(item.geometry, kind))
+        if any(wheel_ellipsoid(item) for item in alike):
+            return "translated", "ellipsoid: a wheel touches in a point"
     return SHAPE if element.tag != "mesh" else _mesh(element, link, touched, description)
 
 

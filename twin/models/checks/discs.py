@@ -30,6 +30,8 @@ class Disc:
     """Unit vector, shape (3,)."""
     radius: float
     """[m]"""
+    width: float
+    """Along the axis [m]."""
 
 
 def disc_of(shapes: Sequence[Shape]) -> Disc | None:
@@ -44,26 +46,28 @@ def _disc(shape: Shape) -> Disc | None:
     R = matrix_from_quat_wxyz(pose.quat_wxyz)
     if isinstance(geometry, Cylinder):
         wide = geometry.length < 2.0 * geometry.radius
-        return Disc(shape=shape, centre=pose.xyz, axis=R[:, 2], radius=geometry.radius) if wide else None
+        disc = Disc(shape=shape, centre=pose.xyz, axis=R[:, 2], radius=geometry.radius, width=geometry.length)
+        return disc if wide else None
     if not isinstance(geometry, Mesh) or not is_solid(shape):
         return None
     hull = hull_of(geometry)
     found = None if hull is None else _round(hull)
     if hull is None or found is None:
         return None
-    axis, radius = found
-    return Disc(shape=shape, centre=pose.apply(hull.centroid), axis=R @ axis, radius=radius)
+    centre, axis, radius, width = found
+    return Disc(shape=shape, centre=pose.apply(centre), axis=R @ axis, radius=radius, width=width)
 
 
-def _round(hull: Hull) -> tuple[Array, float] | None:
-    """Return the axis and radius of a hull that is a disc, in the mesh's frame."""
+def _round(hull: Hull) -> tuple[Array, Array, float, float] | None:
+    """Return centre, axis, radius and width of a hull that is a disc, in the mesh's frame."""
     moments, axes = np.linalg.eigh(hull.gyration)
     axis = axes[:, 2]
     points = hull.points - hull.centroid
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     across = np.outer(np.cos(angles), axes[:, 0]) + np.outer(np.sin(angles), axes[:, 1])
     reaches = np.max(points @ across.T, axis=0)
-    width, radius = float(np.ptp(points @ axis)), float(reaches.max())
+    near, far = float(np.min(points @ axis)), float(np.max(points @ axis))
+    width, radius = far - near, float(reaches.max())
     if width >= 2.0 * radius or moments[1] > ALIKE * moments[0] or reaches.min() < ROUND * radius:
         return None
-    return axis, radius
+    return hull.centroid + axis * (near + far) / 2.0, axis, radius, width
