@@ -26,7 +26,8 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## the run's CPU time as a ratio to the raw limit of physics and rays
+bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation
+	$(BIN)/python -m tests.benchmarks.convert_cost
 	$(BIN)/python -m tests.benchmarks.run_cost
 
 oracle: $(VENV)/.ready  ## conversions against pinocchio, and the table in docs/fidelity.md
