@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import islice
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.convert.geoms import primitive
 from twin.models.checks.diagnostic import Diagnostic, finding
@@ -16,6 +17,8 @@ from twin.models.kinematics import link_poses, rigid_groups
 
 LEAST_DEPTH = 1e-4
 """Shapes that just touch are meant to [m]."""
+MOST_PAIRS = 50_000
+"""Pairs of shapes that are looked at; robots have some hundreds near each other."""
 WHEEL_GAP = 5e-4
 """A wheel closer than this to the part it turns in rubs on it [m]."""
 
@@ -71,9 +74,8 @@ def _distances(description: RobotDescription, heads: dict[str, str]) -> dict[tup
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     least: dict[tuple[str, str], float] = {}
-    for i, j in combinations(range(len(owners)), 2):
-        if heads[owners[i]] == heads[owners[j]] or not _may_touch(model, data, i, j):
-            continue
+    groups = np.unique([heads[owner] for owner in owners], return_inverse=True)[1]
+    for i, j in islice(_near(model, data, groups), MOST_PAIRS):
         distance = mujoco.mj_geomDistance(model, data, i, j, WHEEL_GAP, None)
         if distance < WHEEL_GAP:
             pair = (owners[i], owners[j])
@@ -81,9 +83,13 @@ def _distances(description: RobotDescription, heads: dict[str, str]) -> dict[tup
     return least
 
 
-def _may_touch(model: mujoco.MjModel, data: mujoco.MjData, i: int, j: int) -> bool:
-    gap = float(np.linalg.norm(data.geom_xpos[i] - data.geom_xpos[j]))
-    return gap < model.geom_rbound[i] + model.geom_rbound[j] + WHEEL_GAP
+def _near(model: mujoco.MjModel, data: mujoco.MjData, groups: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield pairs of shapes of different groups whose bounding spheres touch."""
+    for i in range(model.ngeom):
+        gaps = np.linalg.norm(data.geom_xpos[i + 1 :] - data.geom_xpos[i], axis=1)
+        touch = gaps < model.geom_rbound[i + 1 :] + model.geom_rbound[i] + WHEEL_GAP
+        for j in np.flatnonzero(touch & (groups[i + 1 :] != groups[i])):
+            yield i, i + 1 + int(j)
 
 
 def _line(description: RobotDescription, link: str) -> int:
