@@ -15,9 +15,12 @@ exits 2; anything else that escapes is a bug and keeps its traceback.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+MANY, SHOWN = 100, 20
+"""Of more names than this in a message only so many are told."""
 
 
 class SourceLine(int):
@@ -108,6 +111,18 @@ def nearest(word: str, valid: Iterable[str]) -> str:
     import difflib
 
     names = sorted(valid)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    # Comparing very many names takes long, as a file may name as many unknown ones.
+    likely = names if len(names) <= MANY else [name for name in names if name.lower() == word.lower()]
+    close = difflib.get_close_matches(word, likely, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
-    return f"{hint}Valid: {', '.join(names)}"
+    return f"{hint}Valid: {shortened(names)}"
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Return names for a message, of many only the first.
+
+    >>> shortened(["imu", "lidar"])
+    'imu, lidar'
+    """
+    more = [f"and {len(names) - SHOWN} more"] if len(names) > MANY else []
+    return ", ".join([*names[: SHOWN if more else None], *more])

@@ -111,7 +111,7 @@ FAULTS = {
     ),
     "out of range": (
         link_c(sphere("<origin xyz='0 1e11 0'/>")),
-        "xyz='0 1e11 0' is out of range; at most 1e+10",
+        "xyz='0 1e11 0' is out of range; at most 1e+08",
     ),
     "too thin": (
         link_c("<visual><geometry><box size='1 1 1e-300'/></geometry></visual>"),

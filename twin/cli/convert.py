@@ -48,11 +48,16 @@ def convert(
     guesses, warnings = (len(report[key]) for key in ("guesses", "diagnostics"))
     stdout().print(
         f"{output / 'robot.xml'}: {size}, {report['mass']:.6g} kg; tags: {tags}; "
-        f"{guesses} guess{'' if guesses == 1 else 'es'}"
+        f"{guesses} guess{'' if guesses == 1 else 'es'}",
+        markup=False,
     )
     driven = report["self_check"].get("drive")
     if driven is not None and not driven["passed"]:
         missed = ", ".join(driven["words"])
         stdout().print(f"does not drive as its plugin says: {missed}; see `twin check --drive {file}`")
     if warnings:
-        stdout().print(f"{counted(warnings, 'warning')}: see `twin check {file}` or report.json", style="dim")
+        stdout().print(
+            f"{counted(warnings, 'warning')}: see `twin check {file}` or report.json",
+            style="dim",
+            markup=False,
+        )

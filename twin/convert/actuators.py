@@ -7,6 +7,7 @@ import math
 import mujoco
 import numpy as np
 
+from twin.convert.bodies import LEAST_RANGE
 from twin.convert.conversion import LedgerEntry
 from twin.convert.roles import commanded_wheels
 from twin.models.checks.wheels import Wheel
@@ -124,7 +125,7 @@ def _add(spec: mujoco.MjSpec, joint: Joint) -> mujoco.MjsActuator:
 
 
 def _limit_force(actuator: mujoco.MjsActuator, effort: float | None) -> None:
-    if effort:
+    if effort is not None and effort > LEAST_RANGE:
         actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
         actuator.forcerange = [-effort, effort]
 
@@ -143,7 +144,7 @@ def _limit_command(
     if math.isinf(low) and math.isinf(high):
         return
     low, high = max(low, -LARGEST), min(high, LARGEST)
-    if low < high:
+    if high - low > LEAST_RANGE:
         actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
         actuator.ctrlrange = [low, high]
 

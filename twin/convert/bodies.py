@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Container
 from typing import Literal
 
 import mujoco
 import numpy as np
 
 from twin.convert.geoms import GeomBuilder
+from twin.convert.self_check import QPOS_NAMES
 from twin.errors import ConversionError, Problem
 from twin.geometry import Pose3
 from twin.models.description import Joint, RobotDescription
@@ -18,6 +21,8 @@ Base = Literal["free", "fixed", "kinematic"]
 
 WHEEL_ARMATURE = 1e-3
 """Rotor inertia of a geared wheel motor, seen at the wheel [kg m²]; without it light wheels slip wrongly."""
+LEAST_RANGE = 1e-9
+"""Limits that are nearer to each other, or to zero, are none [SI]; MuJoCo reads them as equal."""
 _TYPE = mujoco.mjtJoint
 
 
@@ -34,6 +39,7 @@ def add_bodies(
     Raises:
         ConversionError: A moving part has no mass.
     """
+    _refuse_taken_names(description)
     _refuse_massless(description, base)
     masses = description.settlement.bodies
 
@@ -47,11 +53,11 @@ def add_bodies(
     if base == "kinematic":
         root.mocap = True
     elif base == "free":
-        root_joint = f"{description.root}_free_joint"
+        root_joint = free_name(f"{description.root}_free_joint", description.joints)
         root.add_freejoint(name=root_joint)
-    pending = [(description.root, root)]
+    pending = deque([(description.root, root)])
     while pending:
-        name, body = pending.pop(0)
+        name, body = pending.popleft()
         for joint in description.children(name):
             child = add_link(body, joint.child, joint.T_parent_joint)
             _add_joint(child, joint, is_wheel=joint.name in wheel_joints)
@@ -92,10 +98,10 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, is_wheel: bool) -> None:
         armature=WHEEL_ARMATURE if is_wheel else 0.0,
     )
     limit = joint.limit
-    if limit.lower is not None and limit.upper is not None and limit.lower < limit.upper:
+    if limit.lower is not None and limit.upper is not None and limit.upper - limit.lower > LEAST_RANGE:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         added.range = [limit.lower, limit.upper]
-    if limit.effort:
+    if limit.effort is not None and limit.effort > LEAST_RANGE:
         added.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
         added.actfrcrange = [-limit.effort, limit.effort]
 
@@ -106,6 +112,33 @@ def _add_planar(body: mujoco.MjsBody, joint: Joint) -> None:
     for suffix, axis in (("x", along), ("y", across)):
         body.add_joint(name=f"{joint.name}_{suffix}", type=_TYPE.mjJNT_SLIDE, axis=axis)
     body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return `name`, with a number if it is taken."""
+    free, number = name, 2
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
+
+
+def _refuse_taken_names(description: RobotDescription) -> None:
+    """Refuse joints that are called as one of those that stand for a planar or floating joint."""
+    joints = description.joints
+    problems = [
+        Problem(
+            f"joint '{name}{suffix}' has the name of a part of the {joint.type} joint '{name}'; rename it",
+            description.source,
+            joints[f"{name}{suffix}"].line or None,
+            code="duplicate-name",
+            element=f"joint '{name}{suffix}'",
+        )
+        for name, joint in joints.items()
+        for suffix in QPOS_NAMES.get(joint.type, ())
+        if f"{name}{suffix}" in joints
+    ]
+    if problems:
+        raise ConversionError(problems)
 
 
 def _refuse_massless(description: RobotDescription, base: Base) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -29,11 +29,13 @@ def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
         if joint.type != "fixed":
             for pair in product(solid[heads[joint.parent]], solid[heads[joint.child]]):
                 pairs.setdefault(frozenset(pair), pair)
-    for pair in combinations([name for group in solid.values() for name in group], 2):
+    every = [name for group in solid.values() for name in group]
+    loners = [name for name in every if not may_touch(description, name, name)]
+    for pair in product(loners, every):
         if heads[pair[0]] != heads[pair[1]] and not may_touch(description, *pair):
             pairs.setdefault(frozenset(pair), pair)
     for one, other in pairs.values():
-        spec.add_exclude(name=f"{one}~{other}", bodyname1=one, bodyname2=other)
+        spec.add_exclude(bodyname1=one, bodyname2=other)
 
 
 def may_touch(description: RobotDescription, link: str, other: str) -> bool:

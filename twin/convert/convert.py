@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import mujoco
 
 from twin.convert.actuators import add_actuators
-from twin.convert.bodies import Base, add_bodies
+from twin.convert.bodies import Base, add_bodies, free_name
 from twin.convert.contacts import add_excludes, spawn_height
 from twin.convert.conversion import Conversion, LedgerEntry
 from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
 from twin.convert.ledger import describe_conversion
+from twin.convert.mujoco_log import without_warnings
 from twin.convert.roles import roles_of
 from twin.convert.stand_ins import refuse_singular
 from twin.convert.tyres import carry_load
@@ -21,6 +21,8 @@ from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 from twin.models.meshes import mesh_faults
 
+DEEPEST = 450
+"""Links in a row; tinyxml2 reads 500 elements inside of each other."""
 WORLD = "world"
 """A root link of this name means a robot that is bolted down."""
 
@@ -45,9 +47,10 @@ def convert(
     faults = mesh_faults(description, visuals=visuals)
     if faults:
         raise ConversionError(faults)
-    description, renamed = _without_world(description)
-    if (renamed or description.static) and base == "free":
+    _refuse_deep(description)
+    if (description.root == WORLD or description.static) and base == "free":
         base = "fixed"
+    description, renamed = _without_world(description)
     roles = roles_of(description)
     spec = mujoco.MjSpec()
     spec.modelname = description.name
@@ -77,30 +80,47 @@ def convert(
 
 def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
     try:
-        with warnings.catch_warnings():
-            # A singular mass matrix is found, and named, by refuse_singular.
-            warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")
+        with without_warnings():  # refuse_singular names a singular mass matrix
             return spec.copy().compile()
     except ValueError as error:
         message = f"MuJoCo refuses robot '{description.name}': {' '.join(str(error).split())}"
         raise ConversionError(Problem(message, description.source, code="mujoco", element="robot")) from error
 
 
+def _refuse_deep(description: RobotDescription) -> None:
+    """Refuse a chain of links that is too long for the XML reader that MuJoCo uses."""
+    level, depth = [description.root], 1
+    while level:
+        if depth > DEEPEST:
+            message = (
+                f"more than {DEEPEST} links hang on each other, down to '{level[0]}'; MuJoCo reads no more"
+            )
+            raise ConversionError(
+                Problem(message, description.source, code="mujoco", element=f"link '{level[0]}'")
+            )
+        level, depth = [joint.child for link in level for joint in description.children(link)], depth + 1
+
+
 def _without_world(description: RobotDescription) -> tuple[RobotDescription, list[LedgerEntry]]:
-    """Return the robot with a root link `world` renamed, and what to note about it."""
-    if description.root != WORLD:
+    """Return the robot with a link `world` renamed, and what to note about it."""
+    if WORLD not in description.links:
         return description, []
-    name = f"{WORLD}_link"
+    name = free_name(f"{WORLD}_link", description.links)
     links = {(name if key == WORLD else key): link for key, link in description.links.items()}
     links[name] = replace(links[name], name=name)
     joints = {
-        key: replace(joint, parent=name) if joint.parent == WORLD else joint
+        key: replace(
+            joint,
+            parent=name if joint.parent == WORLD else joint.parent,
+            child=name if joint.child == WORLD else joint.child,
+        )
         for key, joint in description.joints.items()
     }
     sensors = tuple(replace(s, link=name) if s.link == WORLD else s for s in description.sensors)
     cameras = tuple(replace(c, link=name) if c.link == WORLD else c for c in description.cameras)
     note = f"body '{name}'; MuJoCo has a body '{WORLD}' of its own"
     entry = LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)
-    return replace(description, root=name, links=links, joints=joints, sensors=sensors, cameras=cameras), [
+    root = name if description.root == WORLD else description.root
+    return replace(description, root=root, links=links, joints=joints, sensors=sensors, cameras=cameras), [
         entry
     ]

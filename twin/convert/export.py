@@ -18,6 +18,7 @@ from twin.convert.conversion import Conversion
 from twin.convert.convert import convert
 from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
+from twin.convert.mujoco_log import without_warnings
 from twin.convert.roles import roles_of
 from twin.convert.self_check import SelfCheck, self_check
 from twin.convert.sensors import add_sensors
@@ -56,7 +57,7 @@ def export(
         ConversionError: As by `convert`; or the folder holds other files; or the model that was written is
             not what the description says.
     """
-    _check_folder(folder)
+    folder = _checked(folder)
     conversion = convert(description, base=base)
     spec = conversion.spec.copy()
     if set_options is not None:
@@ -64,15 +65,15 @@ def export(
     if conversion.root_joint is not None:
         spec.body(conversion.description.root).pos = [0.0, 0.0, conversion.spawn_height]
     sensors = add_sensors(spec, conversion.description)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    staging = _stage(folder)
     try:
         assets = _write_assets(spec, staging)
-        (staging / MODEL).write_text(exact_xml(spec), encoding="utf-8")
-        model = _load(staging / MODEL, description)
-        checked = self_check(model, conversion.description)
+        with without_warnings():
+            model = _write_and_load(spec, staging / MODEL, description)
+            checked = self_check(model, conversion.description)
         if not checked.passed:
-            raise ConversionError(f"{description.source}: the model differs from the file: {checked}")
+            message = f"the model differs from the file, as its numbers are beyond MuJoCo's: {checked}"
+            raise ConversionError(Problem(message, description.source, code="mujoco", element="robot"))
         report = _report(description, conversion, model, assets, checked) | {"sensors": sensors}
         if drive_check is not None and conversion.root_joint is not None:
             report["self_check"]["drive"] = drive_check(description)
@@ -85,19 +86,40 @@ def export(
     return report
 
 
-def _check_folder(folder: Path) -> None:
-    if folder.is_dir():
-        others = sorted(item.name for item in folder.iterdir() if item.name not in (MODEL, REPORT, ASSETS))
-        if others:
-            raise ConversionError(
-                f"{folder}: the folder holds other files ({', '.join(others[:3])}); give a new or empty one"
-            )
-    elif folder.exists():
-        raise ConversionError(f"{folder}: is a file; give a new or empty folder")
-
-
-def _load(file: Path, description: RobotDescription) -> mujoco.MjModel:
+def _checked(folder: Path) -> Path:
+    """Return the folder to write, links followed, if it is new, empty, or an earlier conversion."""
     try:
+        target = folder.resolve()
+        found = sorted(item.name for item in target.iterdir()) if target.is_dir() else None
+        if found is None and target.exists():
+            raise ConversionError(f"{folder}: is a file; give a new or empty folder")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another folder") from None
+    ours = {MODEL, REPORT, ASSETS} if REPORT in (found or ()) else set()
+    others = [name for name in found or () if name not in ours]
+    if others:
+        raise ConversionError(
+            f"{folder}: the folder holds other files ({', '.join(others[:3])}); give a new or empty one"
+        )
+    return target
+
+
+def _stage(folder: Path) -> Path:
+    """Return a new folder beside `folder`, to be renamed when everything is in it."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(prefix=f".{folder.name[:100]}.", dir=folder.parent))
+    except OSError as error:
+        raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another folder") from None
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def _write_and_load(spec: mujoco.MjSpec, file: Path, description: RobotDescription) -> mujoco.MjModel:
+    try:
+        file.write_text(exact_xml(spec), encoding="utf-8")
         return mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:
         message = f"MuJoCo does not read what was written: {' '.join(str(error).split())}"
@@ -117,7 +139,10 @@ def _write_assets(spec: mujoco.MjSpec, folder: Path) -> list[str]:
 
 def _replace(new: Path, folder: Path) -> None:
     if not folder.exists():
-        new.rename(folder)
+        try:
+            new.rename(folder)
+        except OSError as error:
+            raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another") from None
         return
     old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
     folder.rename(old / folder.name)

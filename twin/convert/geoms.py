@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from twin.convert.mesh_assets import mesh_asset
+from twin.convert.mesh_assets import mesh_asset, plain_stem
 from twin.convert.roles import Roles
 from twin.convert.tyres import stiff, wheel_contact
 from twin.geometry import Array, Pose3
@@ -92,17 +92,20 @@ class GeomBuilder:
         if mesh not in self._meshes:
             file, content = mesh_asset(mesh)
             self._spec.assets[file] = content
-            name = f"{mesh.path.stem}#{len(self._meshes)}"
+            name = f"{plain_stem(mesh.path)}#{len(self._meshes)}"
             self._spec.add_mesh(
                 name=name,
                 file=file,
                 scale=mesh.scale,  # MuJoCo turns the triangles of a mirrored mesh round
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a flat mesh has no volume
+                maxhullvert=MOST_HULL_VERTICES,
             )
             self._meshes[mesh] = name
         return self._meshes[mesh]
 
 
+MOST_HULL_VERTICES = 1000
+"""Of the convex hull by which a mesh touches; a finer one than any robot needs would take minutes to find."""
 _TYPE = mujoco.mjtGeom
 
 

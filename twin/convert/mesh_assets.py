@@ -23,7 +23,12 @@ def mesh_asset(mesh: Mesh) -> tuple[str, bytes]:
     """
     triangles = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
     suffix, content = _content(mesh.path, triangles)
-    return f"{mesh.path.stem}-{hashlib.sha256(content).hexdigest()[:8]}{suffix}", content
+    return f"{plain_stem(mesh.path)}-{hashlib.sha256(content).hexdigest()[:8]}{suffix}", content
+
+
+def plain_stem(path: Path) -> str:
+    """Return a file's name without suffix, with `_` for line breaks and the like: XML changes them."""
+    return "".join(char if char.isprintable() else "_" for char in path.stem)
 
 
 @lru_cache(maxsize=128)

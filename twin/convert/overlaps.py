@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import islice
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.convert.geoms import primitive
 from twin.models.checks.diagnostic import Diagnostic, finding
@@ -20,6 +21,8 @@ from twin.models.solids import is_solid
 
 LEAST_DEPTH = 1e-4
 """Shapes that just touch are meant to [m]."""
+MOST_PAIRS = 50_000
+"""Pairs of shapes that are looked at; robots have some hundreds near each other."""
 WHEEL_GAP = 5e-4
 """A wheel closer than this to the part it turns in rubs on it [m]."""
 
@@ -36,8 +39,6 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
     joined = {frozenset((heads[joint.parent], heads[joint.child])) for joint in description.joints.values()}
 
     def may_touch(a: _Solid, b: _Solid) -> bool:
-        if heads[a.link] == heads[b.link]:
-            return False
         if frozenset((heads[a.link], heads[b.link])) not in joined:
             return True
         return any(
@@ -96,12 +97,14 @@ def _distances(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     least: dict[tuple[str, str], float] = {}
-    for (i, a), (j, b) in combinations(enumerate(solids), 2):
-        if not may_touch(a, b) or not _are_near(model, data, i, j):
+    heads = rigid_groups(description)
+    groups = np.unique([heads[solid.link] for solid in solids], return_inverse=True)[1]
+    for i, j in islice(_near(model, data, groups), MOST_PAIRS):
+        if not may_touch(solids[i], solids[j]):
             continue
         distance = mujoco.mj_geomDistance(model, data, i, j, WHEEL_GAP, None)
         if distance < WHEEL_GAP:
-            pair = (a.link, b.link)
+            pair = (solids[i].link, solids[j].link)
             least[pair] = min(distance, least.get(pair, np.inf))
     return least
 
@@ -119,9 +122,13 @@ def _shape(spec: mujoco.MjSpec, geometry: Geometry) -> dict[str, Any]:
     return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
 
 
-def _are_near(model: mujoco.MjModel, data: mujoco.MjData, i: int, j: int) -> bool:
-    gap = float(np.linalg.norm(data.geom_xpos[i] - data.geom_xpos[j]))
-    return gap < model.geom_rbound[i] + model.geom_rbound[j] + WHEEL_GAP
+def _near(model: mujoco.MjModel, data: mujoco.MjData, groups: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield pairs of shapes of different rigid groups whose bounding spheres touch."""
+    for i in range(model.ngeom):
+        gaps = np.linalg.norm(data.geom_xpos[i + 1 :] - data.geom_xpos[i], axis=1)
+        touch = gaps < model.geom_rbound[i + 1 :] + model.geom_rbound[i] + WHEEL_GAP
+        for j in np.flatnonzero(touch & (groups[i + 1 :] != groups[i])):
+            yield i, i + 1 + int(j)
 
 
 def _line(description: RobotDescription, link: str) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from lxml import etree
 from twin.errors import ModelError, Problem
 from twin.models.description import SkippedMesh
 from twin.models.line_table import LineTable
+from twin.models.plain_numbers import plain_number, plain_numbers
 from twin.models.xml_text import scan
 
 Element = Any
@@ -20,6 +22,12 @@ Element = Any
 
 LARGEST = 1e10
 """MuJoCo takes no larger number [SI]; only limits may be larger, as some write them for none at all."""
+FARTHEST = 1e8
+"""Largest coordinate of an origin [m]: further away masses drown in rounding."""
+NAMES = ("name", "link", "joint", "reference")
+"""Attributes with the name of a thing."""
+NAMED = ("link", "joint", "parent", "child", "mimic")
+_BREAKS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 PLACES = ("link", "joint", "gazebo", "sensor")
 """Elements that a user knows by name."""
 
@@ -84,7 +92,7 @@ class Report:
                 )
             return fallback
         try:
-            values = tuple(float(word) for word in text.split())
+            values = plain_numbers(text)
         except ValueError:
             self.add(
                 element, f"{describe(element)}: {name}='{text}' is not {_count(count)}", code="bad-number"
@@ -100,11 +108,11 @@ class Report:
         if not all(map(math.isfinite, values)):
             self.add(element, f"{describe(element)}: {name}='{text}' is not finite", code="bad-number")
             return fallback
-        largest = max(map(abs, values))
-        if largest > LARGEST and element.tag != "limit":
+        most = FARTHEST if (element.tag, name) == ("origin", "xyz") else LARGEST
+        if max(map(abs, values)) > most and element.tag != "limit":
             self.add(
                 element,
-                f"{describe(element)}: {name}='{text}' is out of range; at most {LARGEST:g}",
+                f"{describe(element)}: {name}='{text}' is out of range; at most {most:g}",
                 code="bad-number",
             )
             return fallback
@@ -125,16 +133,13 @@ class Report:
             return None
         text = (child.text or "").strip()
         try:
-            value = float(text)
+            value = plain_number(text)
         except ValueError:
             value = math.nan
-        if math.isfinite(value):
+        if abs(value) <= LARGEST:
             return value
-        self.add(
-            child,
-            f"{describe(element)}: <{child.tag}>{text}</{child.tag}> is not a finite number",
-            code="bad-number",
-        )
+        fault = f"is out of range; at most {LARGEST:g}" if math.isfinite(value) else "is not a finite number"
+        self.add(child, f"{describe(element)}: <{child.tag}>{text}</{child.tag}> {fault}", code="bad-number")
         return None
 
     def required(self, element: Element, name: str) -> str:
@@ -172,6 +177,7 @@ def parse(text: bytes, report: Report) -> Element:
         ) from None
     _drop_default_namespace(root)
     report.locate(root, lines)
+    _check_names(root, report)
     if root.tag != "robot":
         report.add(
             root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>", code="not-urdf"
@@ -229,6 +235,23 @@ def _drop_default_namespace(root: Element) -> None:
     for element in root.iter():
         if element.prefix is None:
             element.tag = etree.QName(element).localname
+
+
+def _check_names(root: Element, report: Report) -> None:
+    """Note links and joints whose names have spaces at their ends or line breaks, and mend such names."""
+    for element in root.iter():
+        for attribute in NAMES:
+            name = element.get(attribute)
+            plain = None if name is None else " ".join(part for part in _BREAKS.split(name) if part).strip()
+            if plain == name:
+                continue
+            element.set(attribute, plain)
+            if plain and element.tag in NAMED:
+                report.add(
+                    element,
+                    f"{describe(element)}: {attribute}= has spaces at its ends or line breaks; remove them",
+                    code="bad-name",
+                )
 
 
 def _count(count: int) -> str:

@@ -52,6 +52,10 @@ def read_drive(root: Element, joints: Mapping[str, Joint], report: Report) -> Dr
         )
     separation, radius = _geometry(plugin, report)
     torque = report.child_number(plugin, *TORQUES)
+    if torque is not None and torque < 0.0:
+        report.add(
+            plugin, f"the drive plugin has wheel torque {torque:g} Nm; give a magnitude", code="bad-drive"
+        )
     return DriveSpec(
         kind="skid_steer" if len(left) > 1 or _names(plugin, SKID_STEER) else "diff_drive",
         left_joints=left,

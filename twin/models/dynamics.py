@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,19 +48,47 @@ def jacobian(
         Shape (6, n) with n = len(degrees_of_freedom): velocity [m/s], then angular velocity [rad/s], per
         joint speed, in the root frame.
     """
-    columns = {name: column for column, name in enumerate(degrees_of_freedom(description))}
-    above = {joint.child: joint for joint in description.joints.values()}
-    target = poses[link].xyz if point is None else point
-    result = np.zeros((6, len(columns)))
-    while link in above:
-        joint = above[link]
-        suffixes = SUFFIXES.get(joint.type, ("",))
-        for suffix, (slide, turn) in zip(suffixes, _motions(joint, poses), strict=True):
-            column = columns[f"{joint.name}{suffix}"]
-            result[:3, column] = slide + np.cross(turn, target - poses[link].xyz)
-            result[3:, column] = turn
-        link = joint.parent
+    motions = _Motions.of(description, poses)
+    columns = motions.columns[link]
+    result = np.zeros((6, len(motions.slides)))
+    result[:, columns] = motions.jacobian(columns, poses[link].xyz if point is None else point)
     return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Motions:
+    """How each degree of freedom moves what hangs on it, in the root frame, each shape (n, 3)."""
+
+    slides: Array
+    turns: Array
+    origins: Array
+    """Where the axes of the turns are."""
+    columns: Mapping[str, list[int]]
+    """Of each link, the degrees of freedom that move it."""
+
+    @classmethod
+    def of(cls, description: RobotDescription, poses: Mapping[str, Pose3]) -> _Motions:
+        rows: list[tuple[Array, Array, Array]] = []
+        own: dict[str, list[int]] = {}
+        for joint in description.joints.values():
+            motions = _motions(joint, poses)
+            own[joint.name] = [*range(len(rows), len(rows) + len(motions))]
+            rows += [(slide, turn, poses[joint.child].xyz) for slide, turn in motions]
+        columns: dict[str, list[int]] = {description.root: []}
+        pending = [description.root]
+        while pending:
+            link = pending.pop()
+            for joint in description.children(link):
+                columns[joint.child] = columns[link] + own[joint.name]
+                pending.append(joint.child)
+        slides, turns, origins = np.array(rows).reshape(-1, 3, 3).transpose(1, 0, 2)
+        return cls(slides=slides, turns=turns, origins=origins, columns=columns)
+
+    def jacobian(self, columns: list[int], point: Array) -> Array:
+        """Return velocity and angular velocity of a point per degree of freedom, shape (6, len(columns))."""
+        arms = point - self.origins[columns]
+        moved = self.slides[columns] + np.cross(self.turns[columns], arms)
+        return np.concatenate((moved.T, self.turns[columns].T))
 
 
 def _motions(joint: Joint, poses: Mapping[str, Pose3]) -> list[tuple[Array, Array]]:
@@ -86,15 +115,18 @@ def mass_matrix_and_gravity(description: RobotDescription, positions: Positions)
         positions: Of joints, as for `link_poses`.
     """
     poses = link_poses(description, positions)
-    size = len(degrees_of_freedom(description))
+    motions = _Motions.of(description, poses)
+    size = len(motions.slides)
     matrix, gravity = np.zeros((size, size)), np.zeros(size)
     for name, link in description.links.items():
         if link.inertial is None:
             continue
         T_root_com = poses[name] @ link.inertial.T_link_com
-        J = jacobian(description, name, poses, T_root_com.xyz)
+        moving = motions.columns[name]
+        J = motions.jacobian(moving, T_root_com.xyz)
         R = matrix_from_quat_wxyz(T_root_com.quat_wxyz)
         mass = link.inertial.mass
-        matrix += mass * J[:3].T @ J[:3] + J[3:].T @ (R @ link.inertial.inertia @ R.T) @ J[3:]
-        gravity += mass * STANDARD_GRAVITY * J[2]
+        inertia = R @ link.inertial.inertia @ R.T
+        matrix[np.ix_(moving, moving)] += mass * J[:3].T @ J[:3] + J[3:].T @ inertia @ J[3:]
+        gravity[moving] += mass * STANDARD_GRAVITY * J[2]
     return matrix, gravity

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from twin.models.description import Joint, Spring, Surface
 from twin.models.document import LARGEST, Element, Report, first
+from twin.models.plain_numbers import plain_number
 
 MU1 = ("mu1", "collision/surface/friction/ode/mu")
 MU2 = ("mu2", "collision/surface/friction/ode/mu2")
@@ -30,7 +31,7 @@ def value_of(element: Element | None) -> str:
 def number_in(element: Element | None) -> float | None:
     """Return the number in an element, or None if there is none."""
     try:
-        value = float(value_of(element))
+        value = plain_number(value_of(element))
     except ValueError:
         return None
     return value if math.isfinite(value) and abs(value) <= LARGEST else None

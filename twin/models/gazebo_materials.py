@@ -9,6 +9,7 @@ from lxml import etree
 
 from twin.models.document import Element
 from twin.models.gazebo import extensions_of, value_of
+from twin.models.plain_numbers import plain_number
 
 COLOURS: Mapping[str, str] = MappingProxyType(
     {
@@ -62,7 +63,7 @@ def colour_of(element: Element) -> str | None:
     """
     words = value_of(element.find("visual/material/diffuse")).split()
     try:
-        if len(words) in (3, 4) and all(0.0 <= float(word) <= 1.0 for word in words):
+        if len(words) in (3, 4) and all(0.0 <= plain_number(word) <= 1.0 for word in words):
             return " ".join([*words, "1"][:4])
     except ValueError:
         pass

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import get_args
 
-from twin.errors import nearest
+from twin.errors import nearest, shortened
 from twin.models.description import Joint, JointType, Limit, Link, Mimic
 from twin.models.document import Element, Report, describe
 from twin.models.kinematics import ONE_DOF
@@ -15,6 +15,8 @@ from twin.models.links import read_origin
 
 JOINT_TYPES: tuple[str, ...] = get_args(JointType)
 BOUNDED = ("revolute", "prismatic")
+SHOWN = 20
+"""Names of many that are told."""
 
 
 def read_joint(element: Element, report: Report) -> Joint:
@@ -35,8 +37,8 @@ def read_joint(element: Element, report: Report) -> Joint:
         T_parent_joint=read_origin(element, report),
         axis=_read_axis(element, kind, report),
         limit=_read_limit(element, kind, report),
-        damping=0.0 if dynamics is None else report.number(dynamics, "damping", 0.0),
-        friction=0.0 if dynamics is None else report.number(dynamics, "friction", 0.0),
+        damping=_read_dynamics(dynamics, "damping", report),
+        friction=_read_dynamics(dynamics, "friction", report),
         mimic=_read_mimic(element, report),
         line=report.line(element),
     )
@@ -92,6 +94,13 @@ def _read_limit(element: Element, kind: str, report: Report) -> Limit:
         )
         lower, upper = upper, lower
     return Limit(lower=lower, upper=upper, effort=effort, velocity=velocity)
+
+
+def _read_dynamics(dynamics: Element | None, what: str, report: Report) -> float:
+    value = 0.0 if dynamics is None else report.number(dynamics, what, 0.0)
+    if value < 0.0:
+        report.add(dynamics, f"{describe(dynamics)}: {what} {value:g} is negative", code="negative-limit")
+    return value
 
 
 def _read_mimic(element: Element, report: Report) -> Mimic | None:
@@ -166,7 +175,7 @@ def check_tree(
     elif len(roots) > 1:
         report.add(
             None,
-            f"the robot has {len(roots)} root links ({', '.join(roots)}); connect all but one by joints",
+            f"the robot has {len(roots)} root links ({shortened(roots)}); connect all but one by joints",
             code="several-roots",
         )
     else:
@@ -177,10 +186,10 @@ def check_tree(
 def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint], report: Report) -> None:
     safe: set[str] = set()
     for name in links:
-        path: list[str] = []
+        path: dict[str, None] = {}
         link = name
         while link in parent_joint and link not in safe and link not in path:
-            path.append(link)
+            path[link] = None
             link = parent_joint[link].parent
         if link in path:
             report.add(None, f"the joints form a cycle: {_cycle(link, parent_joint)}", code="cycle")
@@ -189,11 +198,13 @@ def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint
 
 
 def _cycle(link: str, parent_joint: Mapping[str, Joint]) -> str:
-    path = [link]
-    while (link := parent_joint[link].parent) not in path and link in parent_joint:
-        path.append(link)
-    path = [*path[path.index(link) if link in path else 0 :], link]
-    return " -> ".join(reversed(path))
+    seen = {link: None}
+    while (link := parent_joint[link].parent) not in seen and link in parent_joint:
+        seen[link] = None
+    path = [*seen]
+    path = [*path[path.index(link) if link in seen else 0 :], link]
+    middle = ["..."] if len(path) > SHOWN else []
+    return " -> ".join([*path[::-1][:SHOWN], *middle, *([path[0]] if middle else [])])
 
 
 def without_idle_mimics(
@@ -206,8 +217,10 @@ def without_idle_mimics(
 
 
 def _without_idle_mimic(joint: Joint, joints: Mapping[str, Joint], element: Element, report: Report) -> Joint:
-    if joint.mimic is None or not joint.mimic.joint:
+    if joint.mimic is None:
         return joint
+    if not joint.mimic.joint:
+        return replace(joint, mimic=None)  # noted before
     if joint.type not in ONE_DOF:
         why = f"joint '{joint.name}' is {joint.type} and cannot mimic another; remove <mimic>"
     elif joint.mimic.joint not in joints:
@@ -222,17 +235,16 @@ def _without_idle_mimic(joint: Joint, joints: Mapping[str, Joint], element: Elem
 
 
 def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report) -> None:
+    known: set[str] = set()
     for joint in joints.values():
-        seen = [joint.name]
-        leader = joint.mimic
-        while leader is not None:
-            if leader.joint not in joints:
-                break  # has no name, which was noted
-            if leader.joint in seen:
-                loop = " -> ".join([*seen, leader.joint])
-                report.add(
-                    elements[joint.name], f"joint '{joint.name}' mimics itself: {loop}", code="mimic-cycle"
-                )
-                break
-            seen.append(leader.joint)
-            leader = joints[leader.joint].mimic
+        path: dict[str, None] = {}
+        name = joint.name
+        while name in joints and name not in path and name not in known:
+            path[name] = None
+            mimic = joints[name].mimic
+            name = "" if mimic is None else mimic.joint
+        if name in path:
+            loop = [*path][[*path].index(name) :]
+            shown = " -> ".join([*loop[:SHOWN], *["..."] * (len(loop) > SHOWN), name])
+            report.add(elements[name], f"joint '{name}' mimics itself: {shown}", code="mimic-cycle")
+        known.update(path)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose3
-from twin.models.description import Joint, RobotDescription
+from twin.models.description import Joint, Mimic, RobotDescription
 
 Positions = Mapping[str, ArrayLike]
 """Joint positions by name: a number [rad or m]; of a planar joint x, y [m], yaw [rad]; of a floating joint
@@ -25,17 +25,20 @@ ZERO: Mapping[str, tuple[float, ...]] = {
 
 def joint_positions(description: RobotDescription, positions: Positions) -> dict[str, Array]:
     """Return every joint's position, shape (1,), (3,) or (7,): as given, else by its leader, else zero."""
-
-    def position(joint: Joint) -> Array:
-        if joint.mimic is None:
-            return np.atleast_1d(
-                np.asarray(positions.get(joint.name, ZERO.get(joint.type, 0.0)), dtype=np.float64)
-            )
-        leader = description.joints[joint.mimic.joint]
-        lead = position(leader) if leader.type in ONE_DOF else np.zeros(1)
-        return joint.mimic.multiplier * lead + joint.mimic.offset
-
-    return {name: position(joint) for name, joint in description.joints.items()}
+    found: dict[str, Array] = {}
+    for joint in description.joints.values():
+        followers: list[tuple[str, Mimic]] = []
+        leader = joint
+        while leader.name not in found and leader.mimic is not None:
+            followers.append((leader.name, leader.mimic))
+            leader = description.joints[leader.mimic.joint]
+        if leader.name not in found:
+            given = positions.get(leader.name, ZERO.get(leader.type, 0.0))
+            found[leader.name] = np.atleast_1d(np.asarray(given, dtype=np.float64))
+        lead = found[leader.name] if leader.type in ONE_DOF else np.zeros(1)
+        for name, mimic in reversed(followers):
+            found[name] = lead = mimic.multiplier * lead + mimic.offset
+    return {name: found[name] for name in description.joints}
 
 
 def joint_motion(joint: Joint, position: ArrayLike) -> Pose3:

@@ -29,6 +29,18 @@ from twin.models.xml_text import as_utf8, read_utf8
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 """1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
 XACRO = "http://www.ros.org/wiki/xacro"
+MOST = {
+    "link": 2000,
+    "joint": 2000,
+    "link/visual": 10_000,
+    "link/collision": 5000,
+    "gazebo": 10_000,
+    "gazebo/sensor": 500,
+    "gazebo/plugin": 500,
+    "transmission": 2000,
+    "ros2_control/joint": 2000,
+}
+"""Elements of a kind; the largest robots known have 200 links."""
 WORLD = "world"
 """A root link of this name is bolted down."""
 
@@ -72,6 +84,7 @@ def parse_urdf(
     raw = urdf.encode() if isinstance(urdf, str) else as_utf8(urdf, source)
     report = Report(source, lines)
     root = parse(raw, report)
+    _refuse_too_many(root, report)
     if root.get("version", "1.0") not in VERSIONS:
         report.add(
             root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
@@ -109,6 +122,15 @@ def parse_urdf(
     _sort(report)
     report.raise_if_any()
     return description
+
+
+def _refuse_too_many(root: Element, report: Report) -> None:
+    for path, most in MOST.items():
+        found = len(root.findall(path))
+        if found > most:
+            what = path.rpartition("/")[2]
+            report.add(None, f"the robot has {found} <{what}>; at most {most} are read", code="too-large")
+    report.raise_if_any()
 
 
 def _has_xacro(source: Path, raw: bytes) -> bool:

@@ -20,6 +20,7 @@ Faces = NDArray[np.int64]
 READABLE = "STL, OBJ and COLLADA (.dae)"
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 STL_HEADER = 84
+MOST_FACES = 500_000
 _SNIFFED = 4096
 _OTHERS = {
     b"glTF": "glTF, of which RViz and Gazebo disagree which axis is up",
@@ -126,6 +127,8 @@ def read_obj(data: bytes) -> tuple[Array, Faces]:
         except ValueError:
             shown = line.decode(errors="replace").strip()[:60]
             raise ValueError(f"has a broken line {number}: '{shown}'") from None
+        if len(faces) > MOST_FACES or len(points) > 3 * MOST_FACES:
+            raise ValueError(f"has more than {MOST_FACES} triangles, or corners for more")
     return (
         np.array(points).astype(np.float64).reshape(-1, 3),
         np.array(faces, dtype=np.int64).reshape(-1, 3),
@@ -135,6 +138,8 @@ def read_obj(data: bytes) -> tuple[Array, Faces]:
 def _obj_index(word: bytes, count: int) -> int:
     """Return the index from 0 of a corner as `3`, `3/1`, `3//2` or, counted from the end, `-1`."""
     index = int(word.partition(b"/")[0])
+    if abs(index) > 3 * MOST_FACES:
+        raise ValueError(f"{index} is out of range")
     return index - 1 if index > 0 else count + index
 
 

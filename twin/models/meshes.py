@@ -13,6 +13,7 @@ from twin.geometry import Array
 from twin.models.dae import Rgb, read_dae
 from twin.models.description import Collision, Link, Mesh, RobotDescription, Visual
 from twin.models.mesh_formats import (
+    MOST_FACES,
     Faces,
     Format,
     format_of,
@@ -23,7 +24,6 @@ from twin.models.mesh_formats import (
 )
 
 MOST_BYTES = 256 * 1024 * 1024
-MOST_FACES = 1_000_000
 FARTHEST = 1e6
 """Largest coordinate [m], in the file and scaled; MuJoCo keeps meshes in single precision."""
 FLAT = 1e-6

@@ -12,6 +12,7 @@ from twin.models.description import ContactSpec, ImuSpec, LidarSpec, Link, Range
 from twin.models.document import LARGEST, Element, Report, first, text_of
 from twin.models.drives import library_of
 from twin.models.gazebo import value_of
+from twin.models.plain_numbers import plain_numbers
 
 LIDAR = ("gpu_lidar", "lidar", "ray", "gpu_ray")
 SONAR = ("sonar", "ray-cone")
@@ -30,6 +31,9 @@ TOPIC_TAGS = (
 )
 RAY = ("lidar", "ray")
 """The element with <scan> and <range>: new and classic name."""
+MAX_SAMPLES = 100_000
+"""Rays of a lidar; every one of them is cast for every scan."""
+MAX_RATE_HZ = 1e6
 
 
 class Common(TypedDict):
@@ -113,10 +117,11 @@ def read_common(element: Element, link: str, kind: str, report: Report) -> Commo
         element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate"
     )
     rate = rate or DEFAULT_RATE_HZ[kind]
-    if rate < 0.0:
+    if not 0.0 < rate <= MAX_RATE_HZ:
         report.add(
             element,
-            f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; it is positive",
+            f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; "
+            f"it is positive and at most {MAX_RATE_HZ:g}",
             code="bad-sensor",
         )
         rate = 1.0
@@ -135,7 +140,7 @@ def read_pose(element: Element) -> Pose3:
     """Return an SDFormat `<pose>` in its parent's frame, the identity if there is none that can be read."""
     pose = element.find("pose")
     try:
-        x, y, z, *rpy = (float(word) for word in value_of(pose).split())
+        x, y, z, *rpy = plain_numbers(value_of(pose))
         roll, pitch, yaw = rpy
     except ValueError:
         return Pose3.from_xyz_rpy()
@@ -149,12 +154,14 @@ def read_pose(element: Element) -> Pose3:
 def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
     scan = _ray_child(element, "scan/horizontal")
     samples = _need(element, scan, "samples", report)
-    if samples != int(samples) or samples < 1:
+    if samples != int(samples) or not 1 <= samples <= MAX_SAMPLES:
+        valid = f"a whole number from 1 to {MAX_SAMPLES}"
         report.add(
             element,
-            f"sensor '{element.get('name', '')}' has {samples:g} samples; a whole number from 1",
+            f"sensor '{element.get('name', '')}' has {samples:g} samples; {valid}",
             code="bad-sensor",
         )
+        samples = 1.0
     angle_min, angle_max = (
         _need(element, scan, "min_angle", report),
         _need(element, scan, "max_angle", report),
@@ -200,10 +207,10 @@ def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
 
 
 def _read_imu(element: Element, link: str, report: Report) -> ImuSpec:
-    both = report.child_number(element, "plugin/gaussianNoise", "gaussianNoise") or 0.0
-    gyro = report.child_number(element, *_imu_noise("angular_velocity", "rate", "stddev"))
-    bias = report.child_number(element, *_imu_noise("angular_velocity", "rate", "bias_stddev"))
-    accel = report.child_number(element, *_imu_noise("linear_acceleration", "accel", "stddev"))
+    both = _deviation(element, report, "plugin/gaussianNoise", "gaussianNoise") or 0.0
+    gyro = _deviation(element, report, *_imu_noise("angular_velocity", "rate", "stddev"))
+    bias = _deviation(element, report, *_imu_noise("angular_velocity", "rate", "bias_stddev"))
+    accel = _deviation(element, report, *_imu_noise("linear_acceleration", "accel", "stddev"))
     return ImuSpec(
         **read_common(element, link, "imu", report),
         gyro_noise_stddev=both if gyro is None else gyro,
@@ -237,7 +244,19 @@ def _ray_child(element: Element, path: str) -> Element | None:
 
 def _noise(element: Element, report: Report) -> float:
     paths = (*(f"{ray}/noise/stddev" for ray in RAY), "plugin/gaussianNoise")
-    return report.child_number(element, *paths) or 0.0
+    return _deviation(element, report, *paths) or 0.0
+
+
+def _deviation(element: Element, report: Report, *paths: str) -> float | None:
+    """Return a standard deviation, or None."""
+    value = report.child_number(element, *paths)
+    if value is not None and value < 0.0:
+        report.add(
+            element,
+            f"sensor '{element.get('name', '')}' has noise of {value:g}; a deviation is not negative",
+            code="bad-sensor",
+        )
+    return value
 
 
 def _need(sensor: Element, parent: Element | None, name: str, report: Report) -> float:

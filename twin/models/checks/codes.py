@@ -22,6 +22,7 @@ ERRORS: Mapping[str, str] = MappingProxyType(
         "bad-number": "write plain finite numbers, separated by spaces",
         "missing-link": "add <parent link='...'/> and <child link='...'/>",
         "unknown-link": "define the link, or correct the name",
+        "bad-name": "remove line breaks, and spaces at the ends of the name",
         "duplicate-name": "rename one of them",
         "no-links": "add at least one <link name='...'/>",
         "two-parents": "let one of the joints lead to another link",

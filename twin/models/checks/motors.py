@@ -10,7 +10,7 @@ import numpy as np
 from twin.geometry import Array, Pose3, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import Joint, RobotDescription
-from twin.models.kinematics import link_poses
+from twin.models.kinematics import ONE_DOF, link_poses
 
 GRAVITY = 9.81
 """[m/s²]"""
@@ -21,7 +21,7 @@ def weak_motor(description: RobotDescription) -> Iterator[Diagnostic]:
 
     The robot stands upright, the other joints are at zero or at the nearest end of their range.
     """
-    rest = {joint.name: _rest(joint) for joint in description.joints.values()}
+    rest = {joint.name: _rest(joint) for joint in description.joints.values() if joint.type in ONE_DOF}
     poses = link_poses(description, rest)
     for joint in description.joints.values():
         effort = joint.limit.effort
@@ -70,6 +70,8 @@ def static_load(
     now = float(axis @ np.cross(arm, weight))
     quarter = float(axis @ np.cross(np.cross(axis, arm), weight))
     low, high = (joint.limit.lower or 0.0) - position, (joint.limit.upper or 0.0) - position
+    if high - low >= 2.0 * math.pi:
+        return mass, math.hypot(now, quarter)
     peak = math.atan2(quarter, now)
     turns = [
         peak + k * math.pi

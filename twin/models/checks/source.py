@@ -6,6 +6,7 @@ import math
 
 from twin.models.description import RobotDescription
 from twin.models.document import Element, Report, parse
+from twin.models.plain_numbers import plain_number
 
 ONCE = ("inertial", "visual", "collision", "joint")
 """Elements in which each other one stands once."""
@@ -20,7 +21,7 @@ def read_source(description: RobotDescription) -> tuple[Element, Report]:
 def number(text: str | None) -> float:
     """Return the number in a text, or NaN: only the first of repeated elements was validated."""
     try:
-        return float(text or "")
+        return plain_number(text or "")
     except ValueError:
         return math.nan
 

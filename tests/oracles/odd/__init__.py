@@ -1,0 +1,1 @@
+"""Odd, bad and hostile robot files, each with what `twin convert` has to make of it."""
