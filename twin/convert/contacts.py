@@ -8,9 +8,12 @@ import mujoco
 import numpy as np
 
 from twin.convert.geoms import GROUP_COLLISION
+from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 from twin.models.kinematics import rigid_groups
 
+MOST_PAIRS = 250_000
+"""Of links that do not touch each other; MuJoCo keeps each of them."""
 _TYPE = mujoco.mjtGeom
 
 
@@ -31,6 +34,10 @@ def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
                 pairs.setdefault(frozenset(pair), pair)
     every = [name for group in solid.values() for name in group]
     loners = [name for name in every if not may_touch(description, name, name)]
+    if len(loners) * len(every) > MOST_PAIRS:
+        message = f"{len(loners)} links that touch no other of {len(every)} need too many pairs"
+        fault = f"{message}; leave out <self_collide> or collision shapes"
+        raise ConversionError(Problem(fault, description.source, code="too-large", element="robot"))
     for pair in product(loners, every):
         if heads[pair[0]] != heads[pair[1]] and not may_touch(description, *pair):
             pairs.setdefault(frozenset(pair), pair)

@@ -26,6 +26,8 @@ from twin.models.description import (
 
 MAX_RAYS = 2048
 """A planar lidar with more rays than this is left out: MuJoCo casts every ray anew in every step."""
+MAX_RAYS_OF_ALL = 4 * MAX_RAYS
+"""Further lidars and sonars are left out likewise."""
 CONE_RINGS = 2
 """Rings of rays about a sonar's axis; ring k has 6 k rays, 19 rays in all."""
 RAY_ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
@@ -89,6 +91,7 @@ class _SensorBuilder:
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self._spec = spec
         self._taken: set[str] = set()
+        self._rays_cast = 0
 
     def add(self, sensor: SensorSpec) -> list[str]:
         """Add a sensor; return its names."""
@@ -122,6 +125,9 @@ class _SensorBuilder:
         if isinstance(sensor, LidarSpec) and sensor.samples > MAX_RAYS:
             return
         rays = rays_of(sensor)
+        if self._rays_cast + len(rays) > MAX_RAYS_OF_ALL:
+            return
+        self._rays_cast += len(rays)
         digits = max(3, len(str(len(rays) - 1)))
         for index, ray in enumerate(rays):
             name = f"{sensor.name}-{index:0{digits}}"
