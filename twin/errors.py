@@ -112,7 +112,7 @@ def nearest(word: str, valid: Iterable[str]) -> str:
 
     names = sorted(valid)
     # Comparing very many names takes long, as a file may name as many unknown ones.
-    likely = names if len(names) <= MANY else [name for name in names if name.lower() == word.lower()]
+    likely = names if len(names) <= COMPARED else [name for name in names if name.lower() == word.lower()]
     close = difflib.get_close_matches(word, likely, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return f"{hint}Valid: {shortened(names)}"

@@ -31,7 +31,7 @@ def add_bodies(
     description: RobotDescription,
     *,
     base: Base,
-    geoms: GeomBuilder,
+    geoms: GeomBuilder | None,
     wheel_joints: frozenset[str],
 ) -> str | None:
     """Add all links and joints; return the name of the root's free joint, if it has one.
@@ -45,7 +45,8 @@ def add_bodies(
 
     def add_link(parent: mujoco.MjsBody, name: str, T_parent_link: Pose3) -> mujoco.MjsBody:
         body = _add_body(parent, name, T_parent_link, masses.get(name))
-        geoms.add(body, description.links[name])
+        if geoms is not None:
+            geoms.add(body, description.links[name])
         return body
 
     root = add_link(spec.worldbody, description.root, Pose3.from_xyz_rpy())

@@ -52,27 +52,24 @@ def convert(
         base = "fixed"
     description, renamed = _without_world(description)
     roles = roles_of(description)
+    # Some steps need to know how the bodies move; shapes, which take far longer, do not matter to that.
+    bare = mujoco.MjSpec()
+    add_bodies(bare, description, base=base, geoms=None, wheel_joints=roles.wheel_joints)
+    moving = _compile(bare, description)
+    refuse_singular(moving, description)
     spec = mujoco.MjSpec()
     spec.modelname = description.name
     spec.compiler.degree = False
-    root_joint = add_bodies(
-        spec,
-        description,
-        base=base,
-        geoms=GeomBuilder(spec, roles, timestep=timestep, visuals=visuals),
-        wheel_joints=roles.wheel_joints,
-    )
+    geoms = GeomBuilder(spec, roles, timestep=timestep, visuals=visuals)
+    root_joint = add_bodies(spec, description, base=base, geoms=geoms, wheel_joints=roles.wheel_joints)
     add_excludes(spec, description)
     add_extensions(spec, description)
-    model = _compile(spec, description)
-    refuse_singular(model, description)
-    carry_load(spec, model, roles)
-    entries = add_actuators(spec, description, model, timestep=timestep)
-    _compile(spec, description)
+    carry_load(spec, moving, roles)
+    entries = add_actuators(spec, description, moving, timestep=timestep)
     return Conversion(
         description=description,
         spec=spec,
-        spawn_height=spawn_height(model),
+        spawn_height=spawn_height(_compile(spec, description)),
         root_joint=root_joint,
         ledger=(*renamed, *describe_conversion(description, roles, base), *entries),
     )

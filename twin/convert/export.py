@@ -178,7 +178,7 @@ def _report(
         "drive": None if description.drive is None else asdict(description.drive),
         "assets": assets,
         "self_check": {"passed": checked.passed, **asdict(checked)},
-        "diagnostics": [diagnostic_json(item) for item in inspect_robot(description)],
+        "diagnostics": [diagnostic_json(item) for item in inspect_robot(description, converts=True)],
         "tags": counts(tags),
         "ledger": [asdict(entry) for entry in tags],
         "guesses": [asdict(entry) for entry in conversion.ledger if entry.outcome == "guessed"],

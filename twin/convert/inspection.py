@@ -44,10 +44,13 @@ def inspect_file(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> I
     return Inspection(file=file, description=description, diagnostics=inspect_robot(description))
 
 
-def inspect_robot(description: RobotDescription) -> tuple[Diagnostic, ...]:
-    """Return the diagnostics of a robot that could be read, in file order."""
+def inspect_robot(description: RobotDescription, *, converts: bool = False) -> tuple[Diagnostic, ...]:
+    """Return the diagnostics of a robot that could be read, in file order.
+
+    `converts`: it is known that `convert` takes the robot, so that this need not be tried.
+    """
     found = [*check(description), *overlaps(description)]
-    if not any(diagnostic.severity == "error" for diagnostic in found):
+    if not converts and not any(diagnostic.severity == "error" for diagnostic in found):
         base_is_massless = any(diagnostic.code == "massless-base" for diagnostic in found)
         try:
             convert(description, base="fixed" if base_is_massless else "free", visuals=False)

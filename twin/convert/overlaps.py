@@ -23,6 +23,8 @@ LEAST_DEPTH = 1e-4
 """Shapes that just touch are meant to [m]."""
 MOST_PAIRS = 50_000
 """Pairs of shapes that are looked at; robots have some hundreds near each other."""
+LEAST_VOLUME = 1e-15
+"""Of a mesh [m³]."""
 WHEEL_GAP = 5e-4
 """A wheel closer than this to the part it turns in rubs on it [m]."""
 
@@ -88,7 +90,7 @@ def _distances(
     solids: list[_Solid] = []
     for name, pose in link_poses(description).items():
         for collision in description.links[name].collisions:
-            if is_solid(collision):
+            if is_solid(collision) and not _is_dust(collision.geometry):
                 placed = pose @ collision.T_link_geometry
                 shape = _shape(spec, collision.geometry)
                 spec.worldbody.add_geom(**shape, pos=placed.xyz, quat=placed.quat_wxyz)
@@ -107,6 +109,12 @@ def _distances(
             pair = (solids[i].link, solids[j].link)
             least[pair] = min(distance, least.get(pair, np.inf))
     return least
+
+
+def _is_dust(geometry: Geometry) -> bool:
+    """Tell whether a mesh is too small for MuJoCo, which says so itself when the robot is converted."""
+    hull = hull_of(geometry) if isinstance(geometry, Mesh) else None
+    return hull is not None and hull.volume < LEAST_VOLUME
 
 
 def _shape(spec: mujoco.MjSpec, geometry: Geometry) -> dict[str, Any]:

@@ -11,10 +11,13 @@ from twin.geometry import Array
 from twin.models.description import Mesh
 from twin.models.meshes import TriangleMesh, is_flat, read_mesh, scaled_points
 
+MANY_POINTS = 20_000
+DIRECTIONS = 1000
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hull:
-    """The convex hull of a mesh, in the mesh's frame."""
+    """The convex hull of a mesh, in the mesh's frame; of one with very many points, nearly."""
 
     points: Array
     """Its corners [m], shape (n, 3)."""
@@ -42,6 +45,8 @@ def _hull_of(mesh: Mesh, _content: TriangleMesh) -> Hull | None:
     points = scaled_points(mesh)
     if is_flat(points):
         return None
+    if len(points) > MANY_POINTS:
+        points = _outermost(points)
     try:
         hull = ConvexHull(points)
     except QhullError:
@@ -64,3 +69,16 @@ def _hull_of(mesh: Mesh, _content: TriangleMesh) -> Hull | None:
         centroid=inside + centroid,
         gyration=np.trace(covariance) * np.eye(3) - covariance,
     )
+
+
+def _outermost(points: Array) -> Array:
+    """Return the points that reach furthest, each in one of many directions evenly spread (Fibonacci)."""
+    number = np.arange(DIRECTIONS)
+    z = 1.0 - (2.0 * number + 1.0) / DIRECTIONS
+    turn = number * (np.pi * (3.0 - np.sqrt(5.0)))
+    across = np.sqrt(1.0 - z * z)
+    spread = np.stack((across * np.cos(turn), across * np.sin(turn), z), axis=1)
+    directions = np.concatenate((np.eye(3), -np.eye(3), spread))
+    transposed = np.ascontiguousarray(points.T)
+    chosen = np.concatenate([np.argmax(part @ transposed, axis=1) for part in np.array_split(directions, 50)])
+    return points[np.unique(chosen)]
