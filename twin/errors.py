@@ -21,6 +21,8 @@ from pathlib import Path
 
 MANY, SHOWN = 100, 20
 """Of more names than this in a message only so many are told."""
+COMPARED = 200
+"""Up to so many names, the nearest one is looked for."""
 
 
 class SourceLine(int):

@@ -113,6 +113,10 @@ FAULTS = {
         link_c(sphere("<origin xyz='0 1e11 0'/>")),
         "xyz='0 1e11 0' is out of range; at most 1e+08",
     ),
+    "no mass to speak of": (
+        link_c(inertial(mass=1e-300)),
+        "mass 1e-300 kg; a mass is more than",
+    ),
     "too thin": (
         link_c("<visual><geometry><box size='1 1 1e-300'/></geometry></visual>"),
         "<box> of link 'c' has a dimension that is not positive",

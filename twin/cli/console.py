@@ -33,7 +33,7 @@ def print_error(fault: TwinError) -> None:
     for problem in fault.problems:
         console.print(Text("error: ", style="bold red") + _sentence(problem))
     if len(fault.problems) > 1:
-        console.print(Text(f"{len(fault.problems)} problems, nothing was run", style="dim"))
+        console.print(Text(f"{len(fault.problems)} problems", style="dim"))
 
 
 def _sentence(problem: Problem) -> Text:

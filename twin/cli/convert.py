@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -15,6 +15,7 @@ from twin.models.options import ReadOptions
 class Base(StrEnum):
     """How the root link is held."""
 
+    AUTO = "auto"
     FREE = "free"
     FIXED = "fixed"
 
@@ -25,7 +26,9 @@ def convert(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.", show_default=False)
     ],
-    base: Annotated[Base, typer.Option(help="fixed: the robot is bolted down.")] = Base.FREE,
+    base: Annotated[
+        Base, typer.Option(help="fixed: bolted down. auto: free, unless the base weighs nothing.")
+    ] = Base.AUTO,
     *,
     read: ReadOptions,
 ) -> None:
@@ -42,7 +45,10 @@ def convert(
 
     description = load(file, read)
     options = Physics(sleep=False).apply
-    report = export(description, output, base=base.value, set_options=options, drive_check=drive_self_check)
+    by_name: dict[Base, Literal["free", "fixed"]] = {Base.FREE: "free", Base.FIXED: "fixed"}
+    report = export(
+        description, output, base=by_name.get(base), set_options=options, drive_check=drive_self_check
+    )
     tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
     size = ", ".join(counted(len(report[noun + "s"]), noun) for noun in ("link", "joint"))
     guesses, warnings = (len(report[key]) for key in ("guesses", "diagnostics"))

@@ -142,6 +142,13 @@ def _refuse_taken_names(description: RobotDescription) -> None:
         raise ConversionError(problems)
 
 
+def natural_base(description: RobotDescription) -> Base:
+    """Return `free`, or `fixed` for a robot whose base weighs nothing, so that it can only be bolted down."""
+    heads = rigid_groups(description)
+    heavy = {heads[name] for name in description.settlement.bodies}
+    return "free" if heads[description.root] in heavy else "fixed"
+
+
 def _refuse_massless(description: RobotDescription, base: Base) -> None:
     heads = rigid_groups(description)
     heavy = {heads[name] for name in description.settlement.bodies}

@@ -7,14 +7,14 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import mujoco
 
-from twin.convert.bodies import Base
-from twin.convert.conversion import Conversion
+from twin.convert.bodies import Base, natural_base
+from twin.convert.conversion import Conversion, LedgerEntry
 from twin.convert.convert import convert
 from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
@@ -37,7 +37,7 @@ def export(
     description: RobotDescription,
     folder: Path,
     *,
-    base: Base = "free",
+    base: Base | None = None,
     set_options: SetOptions | None = None,
     drive_check: DriveCheck | None = None,
 ) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def export(
     Args:
         description: The robot.
         folder: Is created; an earlier conversion in it is replaced.
-        base: As for `convert`.
+        base: As for `convert`; None: free, unless the base weighs nothing, which the report calls a guess.
         set_options: Sets the physics options that the model is meant for; else MuJoCo's defaults hold.
         drive_check: Drives a robot with a free base and returns what becomes `drive` in the report's
             `self_check`; None for a robot that does not drive.
@@ -58,7 +58,11 @@ def export(
             not what the description says.
     """
     folder = _checked(folder)
-    conversion = convert(description, base=base)
+    conversion = convert(description, base=base or natural_base(description))
+    if base is None and conversion.root_joint is None:
+        note = "bolted down, as it weighs nothing or the file says so"
+        guess = LedgerEntry(element=f"base '{description.root}'", outcome="guessed", note=note)
+        conversion = replace(conversion, ledger=(*conversion.ledger, guess))
     spec = conversion.spec.copy()
     if set_options is not None:
         set_options(spec)

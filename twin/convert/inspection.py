@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from twin.convert.bodies import natural_base
 from twin.convert.convert import convert
 from twin.convert.overlaps import overlaps
 from twin.errors import ConversionError, ModelError
@@ -51,9 +52,8 @@ def inspect_robot(description: RobotDescription, *, converts: bool = False) -> t
     """
     found = [*check(description), *overlaps(description)]
     if not converts and not any(diagnostic.severity == "error" for diagnostic in found):
-        base_is_massless = any(diagnostic.code == "massless-base" for diagnostic in found)
         try:
-            convert(description, base="fixed" if base_is_massless else "free", visuals=False)
+            convert(description, base=natural_base(description), visuals=False)
         except ConversionError as fault:
             found += from_problems(fault.problems, description.source)
     return in_file_order(found)

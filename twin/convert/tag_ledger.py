@@ -127,8 +127,8 @@ class _Fates:
             return self._commands.of(element)
         if path in ("joint", "joint/axis", "joint/limit", "joint/dynamics", "joint/mimic"):
             return _joint(element, path, self._description)
-        if path == "link/inertial/inertia":
-            return _inertia(element, self._description)
+        if path.startswith("link/inertial") and path in FATES:
+            return _inertial(element, path, self._description)
         if path == "link" and element.get("name") == WORLD:
             return "translated", f"body '{WORLD}_link'; MuJoCo has a body '{WORLD}' of its own"
         if "material" in path.split("/"):
@@ -198,22 +198,25 @@ def _limit(element: Element, kind: str) -> Fate:
     return "translated", "; ".join(parts)
 
 
-def _inertia(element: Element, description: RobotDescription) -> Fate:
+def _inertial(element: Element, path: str, description: RobotDescription) -> Fate:
     link = next(element.iterancestors("link")).get("name")
     settlement = description.settlement
-    if link in settlement.lumped:
-        return "translated", f"no body has it; part of the inertia of '{settlement.lumped[link]}'"
-    if link in settlement.repaired:
-        repair = settlement.repaired[link]
-        if repair.fault is None:
-            return (
-                "translated",
-                "the nearest inertia that a body can have; it is that of a point or rounded",
-            )
-        return "guessed", f"the nearest inertia that a body can have, {repair.change:.1%} away"
     if description.links[link].inertial is None:
         return "kept", "no mass, no inertia: a mere frame"
-    return FATES["link/inertial/inertia"]
+    if link in settlement.lumped:
+        return "translated", f"part of the inertial of '{settlement.lumped[link]}', to which it is fixed"
+    if link not in settlement.bodies:
+        return "dropped", "the body that does not move has no mass for it"
+    parts = [name for name, into in settlement.lumped.items() if into == link]
+    if path == "link/inertial/inertia" and link in settlement.repaired:
+        repair = settlement.repaired[link]
+        nearest = "the nearest inertia that a body can have"
+        if repair.fault is None:
+            return "translated", f"{nearest}; it is that of a point or a line, or rounded"
+        return "guessed", f"{nearest}, {repair.change:.1%} away"
+    if parts:
+        return "translated", f"together with that of {', '.join(parts)}"
+    return FATES[path]
 
 
 def _shape(element: Element, parent: str, description: RobotDescription, roles: Roles) -> Fate:

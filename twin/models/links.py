@@ -113,8 +113,9 @@ def _read_inertial(element: Element, link: str, report: Report) -> Inertial | No
         )
         return None
     mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
-    if mass < 0.0:
-        report.add(mass_element, f"link '{link}' has mass {mass:g} kg; a mass is positive", code="bad-mass")
+    if mass < 0.0 or 0.0 < mass <= LEAST:
+        valid = f"a mass is more than {LEAST:g} kg, or zero for a mere frame"
+        report.add(mass_element, f"link '{link}' has mass {mass:g} kg; {valid}", code="bad-mass")
         return None
     inertia = _read_inertia(inertia_element, report)
     if mass <= LEAST and np.max(np.abs(inertia)) <= LEAST:
