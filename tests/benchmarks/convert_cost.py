@@ -15,7 +15,7 @@ from tests.oracles.installed import example_robots
 from twin.convert import convert
 from twin.convert.export import export
 from twin.models import load
-from twin.models.meshes import _read
+from twin.models.mesh.meshes import _read
 
 REPEATS = 3
 

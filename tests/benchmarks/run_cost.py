@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from twin import runtime
-from twin.models.description import LidarSpec
+from twin.models.specs import LidarSpec
 from twin.runtime.build import build
 from twin.scenario.schema import Scenario, load
 

@@ -14,9 +14,10 @@ from twin.convert import Conversion, convert
 from twin.errors import ConversionError
 from twin.geometry import Pose3, matrix_from_quat_wxyz
 from twin.models import catalogue, link_poses, load
-from twin.models.description import Mesh, RobotDescription, Visual
+from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_positions
 from twin.models.loader import parse_urdf
+from twin.models.shapes import Mesh, Visual
 
 ROBOTS = tuple(catalogue())
 INERTIAL = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial>"

@@ -15,7 +15,8 @@ from twin.convert import convert
 from twin.convert.export import export
 from twin.geometry import Pose2, Pose3, rotate_wxyz
 from twin.models import load
-from twin.models.description import Box, RobotDescription
+from twin.models.description import RobotDescription
+from twin.models.shapes import Box
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Scene, Shape, StaticBody
 from twin.sim.sensors import Lidar

@@ -19,7 +19,7 @@ from twin.errors import ConversionError
 from twin.geometry import Array
 from twin.models import load
 from twin.models.description import RobotDescription
-from twin.models.meshes import read_mesh
+from twin.models.mesh.meshes import read_mesh
 from twin.models.options import ReadOptions
 
 POINTS = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])

@@ -11,8 +11,9 @@ import pytest
 from twin.errors import ModelError
 from twin.geometry import matrix_from_quat_wxyz
 from twin.models import catalogue, link_poses, load
-from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, RobotDescription
+from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_positions
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 
 ROBOTS = ("diff_bot", "r2d2", "sp1s", "test_robot", "warehouse_bot")
 

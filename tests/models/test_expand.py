@@ -10,7 +10,7 @@ import pytest
 from twin.errors import ModelError
 from twin.models import ReadOptions, load
 from twin.models.checks import check
-from twin.models.expand import expand
+from twin.models.expansion.expand import expand
 
 HEAD = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>"
 

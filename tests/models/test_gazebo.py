@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from twin.models.description import DriveSpec, LidarSpec, RangeSpec
 from twin.models.loader import parse_urdf
+from twin.models.specs import DriveSpec, LidarSpec, RangeSpec
 
 WHEELS = ("fl", "fr", "bl", "br")
 

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from twin.models.checks import check
-from twin.models.description import ImuSpec, RangeSpec, RobotDescription, Spring, Visual
+from twin.models.description import RobotDescription, Spring
 from twin.models.loader import parse_urdf
+from twin.models.shapes import Visual
+from twin.models.specs import ImuSpec, RangeSpec
 
 BOX = "<geometry><box size='1 1 1'/></geometry>"
 CHAIN = (

@@ -14,10 +14,10 @@ from twin.errors import ModelError
 from twin.geometry import Array
 from twin.models import load
 from twin.models.checks import check
-from twin.models.description import Mesh
-from twin.models.hulls import hull_of
-from twin.models.meshes import TriangleMesh, mesh_faults, read_mesh
+from twin.models.mesh.hulls import hull_of
+from twin.models.mesh.meshes import TriangleMesh, mesh_faults, read_mesh
 from twin.models.options import ReadOptions
+from twin.models.shapes import Mesh
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])

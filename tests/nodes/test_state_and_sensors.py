@@ -28,8 +28,8 @@ from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import Empty
 from twin.geometry import Pose2
 from twin.models import load
-from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 from twin.models.kinematics import link_poses
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 from twin.navigation.amcl import AmclConfig
 from twin.nodes.amcl import AmclNode, InitialPose
 from twin.nodes.map_server import MapServerNode

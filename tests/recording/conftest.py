@@ -20,7 +20,7 @@ os.environ["RERUN_ANALYTICS"] = "0"
 os.environ["RERUN_STRICT"] = "1"
 
 from twin.geometry import Pose2, Pose3, wxyz_from_xyzw
-from twin.models.description import Box, Capsule, Cylinder, Sphere
+from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 from twin.recording.read_back import Recording
 from twin.recording.sink import RecordingConfig, RerunSink
 

@@ -11,18 +11,9 @@ import pytest
 
 from twin.convert.conversion import Conversion
 from twin.geometry import Pose2, Pose3
-from twin.models.description import (
-    Box,
-    ContactSpec,
-    ImuSpec,
-    Joint,
-    LidarSpec,
-    Link,
-    RangeSpec,
-    RobotDescription,
-    SensorSpec,
-    Visual,
-)
+from twin.models.description import Joint, Link, RobotDescription
+from twin.models.shapes import Box, Visual
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.sim.conftest import BUMPER, IMU, LIDAR, SONAR, box, placed
 from twin.geometry import Pose2, Pose3, rotate_wxyz
-from twin.models.description import SensorSpec
+from twin.models.specs import SensorSpec
 from twin.sim.scene import Scene
 from twin.sim.world import World
 

@@ -9,7 +9,7 @@ import pytest
 from twin.convert import convert
 from twin.geometry import Pose2, Pose3
 from twin.models import load
-from twin.models.description import Box
+from twin.models.shapes import Box
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Scene, Shape, StaticBody

@@ -13,7 +13,8 @@ import pytest
 from tests.sim.conftest import box, placed, tote
 from twin.errors import ModelError, ScenarioError, SimulationError
 from twin.geometry import Pose2, Pose3
-from twin.models.description import Box, ImuSpec
+from twin.models.shapes import Box
+from twin.models.specs import ImuSpec
 from twin.sim.physics import Physics
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
 from twin.sim.world import World

@@ -9,7 +9,7 @@ import pytest
 
 from twin.errors import ScenarioError
 from twin.geometry import Pose2
-from twin.models.description import Box
+from twin.models.shapes import Box
 from twin.sim.scene import Shape, StaticBody
 from twin.sim.world import World
 from twin.warehouse import arena as arenas

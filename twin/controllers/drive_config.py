@@ -10,8 +10,9 @@ from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.skid_steer import track_ratio, weight_shares
 from twin.geometry import Array, Pose3
-from twin.models.description import DriveSpec, RobotDescription
+from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.specs import DriveSpec
 
 
 def drive_config(

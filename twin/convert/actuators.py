@@ -11,9 +11,10 @@ from twin.convert.bodies import LEAST_RANGE
 from twin.convert.conversion import LedgerEntry
 from twin.convert.roles import commanded_wheels
 from twin.models.checks.wheels import Wheel
-from twin.models.description import CommandSpec, Joint, RobotDescription
-from twin.models.document import LARGEST
+from twin.models.description import Joint, RobotDescription
 from twin.models.kinematics import ONE_DOF
+from twin.models.specs import CommandSpec
+from twin.models.urdf.document import LARGEST
 
 WHEEL_KV = 1.0
 """Least gain of a wheel's velocity servo [Nm s/rad].

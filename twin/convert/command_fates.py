@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from twin.convert.fates import Fate, container_fate
-from twin.models.commands import command_interface
 from twin.models.description import RobotDescription
-from twin.models.document import Element
-from twin.models.gazebo import number_in
-from twin.models.transmissions import HARDWARE, Transmission, transmissions
+from twin.models.urdf.commands import command_interface
+from twin.models.urdf.document import Element
+from twin.models.urdf.gazebo import number_in
+from twin.models.urdf.transmissions import HARDWARE, Transmission, transmissions
 
 HARDWARE_ONLY: Fate = ("dropped", "a matter of the hardware")
 

@@ -19,7 +19,7 @@ from twin.convert.stand_ins import refuse_singular
 from twin.convert.tyres import carry_load
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
-from twin.models.meshes import mesh_faults
+from twin.models.mesh.meshes import mesh_faults
 
 DEEPEST = 450
 """Links in a row; tinyxml2 reads 500 elements inside of each other."""

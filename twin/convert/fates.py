@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from twin.convert.conversion import Outcome
 from twin.models.checks.ignored import ATTRIBUTES
-from twin.models.document import Element
+from twin.models.urdf.document import Element
 
 Fate = tuple[Outcome, str]
 """What became of an element, and how or why."""

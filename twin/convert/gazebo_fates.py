@@ -8,12 +8,12 @@ from types import MappingProxyType
 from twin.convert.fates import NO_EFFECT, Fate, container_fate
 from twin.convert.sensor_fates import sensor_fate
 from twin.models.description import Link, RobotDescription
-from twin.models.document import Element
-from twin.models.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
-from twin.models.gazebo import MU1, MU2, SELF_COLLIDE, flag_in, number_in
-from twin.models.gazebo_materials import colour_of
 from twin.models.kinematics import ONE_DOF
-from twin.models.sensors import PLUGIN_IMU
+from twin.models.urdf.document import Element
+from twin.models.urdf.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
+from twin.models.urdf.gazebo import MU1, MU2, SELF_COLLIDE, flag_in, number_in
+from twin.models.urdf.gazebo_materials import colour_of
+from twin.models.urdf.sensors import PLUGIN_IMU
 
 ONE_FRICTION = "friction is the same in every direction"
 SOLVER = "a matter of Gazebo's solver"

@@ -12,8 +12,9 @@ from twin.convert.roles import Roles
 from twin.convert.tyres import stiff, wheel_contact
 from twin.geometry import Array, Pose3
 from twin.models.checks.discs import disc_of
-from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Link, Mesh, Sphere, Visual
-from twin.models.meshes import read_mesh
+from twin.models.description import Link
+from twin.models.mesh.meshes import read_mesh
+from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
 
 GROUP_VISUAL = 2
 GROUP_COLLISION = 3
@@ -44,7 +45,7 @@ class GeomBuilder:
         """Add all shapes of `link`.
 
         Raises:
-            ModelError: A mesh cannot be read; `twin.models.meshes.mesh_faults` tells before.
+            ModelError: A mesh cannot be read; `twin.models.mesh.meshes.mesh_faults` tells before.
         """
         for visual in link.visuals if self._visuals else ():
             body.add_geom(

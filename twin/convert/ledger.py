@@ -9,7 +9,7 @@ from twin.convert.conversion import LedgerEntry, Outcome
 from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.roles import Roles
 from twin.models.description import Joint, Link, RobotDescription
-from twin.models.document import Report, parse
+from twin.models.urdf.document import Report, parse
 
 KNOWN = {"link", "joint", "material", "gazebo", "ros2_control", "transmission"}
 """Top-level elements that the loader reads."""

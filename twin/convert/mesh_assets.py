@@ -6,9 +6,9 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-from twin.models.description import Mesh
-from twin.models.mesh_formats import write_msh, write_stl
-from twin.models.meshes import TriangleMesh, read_mesh
+from twin.models.mesh.mesh_formats import write_msh, write_stl
+from twin.models.mesh.meshes import TriangleMesh, read_mesh
+from twin.models.shapes import Mesh
 
 MOST_STL_FACES = 200_000
 """MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""

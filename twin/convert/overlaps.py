@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from twin.convert.geoms import primitive
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.wheels import wheels_of
-from twin.models.description import Geometry, Mesh, RobotDescription
-from twin.models.hulls import hull_of
+from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.mesh.hulls import hull_of
+from twin.models.shapes import Geometry, Mesh
 from twin.models.solids import is_solid
 
 LEAST_DEPTH = 1e-4

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from twin.models.checks.ground import CASTER_NAME, LEVEL
 from twin.models.checks.wheels import Wheel, wheels_of
-from twin.models.description import Mesh, RobotDescription, Sphere
+from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.shapes import Mesh, Sphere
 from twin.models.solids import lowest
 
 

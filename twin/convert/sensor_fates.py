@@ -7,11 +7,12 @@ from types import MappingProxyType
 
 from twin.convert.fates import Fate, container_fate
 from twin.convert.sensors import MAX_RAYS
-from twin.models.cameras import CAMERA
-from twin.models.description import CameraSpec, LidarSpec, RobotDescription, SensorSpec
-from twin.models.document import Element
-from twin.models.gazebo import value_of
-from twin.models.sensors import kind_of
+from twin.models.description import RobotDescription
+from twin.models.specs import CameraSpec, LidarSpec, SensorSpec
+from twin.models.urdf.cameras import CAMERA
+from twin.models.urdf.document import Element
+from twin.models.urdf.gazebo import value_of
+from twin.models.urdf.sensors import kind_of
 
 RAYS: Fate = ("translated", "one site and rangefinder per ray")
 RANGE: Fate = ("translated", "cutoff of the rangefinders")

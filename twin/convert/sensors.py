@@ -14,15 +14,8 @@ import mujoco
 import numpy as np
 
 from twin.geometry import Array, Pose3, multiply_wxyz, quat_wxyz_from_rpy, quat_wxyz_from_yaw
-from twin.models.description import (
-    CameraSpec,
-    ContactSpec,
-    ImuSpec,
-    LidarSpec,
-    RangeSpec,
-    RobotDescription,
-    SensorSpec,
-)
+from twin.models.description import RobotDescription
+from twin.models.specs import CameraSpec, ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 
 MAX_RAYS = 2048
 """A planar lidar with more rays than this is left out: MuJoCo casts every ray anew in every step."""

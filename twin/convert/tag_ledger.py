@@ -16,9 +16,10 @@ from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.roles import Roles
 from twin.models.checks.source import is_repeated, number, read_source
-from twin.models.description import Cylinder, Mesh, RobotDescription
-from twin.models.document import Element, place
+from twin.models.description import RobotDescription
 from twin.models.kinematics import ONE_DOF
+from twin.models.shapes import Cylinder, Mesh
+from twin.models.urdf.document import Element, place
 
 POSE: Fate = ("kept", "pose")
 SHAPE: Fate = ("kept", "geom")

@@ -10,61 +10,13 @@ from typing import TYPE_CHECKING, Literal
 
 from twin.errors import ModelError, Problem, nearest
 from twin.geometry import Array, Pose3
-from twin.models.line_table import LineTable
+from twin.models.shapes import Collision, SkippedMesh, Visual
+from twin.models.specs import CameraSpec, CommandSpec, DriveSpec, Interface, SensorSpec
+from twin.models.urdf.line_table import LineTable
 
 if TYPE_CHECKING:
     from twin.models.kinematics import Positions
     from twin.models.mass_properties import Settlement
-
-
-@dataclass(frozen=True, kw_only=True)
-class Box:
-    """A box."""
-
-    size: tuple[float, float, float]
-    """Full edge lengths along x, y, z [m]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cylinder:
-    """A cylinder along its z axis."""
-
-    radius: float
-    """[m]"""
-    length: float
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sphere:
-    """A sphere."""
-
-    radius: float
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Capsule:
-    """A capsule along its z axis (an extension of URDF that Gazebo and Drake read too)."""
-
-    radius: float
-    """[m]"""
-    length: float
-    """Of the cylindrical part [m]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Mesh:
-    """A mesh file."""
-
-    path: Path
-    """Resolved, existing file."""
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    apply_up_axis: bool = True
-    """Turn a COLLADA file as its `<up_axis>` says."""
-
-
-Geometry = Box | Cylinder | Sphere | Capsule | Mesh
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,42 +29,6 @@ class Inertial:
     """[kg]"""
     inertia: Array
     """About the centre of mass, in the inertial frame [kg m²], shape (3, 3)."""
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Visual:
-    """A shape to look at."""
-
-    T_link_geometry: Pose3
-    geometry: Geometry
-    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
-    """Resolved from the file's materials."""
-    has_material: bool = True
-    """Without one, a mesh may have a colour of its own."""
-    name: str = ""
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Collision:
-    """A shape to touch."""
-
-    T_link_geometry: Pose3
-    geometry: Geometry
-    name: str = ""
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class SkippedMesh:
-    """A shape that was left out, as its mesh is missing or unreadable and the options allow that."""
-
-    link: str
-    role: Literal["visual", "collision"]
-    reference: str
-    """The mesh as the file names it."""
-    reason: str
     line: int = 0
 
 
@@ -198,132 +114,6 @@ class Joint:
     """[Nm] or [N]"""
     mimic: Mimic | None = None
     line: int = 0
-
-
-Interface = Literal["position", "velocity", "effort"]
-"""Of ros2_control: [rad or m], [rad/s or m/s], [Nm or N]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriveSpec:
-    """A wheeled drive, from the diff-drive or skid-steer plugin in `<gazebo>`."""
-
-    kind: Literal["diff_drive", "skid_steer"]
-    left_joints: tuple[str, ...]
-    right_joints: tuple[str, ...]
-    wheel_separation: float
-    """Distance of the left and right wheels' contact points [m]."""
-    wheel_radius: float
-    """[m]"""
-    max_wheel_torque: float | None = None
-    """[Nm] per wheel"""
-    max_linear_velocity: float | None = None
-    """[m/s]"""
-    max_linear_acceleration: float | None = None
-    """[m/s²]"""
-    max_angular_velocity: float | None = None
-    """[rad/s]"""
-    max_angular_acceleration: float | None = None
-    """[rad/s²]"""
-    odometry_frame: str = "odom"
-    base_frame: str = "base_footprint"
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class CommandSpec:
-    """How a joint is commanded, from `<ros2_control>` or `<transmission>` (wheels of a drive need none)."""
-
-    joint: str
-    interface: Interface
-    lower: float | None = None
-    """Least command that `<param name='min'>` allows, in the interface's unit."""
-    upper: float | None = None
-    """Largest command."""
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class SensorSpec:
-    """Common part of all sensors, from `<gazebo reference="link"><sensor>`."""
-
-    name: str
-    link: str
-    """The frame in which it measures and that stamps its messages."""
-    topic: str
-    """Relative ROS name, such as `scan`."""
-    rate_hz: float
-    T_link_sensor: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
-    """From the sensor's `<pose>`; `twin.sim` samples at the link's origin."""
-    line: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class LidarSpec(SensorSpec):
-    """A planar lidar: `samples` rays from angle_min to angle_max, both included."""
-
-    angle_min: float
-    """[rad]"""
-    angle_max: float
-    """[rad]"""
-    samples: int
-    range_min: float
-    """[m]"""
-    range_max: float
-    """[m]"""
-    noise_stddev: float = 0.0
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeSpec(SensorSpec):
-    """An ultrasonic ranger: the nearest echo in a cone about +x (REP-103)."""
-
-    field_of_view: float
-    """Full angle of the cone [rad]."""
-    range_min: float
-    """[m]"""
-    range_max: float
-    """[m]"""
-    noise_stddev: float = 0.0
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImuSpec(SensorSpec):
-    """Gyroscope and accelerometer."""
-
-    gyro_noise_stddev: float = 0.0
-    """[rad/s]"""
-    gyro_bias_stddev: float = 0.0
-    """Of the constant bias, drawn once a run [rad/s]."""
-    accel_noise_stddev: float = 0.0
-    """[m/s²]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactSpec(SensorSpec):
-    """A bumper: tells whether its link touches anything."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraSpec(SensorSpec):
-    """A camera that looks along +x of its link with +z up, as Gazebo's do; `twin.sim` renders none."""
-
-    horizontal_fov: float
-    """Full angle [rad]."""
-    width: int
-    """[pixels]"""
-    height: int
-    """[pixels]"""
-    near: float
-    """Clipping distance [m]."""
-    far: float
-    """Clipping distance [m]."""
-    noise_stddev: float = 0.0
-    """Of a pixel's value, from 0 to 1."""
-    optical_frame: str | None = None
-    """Frame that stamps its images: +z forward, +x right (REP-103)."""
 
 
 @dataclass(frozen=True, kw_only=True)

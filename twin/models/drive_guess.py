@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from twin.models.checks.wheels import wheels_of
-from twin.models.description import DriveSpec, RobotDescription
+from twin.models.description import RobotDescription
+from twin.models.specs import DriveSpec
 
 LEAST_OFFSET = 1e-3
 """A wheel nearer than this to the middle belongs to no side [m]."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from twin.errors import ModelError
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
-from twin.models.description import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
-from twin.models.hulls import Hull, hull_of
+from twin.models.mesh.hulls import Hull, hull_of
+from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
 
 Shape = Visual | Collision
 Primitive = Box | Cylinder | Sphere | Capsule

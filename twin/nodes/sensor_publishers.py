@@ -11,7 +11,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Bool, Header, Imu, LaserScan, Quaternion, Range, Vector3, stamp
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Publisher
-from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 
 
 class SensorDevice(Protocol):

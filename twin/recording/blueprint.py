@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.description import Box, Geometry, Mesh, Sphere
+from twin.models.shapes import Box, Geometry, Mesh, Sphere
 from twin.recording.columns import TIMELINE
 from twin.recording.frames import WORLD, Frames
 from twin.recording.sources import BodyShape, World

@@ -12,8 +12,9 @@ from itertools import chain
 from pathlib import Path
 
 from twin.convert.inspection import inspect_file, inspect_robot
-from twin.models.description import Collision, Mesh, RobotDescription, Visual
+from twin.models.description import RobotDescription
 from twin.models.options import DEFAULTS, ReadOptions
+from twin.models.shapes import Collision, Mesh, Visual
 from twin.recording.live_viewer import LiveViewer, connect, live_viewer
 from twin.recording.player import check_display, has_display
 from twin.recording.posture import Posture

@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 
 from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.description import Mesh
-from twin.models.meshes import read_mesh
+from twin.models.mesh.meshes import read_mesh
+from twin.models.shapes import Mesh
 from twin.recording.solids import Solid
 
 

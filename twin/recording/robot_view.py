@@ -11,8 +11,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from twin.geometry import Array, matrix_from_quat_wxyz, xyzw_from_wxyz
-from twin.models.description import Geometry, Mesh, RobotDescription
+from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_motion, link_poses
+from twin.models.shapes import Geometry, Mesh
 from twin.models.solids import Shape, reach
 from twin.recording.posture import Posture
 from twin.recording.robot_layers import LAYERS, Canvas

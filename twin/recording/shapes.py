@@ -8,7 +8,7 @@ from typing import Any, Literal
 import rerun as rr
 
 from twin.geometry import Array, Pose3, xyzw_from_wxyz
-from twin.models.description import Box, Capsule, Cylinder, Sphere
+from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 from twin.recording.frames import WORLD
 from twin.recording.meshes import declare_mesh
 from twin.recording.solids import Rgba8, Solid

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twin.geometry import Pose3
-from twin.models.description import Geometry
+from twin.models.shapes import Geometry
 
 Rgba8 = tuple[int, int, int, int]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from twin.geometry import Array, Pose3
-from twin.models.description import Geometry
+from twin.models.shapes import Geometry
 
 
 class Sample(Protocol):

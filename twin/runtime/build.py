@@ -15,7 +15,7 @@ from twin.convert import convert
 from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2
 from twin.models import ReadOptions, load
-from twin.models.description import Box
+from twin.models.shapes import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose

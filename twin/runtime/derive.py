@@ -10,8 +10,9 @@ from twin.errors import ModelError
 from twin.geometry import Array, Pose3
 from twin.manipulation.telescopic_arm import TelescopicArm, TelescopicArmConfig
 from twin.manipulation.trajectory import JointLimits
-from twin.models.description import Box, Capsule, Cylinder, Joint, RobotDescription, Sphere
+from twin.models.description import Joint, RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 
 GRASP_FRAME = "grasp_frame"
 """Link between the fingers of a robot that can grasp."""

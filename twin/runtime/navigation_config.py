@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.description import DriveSpec
+from twin.models.specs import DriveSpec
 from twin.navigation.goal_checker import GoalCheckerConfig
 from twin.navigation.layered_costmap import CostmapConfig
 from twin.navigation.planner import PlannerConfig

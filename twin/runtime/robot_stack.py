@@ -11,7 +11,8 @@ import numpy as np
 from twin.bridge.bus import Bus
 from twin.controllers.drive_config import drive_config
 from twin.geometry import Pose2
-from twin.models.description import LidarSpec, RobotDescription
+from twin.models.description import RobotDescription
+from twin.models.specs import LidarSpec
 from twin.navigation.amcl import AmclConfig
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.navigation.recovery import BehaviorConfig

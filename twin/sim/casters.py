@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from twin.geometry import Array, Pose3
-from twin.models.description import Box, Geometry, RobotDescription, Sphere
+from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.shapes import Box, Geometry, Sphere
 
 
 def casters_under_chassis(description: RobotDescription) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import mujoco
 
 from twin.errors import Problem, ScenarioError
-from twin.models.description import Box, Capsule, Cylinder
+from twin.models.shapes import Box, Capsule, Cylinder
 from twin.sim.casters import casters_under_chassis
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement

@@ -14,8 +14,9 @@ from twin.convert import convert
 from twin.convert.conversion import Conversion
 from twin.errors import ModelError, SimulationError
 from twin.geometry import Array
-from twin.models.description import DriveSpec, RobotDescription
+from twin.models.description import RobotDescription
 from twin.models.drive_guess import guess_drive
+from twin.models.specs import DriveSpec
 from twin.sim.driving import Driven, ProvingGround
 from twin.sim.physics import Physics
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from twin.geometry import Pose3
-from twin.models.description import Box, Capsule, Cylinder, Sphere
+from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 
 Rgba = tuple[float, float, float, float]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from twin.geometry import Pose3
-from twin.models.description import Geometry
+from twin.models.shapes import Geometry
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Rgba, Scene
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twin.geometry import Pose2, Pose3
-from twin.models.description import Box
+from twin.models.shapes import Box
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
 from twin.warehouse.arena_file import PartitionEntry, RackEntry, ToteKind

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Pose2
-from twin.models.description import Box
+from twin.models.shapes import Box
 from twin.navigation.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from twin.warehouse.arena import Arena
 from twin.warehouse.footprint import Rectangle

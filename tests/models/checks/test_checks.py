@@ -253,7 +253,7 @@ def test_a_follower_loads_its_leader() -> None:
 def test_all_codes_of_the_loader_and_the_converter_are_registered() -> None:
     used: set[str] = set()
     for package in ("models", "convert"):
-        for file in sorted((SOURCES / package).glob("*.py")):
+        for file in sorted((SOURCES / package).rglob("*.py")):
             used |= set(re.findall(r"code=\"([a-z-]+)\"", file.read_text("utf-8")))
     assert used <= {*ERRORS, *WARNINGS}
     assert set(ERRORS) - used == set(), "codes that nothing uses"

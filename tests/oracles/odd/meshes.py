@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.oracles.odd.case import INERTIAL, Case, Content, Model, accepted, link, refused, robot, shaped
-from twin.models.mesh_formats import write_stl
+from twin.models.mesh.mesh_formats import write_stl
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.oracles.odd.case import INERTIAL, LIMIT, joint, link, robot
 from twin.models.catalogue import catalogue
-from twin.models.expand import expand
+from twin.models.expansion.expand import expand
 from twin.models.options import ReadOptions
 
 _BOX = "<geometry><box size='.4 .3 .1'/></geometry>"

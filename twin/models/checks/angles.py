@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import number, read_source
 from twin.models.description import RobotDescription
-from twin.models.document import place
+from twin.models.urdf.document import place
 
 ROUNDING = (1e-4, 5e-3)
 """An angle this far from a multiple of 90 degrees was meant to be one [rad]; 1.5708 is near enough."""

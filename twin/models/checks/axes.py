@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import number, read_source
 from twin.models.description import RobotDescription
-from twin.models.document import place
+from twin.models.urdf.document import place
 
 UNIT_TOLERANCE = 1e-3
 

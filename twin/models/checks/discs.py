@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.description import Cylinder, Mesh
-from twin.models.hulls import Hull, hull_of
+from twin.models.mesh.hulls import Hull, hull_of
+from twin.models.shapes import Cylinder, Mesh
 from twin.models.solids import Shape, is_solid
 
 ALIKE = 1.1

@@ -8,8 +8,10 @@ import numpy as np
 
 from twin.geometry import Array, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Capsule, Cylinder, DriveSpec, Link, RobotDescription, Sphere
+from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.shapes import Capsule, Cylinder, Sphere
+from twin.models.specs import DriveSpec
 
 TOLERANCE = 0.005
 """Relative; 25 mm on 5 m."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.errors import nearest
-from twin.models.cameras import CAMERA, camera_fault, lenses
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import read_source
-from twin.models.commands import INTERFACES, command_interface
-from twin.models.description import ContactSpec, RobotDescription
-from twin.models.document import Element, Report, first, place
-from twin.models.drives import is_drive, library_of
-from twin.models.gazebo import (
+from twin.models.description import RobotDescription
+from twin.models.specs import ContactSpec
+from twin.models.urdf.cameras import CAMERA, camera_fault, lenses
+from twin.models.urdf.commands import INTERFACES, command_interface
+from twin.models.urdf.document import Element, Report, first, place
+from twin.models.urdf.drives import is_drive, library_of
+from twin.models.urdf.gazebo import (
     MU1,
     MU2,
     NUMBERS,
@@ -20,8 +21,8 @@ from twin.models.gazebo import (
     number_in,
     value_of,
 )
-from twin.models.sensors import LIDAR, PLUGIN_IMU, RAY, SONAR, kind_of
-from twin.models.transmissions import HARDWARE, transmissions
+from twin.models.urdf.sensors import LIDAR, PLUGIN_IMU, RAY, SONAR, kind_of
+from twin.models.urdf.transmissions import HARDWARE, transmissions
 
 OWN_PLUGINS = ("joint_state_publisher", "joint-state-publisher-system", "_control", "_control-system")
 """Ends of the names of libraries whose work twin's own nodes do: joint states, and running controllers."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.wheels import Wheel, wheels_of
-from twin.models.description import Capsule, Link, RobotDescription, Sphere
+from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.shapes import Capsule, Sphere
 from twin.models.solids import Shape, is_solid, lowest
 
 CLEARANCE = 1e-3

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import is_repeated, number, read_source
 from twin.models.description import RobotDescription
-from twin.models.document import Element, place
+from twin.models.urdf.document import Element, place
 
 CHILDREN: Mapping[str, str] = MappingProxyType(
     {

@@ -9,8 +9,9 @@ import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Inertial, Link, Mesh, RobotDescription
+from twin.models.description import Inertial, Link, RobotDescription
 from twin.models.mass_properties import LEAST, describe_repair, inertia_as_urdf, inertia_fault
+from twin.models.shapes import Mesh
 from twin.models.solids import Shape, all_solid, bounds, homogeneous_inertia
 
 ATTAINABLE = 3.0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import read_source
 from twin.models.description import RobotDescription
-from twin.models.document import Element, place
+from twin.models.urdf.document import Element, place
 
 
 def material_elsewhere(description: RobotDescription) -> Iterator[Diagnostic]:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from twin.errors import ModelError
 from twin.models.checks.diagnostic import Diagnostic, finding, from_problems
-from twin.models.description import Collision, Mesh, RobotDescription, Visual
-from twin.models.meshes import mesh_faults, read_mesh
+from twin.models.description import RobotDescription
+from twin.models.mesh.meshes import mesh_faults, read_mesh
+from twin.models.shapes import Collision, Mesh, Visual
 
 
 def meshes(description: RobotDescription) -> Iterator[Diagnostic]:

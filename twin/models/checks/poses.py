@@ -8,7 +8,8 @@ import numpy as np
 
 from twin.geometry import matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Cylinder, Link, Mesh, RobotDescription
+from twin.models.description import Link, RobotDescription
+from twin.models.shapes import Cylinder, Mesh
 from twin.models.solids import Shape, all_solid, bounds
 
 SHARE = 0.1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from twin.models.description import RobotDescription
-from twin.models.document import Element, Report, parse
-from twin.models.plain_numbers import plain_number
+from twin.models.urdf.document import Element, Report, parse
+from twin.models.urdf.plain_numbers import plain_number
 
 ONCE = ("inertial", "visual", "collision", "joint")
 """Elements in which each other one stands once."""

@@ -12,8 +12,9 @@ import numpy as np
 from twin.geometry import Array, Pose3, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.discs import Disc, disc_of
-from twin.models.description import Cylinder, Joint, Link, RobotDescription
+from twin.models.description import Joint, Link, RobotDescription
 from twin.models.kinematics import link_poses
+from twin.models.shapes import Cylinder
 
 TOLERANCE_DEG = 2.0
 LEVEL = math.cos(math.radians(60.0))

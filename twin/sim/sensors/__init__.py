@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from twin.models.description import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 from twin.sim.sensors.contact import ContactReading, ContactSensor
 from twin.sim.sensors.imu import Imu, ImuReading
 from twin.sim.sensors.lidar import Lidar, LidarReading

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twin.models.description import ContactSpec
+from twin.models.specs import ContactSpec
 from twin.sim.sensors.sensor import Mount
 
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.geometry import Array
-from twin.models.description import ImuSpec
+from twin.models.specs import ImuSpec
 from twin.sim.sensors.sensor import Mount
 
 _BODY = mujoco.mjtObj.mjOBJ_XBODY

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array
-from twin.models.description import LidarSpec
+from twin.models.specs import LidarSpec
 from twin.sim.sensors.rays import RayCaster
 from twin.sim.sensors.sensor import Mount
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array
-from twin.models.description import RangeSpec
+from twin.models.specs import RangeSpec
 from twin.sim.sensors.rays import RayCaster
 from twin.sim.sensors.sensor import Mount
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from twin.errors import ModelError, Problem
-from twin.models.description import SensorSpec
+from twin.models.specs import SensorSpec
 from twin.sim.noise import NoiseStream
 
 if TYPE_CHECKING:

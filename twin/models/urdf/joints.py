@@ -9,9 +9,9 @@ from typing import get_args
 
 from twin.errors import nearest, shortened
 from twin.models.description import Joint, JointType, Limit, Link, Mimic
-from twin.models.document import Element, Report, describe
 from twin.models.kinematics import ONE_DOF
-from twin.models.links import read_origin
+from twin.models.urdf.document import Element, Report, describe
+from twin.models.urdf.links import read_origin
 
 JOINT_TYPES: tuple[str, ...] = get_args(JointType)
 BOUNDED = ("revolute", "prismatic")

@@ -8,8 +8,8 @@ from xml.dom import expatbuilder
 from xml.dom.minidom import Document, Element, Node
 from xml.parsers import expat
 
-from twin.models.sandbox import Refused
-from twin.models.xml_text import MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
+from twin.models.expansion.sandbox import Refused
+from twin.models.urdf.xml_text import MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
 
 PLACE = "place"
 """Key of the user data of an element: its file and line."""

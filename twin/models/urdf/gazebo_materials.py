@@ -7,9 +7,9 @@ from types import MappingProxyType
 
 from lxml import etree
 
-from twin.models.document import Element
-from twin.models.gazebo import extensions_of, value_of
-from twin.models.plain_numbers import plain_number
+from twin.models.urdf.document import Element
+from twin.models.urdf.gazebo import extensions_of, value_of
+from twin.models.urdf.plain_numbers import plain_number
 
 COLOURS: Mapping[str, str] = MappingProxyType(
     {

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import CodeType, MappingProxyType
 from typing import Any
 
-from twin.models.sandbox import Refused
-from twin.models.xacro_values import FUNCTIONS, WIDE, checked, size_of
+from twin.models.expansion.sandbox import Refused
+from twin.models.expansion.xacro_values import FUNCTIONS, WIDE, checked, size_of
 
 MAX_LENGTH = 10_000
 """Characters of an expression."""

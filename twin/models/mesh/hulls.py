@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from twin.geometry import Array
-from twin.models.description import Mesh
-from twin.models.meshes import TriangleMesh, is_flat, read_mesh, scaled_points
+from twin.models.mesh.meshes import TriangleMesh, is_flat, read_mesh, scaled_points
+from twin.models.shapes import Mesh
 
 MANY_POINTS = 20_000
 DIRECTIONS = 1000

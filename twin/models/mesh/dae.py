@@ -16,9 +16,9 @@ import numpy as np
 from lxml import etree
 
 from twin.geometry import Array
-from twin.models.dae_geometry import Part, read_geometry
-from twin.models.document import Element
-from twin.models.mesh_formats import Faces
+from twin.models.mesh.dae_geometry import Part, read_geometry
+from twin.models.mesh.mesh_formats import Faces
+from twin.models.urdf.document import Element
 
 MOST_NODES = 10_000
 """Nodes and instances that a scene may have once instances of instances are followed."""

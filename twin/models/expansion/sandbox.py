@@ -8,7 +8,7 @@ import resource
 import sys
 from typing import Any
 
-from twin.models.packages import MANIFEST, Packages
+from twin.models.urdf.packages import MANIFEST, Packages
 
 CPU_SECONDS = 15
 ADDRESS_SPACE_BYTES = 1 << 30

@@ -8,11 +8,12 @@ from dataclasses import replace
 from typing import TypedDict
 
 from twin.geometry import Pose3
-from twin.models.description import ContactSpec, ImuSpec, LidarSpec, Link, RangeSpec, SensorSpec
-from twin.models.document import LARGEST, Element, Report, first, text_of
-from twin.models.drives import library_of
-from twin.models.gazebo import value_of
-from twin.models.plain_numbers import plain_numbers
+from twin.models.description import Link
+from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+from twin.models.urdf.document import LARGEST, Element, Report, first, text_of
+from twin.models.urdf.drives import library_of
+from twin.models.urdf.gazebo import value_of
+from twin.models.urdf.plain_numbers import plain_numbers
 
 LIDAR = ("gpu_lidar", "lidar", "ray", "gpu_ray")
 SONAR = ("sonar", "ray-cone")

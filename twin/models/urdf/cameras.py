@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping
 
-from twin.models.description import CameraSpec, Link
-from twin.models.document import Element, Report, text_of
-from twin.models.gazebo import number_in
-from twin.models.sensors import kind_of, read_common, read_pose, sensor_elements, unique_name
+from twin.models.description import Link
+from twin.models.specs import CameraSpec
+from twin.models.urdf.document import Element, Report, text_of
+from twin.models.urdf.gazebo import number_in
+from twin.models.urdf.sensors import kind_of, read_common, read_pose, sensor_elements, unique_name
 
 CAMERA = ("camera", "depth", "depth_camera", "rgbd", "rgbd_camera", "multicamera")
 """Types whose image a pinhole camera makes."""

@@ -13,14 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from twin.errors import ModelError, Problem
-from twin.models.line_table import LineTable
 from twin.models.options import DEFAULTS, ReadOptions
-from twin.models.packages import PackagePath
+from twin.models.urdf.line_table import LineTable
+from twin.models.urdf.packages import PackagePath
 
 TIME_LIMIT_S = 15.0
-_ROOT = Path(__file__).parents[2]
+_ROOT = Path(__file__).parents[3]
 """The folder with the package `twin` that is running, installed or not."""
-_START = "import sys; sys.path.insert(0, sys.argv[1]); from twin.models.xacro_worker import main; main()"
+_START = (
+    "import sys; sys.path.insert(0, sys.argv[1]); from twin.models.expansion.xacro_worker import main; main()"
+)
 
 
 @dataclass(frozen=True, kw_only=True)

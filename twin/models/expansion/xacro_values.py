@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from twin.models.sandbox import Refused
+from twin.models.expansion.sandbox import Refused
 
 MAX_ITEMS = 1_000_000
 """Characters of a string, items of a list or range."""

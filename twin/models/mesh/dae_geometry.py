@@ -9,8 +9,8 @@ import numpy as np
 from lxml import etree
 
 from twin.geometry import Array
-from twin.models.document import Element
-from twin.models.mesh_formats import Faces
+from twin.models.mesh.mesh_formats import Faces
+from twin.models.urdf.document import Element
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from twin.models.description import CommandSpec, Interface, Joint
-from twin.models.document import Element, Report, text_of
-from twin.models.gazebo import number_in
+from twin.models.description import Joint
+from twin.models.specs import CommandSpec, Interface
+from twin.models.urdf.document import Element, Report, text_of
+from twin.models.urdf.gazebo import number_in
 
 HARDWARE: Mapping[str, Interface] = {
     "EffortJointInterface": "effort",

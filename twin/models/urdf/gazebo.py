@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from twin.models.description import Joint, Spring, Surface
-from twin.models.document import LARGEST, Element, Report, first
-from twin.models.plain_numbers import plain_number
+from twin.models.urdf.document import LARGEST, Element, Report, first
+from twin.models.urdf.plain_numbers import plain_number
 
 MU1 = ("mu1", "collision/surface/friction/ode/mu")
 MU2 = ("mu2", "collision/surface/friction/ode/mu2")

@@ -12,10 +12,10 @@ from typing import Any
 from lxml import etree
 
 from twin.errors import ModelError, Problem
-from twin.models.description import SkippedMesh
-from twin.models.line_table import LineTable
-from twin.models.plain_numbers import plain_number, plain_numbers
-from twin.models.xml_text import scan
+from twin.models.shapes import SkippedMesh
+from twin.models.urdf.line_table import LineTable
+from twin.models.urdf.plain_numbers import plain_number, plain_numbers
+from twin.models.urdf.xml_text import scan
 
 Element = Any
 """An lxml element; the library ships no types."""

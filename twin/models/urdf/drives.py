@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from twin.errors import nearest
-from twin.models.description import DriveSpec, Joint
-from twin.models.document import Element, Report, text_of
+from twin.models.description import Joint
+from twin.models.specs import DriveSpec
+from twin.models.urdf.document import Element, Report, text_of
 
 DIFF_DRIVE = ("libgazebo_ros_diff_drive.so", "gz-sim-diff-drive-system", "ignition-gazebo-diff-drive-system")
 SKID_STEER = ("libgazebo_ros_skid_steer_drive.so",)

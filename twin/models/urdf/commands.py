@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import get_args
 
 from twin.errors import nearest
-from twin.models.description import CommandSpec, Interface, Joint
-from twin.models.document import Element, Report
-from twin.models.gazebo import number_in
+from twin.models.description import Joint
+from twin.models.specs import CommandSpec, Interface
+from twin.models.urdf.document import Element, Report
+from twin.models.urdf.gazebo import number_in
 
 INTERFACES: tuple[str, ...] = get_args(Interface)
 

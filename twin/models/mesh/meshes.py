@@ -10,9 +10,9 @@ import numpy as np
 
 from twin.errors import ModelError, Problem
 from twin.geometry import Array
-from twin.models.dae import Rgb, read_dae
-from twin.models.description import Collision, Link, Mesh, RobotDescription, Visual
-from twin.models.mesh_formats import (
+from twin.models.description import Link, RobotDescription
+from twin.models.mesh.dae import Rgb, read_dae
+from twin.models.mesh.mesh_formats import (
     MOST_FACES,
     Faces,
     Format,
@@ -22,6 +22,7 @@ from twin.models.mesh_formats import (
     read_obj,
     read_stl,
 )
+from twin.models.shapes import Collision, Mesh, Visual
 
 MOST_BYTES = 256 * 1024 * 1024
 FARTHEST = 1e6
@@ -54,7 +55,7 @@ def read_mesh(path: Path, *, apply_up_axis: bool = True) -> TriangleMesh:
 
     Args:
         path: The file; its content decides on the format.
-        apply_up_axis: For COLLADA, see `twin.models.dae.read_dae`.
+        apply_up_axis: For COLLADA, see `twin.models.mesh.dae.read_dae`.
 
     Raises:
         ModelError: It cannot be read (code `mesh-format`) or holds no usable mesh (code `bad-mesh`).

@@ -9,26 +9,24 @@ import numpy as np
 
 from twin.errors import ModelError, nearest
 from twin.geometry import Array, Pose3
-from twin.models.description import (
+from twin.models.description import Inertial, Link, Surface
+from twin.models.mass_properties import LEAST
+from twin.models.mesh.meshes import read_mesh
+from twin.models.options import ReadOptions
+from twin.models.shapes import (
     Box,
     Capsule,
     Collision,
     Cylinder,
     Geometry,
-    Inertial,
-    Link,
     Mesh,
     SkippedMesh,
     Sphere,
-    Surface,
     Visual,
 )
-from twin.models.document import Element, Report, describe, owner
-from twin.models.mass_properties import LEAST
-from twin.models.meshes import read_mesh
-from twin.models.options import ReadOptions
-from twin.models.packages import Packages
-from twin.models.resources import locate
+from twin.models.urdf.document import Element, Report, describe, owner
+from twin.models.urdf.packages import Packages
+from twin.models.urdf.resources import locate
 
 Rgba = tuple[float, float, float, float]
 

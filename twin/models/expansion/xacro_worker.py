@@ -24,12 +24,12 @@ import xacro
 import xacro.substitution_args as substitution
 import yaml  # noqa: F401  (xacro imports it when asked for; the door is closed then)
 
-from twin.models.packages import PackagePath, Packages, unknown_package
-from twin.models.sandbox import Refused, close_the_door, limit_resources, refuse_outside
-from twin.models.xacro_document import Sources, elements, place
-from twin.models.xacro_expressions import Expressions
-from twin.models.xacro_values import checked, guarded_symbols
-from twin.models.xml_text import MAX_BYTES
+from twin.models.expansion.sandbox import Refused, close_the_door, limit_resources, refuse_outside
+from twin.models.expansion.xacro_document import Sources, elements, place
+from twin.models.expansion.xacro_expressions import Expressions
+from twin.models.expansion.xacro_values import checked, guarded_symbols
+from twin.models.urdf.packages import PackagePath, Packages, unknown_package
+from twin.models.urdf.xml_text import MAX_BYTES
 
 MAX_MACROS = 300
 """Macros inside of each other; some use them as loops."""

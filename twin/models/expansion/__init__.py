@@ -1,0 +1,1 @@
+"""From xacro to URDF, in a process that may do nothing else."""

@@ -1,0 +1,1 @@
+"""Mesh files as triangles, and their convex hulls."""

@@ -1,0 +1,1 @@
+"""URDF text as data: one module for each kind of element."""
