@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.convert.roles import commanded_wheels
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription
@@ -75,11 +76,7 @@ class Hardware:
         self._tick = 2.0 * math.pi / self.config.encoder_ticks
         self._noise = NoiseStream(seed, f"{robot}/joints")
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
-        wheels = (
-            set(description.drive.left_joints + description.drive.right_joints)
-            if description.drive
-            else set()
-        )
+        wheels = {wheel.joint.name for wheel in commanded_wheels(description)}
         self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
         self._counts = self._count()
         self._step = 0
