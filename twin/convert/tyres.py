@@ -19,8 +19,8 @@ Softer, a wheel sinks in and rolls with a smaller radius, and a gripped box cree
 """
 STIFF_SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
 """MuJoCo's default: a force that jumps to its full size at the first touch."""
-ELASTIC_WIDTH = 0.25
-"""Penetration at which a skid-steered wheel's contact gets hard, per time constant [m/s]: 1 mm at 4 ms.
+ELASTIC_WIDTH = 0.35
+"""Penetration at which a skid-steered wheel's contact gets hard, per time constant [m/s]: 1.4 mm at 4 ms.
 
 Wheels that scrub push the robot sideways at the ground; on a hard contact four or more of them then hop
 (measured: loads that jump between zero and twice their mean, and a robot that turns at 0.4 to 0.9 of its

@@ -24,7 +24,12 @@ STRAIGHT_BAR_M = 0.005
 """On 5 m."""
 SPIN_BAR_DEG = 0.3
 """On 360 degrees."""
-CIRCLE_BAR_PERCENT, SKID_CIRCLE_BAR_PERCENT = 0.5, 2.5
+CIRCLE_BAR_PERCENT, UNEQUAL_CIRCLE_BAR_PERCENT = 0.5, 2.5
+ALIKE = 0.01
+"""Loads count as equal if the track ratio by them differs by no more than this, relatively."""
+SKID_LATERAL = 0.1
+"""Towards the centre of a skid steer's circles [m/s²]: faster, it leans on its outer wheels and turns tighter
+than its calibration at rest says (sp1s at 0.5 m/s² by 1.5 %)."""
 HOLD_BAR_M = 0.005
 """In 10 s on the slope."""
 SLOPE_DEG = 5.0
@@ -142,7 +147,7 @@ def calibrated_track_ratio(conversion: Conversion, *, timestep: float) -> float 
 def _check(
     description: RobotDescription,
     timestep: float,
-    manoeuvres: Callable[[ProvingGround, DriveSpec, float], Iterator[Manoeuvre]],
+    manoeuvres: Callable[[ProvingGround, RobotDescription], Iterator[Manoeuvre]],
 ) -> DriveReport:
     drive = description.drive or guess_drive(description)
     if drive is None:
@@ -157,7 +162,7 @@ def _check(
     config = drive_config(drive, description, calibrated_ratio=measured)
     try:
         ground = ProvingGround(conversion, config, physics=Physics(timestep=timestep))
-        lines = tuple(manoeuvres(ground, drive, _mass(description)))
+        lines = tuple(manoeuvres(ground, description))
     except SimulationError as fault:
         words = f"cannot even stand: {fault}"
         lines = (Manoeuvre(name="stand still", error=None, bar=HOLD_BAR_M, unit="m", words=words),)
@@ -175,23 +180,26 @@ def _mass(description: RobotDescription) -> float:
     return sum(link.inertial.mass for link in description.links.values() if link.inertial is not None)
 
 
-def _quick(ground: ProvingGround, drive: DriveSpec, mass: float) -> Iterator[Manoeuvre]:
+def _quick(ground: ProvingGround, description: RobotDescription) -> Iterator[Manoeuvre]:
     yield _straight(ground, 1.0)
     yield _spin(ground, 1)
 
 
-def _manoeuvres(ground: ProvingGround, drive: DriveSpec, mass: float) -> Iterator[Manoeuvre]:
+def _manoeuvres(ground: ProvingGround, description: RobotDescription) -> Iterator[Manoeuvre]:
     yield _straight(ground, 5.0)
     yield _straight(ground, -5.0)
     yield _spin(ground, 1)
     yield _spin(ground, -1)
-    circle_bar = CIRCLE_BAR_PERCENT if drive.kind == "diff_drive" else SKID_CIRCLE_BAR_PERCENT
+    drive = description.drive
+    assert drive is not None
+    lateral = math.inf if drive.kind == "diff_drive" else SKID_LATERAL
+    bar = _circle_bar(drive, description)
     for least in RADII:
         radius = max(least, round(ground.track, 1))
-        yield _circle(ground, radius, circle_bar)
-        yield _circle(ground, -radius, circle_bar)
+        yield _circle(ground, radius, lateral, bar)
+        yield _circle(ground, -radius, lateral, bar)
     for name, heading in HEADINGS:
-        yield _hold(ground, drive, mass, name, heading)
+        yield _hold(ground, drive, _mass(description), name, heading)
 
 
 def _straight(ground: ProvingGround, distance: float) -> Manoeuvre:
@@ -216,7 +224,17 @@ def _spin(ground: ProvingGround, side: int) -> Manoeuvre:
     return _judged(name, lambda: ground.spin(side * 2.0 * math.pi), judge, SPIN_BAR_DEG, "deg")
 
 
-def _circle(ground: ProvingGround, radius: float, bar: float) -> Manoeuvre:
+def _circle_bar(drive: DriveSpec, description: RobotDescription) -> float:
+    """Return the bar of circles [%]: one factor for the track fits four wheels with equal loads only."""
+    if drive.kind == "diff_drive":
+        return CIRCLE_BAR_PERCENT
+    four = len(drive.left_joints) + len(drive.right_joints) == 4
+    equal = analytic_track_ratio(drive, description, equal_loads=True)
+    alike = abs(analytic_track_ratio(drive, description) / equal - 1.0) < ALIKE
+    return CIRCLE_BAR_PERCENT if four and alike else UNEQUAL_CIRCLE_BAR_PERCENT
+
+
+def _circle(ground: ProvingGround, radius: float, lateral: float, bar: float) -> Manoeuvre:
     def judge(driven: Driven) -> tuple[float, str]:
         found, turned = fitted_radius(driven.path), math.copysign(1.0, radius) * driven.true_angle
         share = max(abs(found / abs(radius) - 1.0), abs(driven.angle_error) / (2.0 * math.pi))
@@ -224,7 +242,7 @@ def _circle(ground: ProvingGround, radius: float, bar: float) -> Manoeuvre:
         return 100.0 * share, words
 
     name = f"circle of {abs(radius):g} m {'left' if radius > 0 else 'right'}"
-    return _judged(name, lambda: ground.circle(radius), judge, bar, "%")
+    return _judged(name, lambda: ground.circle(radius, lateral=lateral), judge, bar, "%")
 
 
 def _hold(ground: ProvingGround, drive: DriveSpec, mass: float, name: str, heading: float) -> Manoeuvre:

@@ -119,9 +119,13 @@ class ProvingGround:
         speed = min(self.config.angular, self.drive.angular.max_velocity)
         return self._drive(0.0, math.copysign(speed, angle), abs(angle) / speed)
 
-    def circle(self, radius: float) -> Driven:
-        """Drive once around a circle, to the right if the radius [m] is negative."""
-        linear = min(self.config.linear, self.drive.linear.max_velocity)
+    def circle(self, radius: float, *, lateral: float = math.inf) -> Driven:
+        """Drive once around a circle, to the right if the radius [m] is negative.
+
+        `lateral`: acceleration towards the centre that is not exceeded [m/s²].
+        """
+        gentle = math.sqrt(lateral * abs(radius))
+        linear = min(self.config.linear, self.drive.linear.max_velocity, gentle)
         angular = min(linear / abs(radius), self.drive.angular.max_velocity, self.config.angular)
         w = math.copysign(angular, radius)
         return self._drive(w * radius, w, 2.0 * math.pi / angular)
