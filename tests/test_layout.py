@@ -26,7 +26,6 @@ HEAVY = (
     "numba",
     "pydantic",
     "rosbags",
-    "yourdfpy",
     "xacro",
     "py_trees",
 )

@@ -34,7 +34,7 @@ robots: [{model: diff_bot}]
 checks: [{energy: {max: 1}}]
 """
 
-HEAVY = ("mujoco", "zenoh", "rerun", "pydantic", "numpy", "scipy", "numba", "yaml", "yourdfpy", "rosbags")
+HEAVY = ("mujoco", "zenoh", "rerun", "pydantic", "numpy", "scipy", "numba", "yaml", "xacro", "rosbags")
 
 
 def twin(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
