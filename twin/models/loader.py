@@ -7,7 +7,7 @@ from pathlib import Path
 
 from twin.errors import Problem
 from twin.models.catalogue import resolve
-from twin.models.description import Joint, Link, RobotDescription, Surface
+from twin.models.description import WORLD, Joint, Link, RobotDescription, Surface
 from twin.models.expansion.expand import expand
 from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import describe_repair
@@ -41,8 +41,6 @@ MOST = {
     "ros2_control/joint": 2000,
 }
 """Elements of a kind; the largest robots known have 200 links."""
-WORLD = "world"
-"""A root link of this name is bolted down."""
 
 
 def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDescription:
