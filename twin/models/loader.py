@@ -83,10 +83,7 @@ def parse_urdf(
     report = Report(source, lines)
     root = parse(raw, report)
     _refuse_too_many(root, report)
-    if root.get("version", "1.0") not in VERSIONS:
-        report.add(
-            root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
-        )
+    _check_version(root, report)
     colour_visuals(root)
     surfaces = read_surfaces(root, report)
     packages = Packages(PackagePath.of(source, options))
@@ -129,6 +126,12 @@ def _refuse_too_many(root: Element, report: Report) -> None:
             what = path.rpartition("/")[2]
             report.add(None, f"the robot has {found} <{what}>; at most {most} are read", code="too-large")
     report.raise_if_any()
+
+
+def _check_version(root: Element, report: Report) -> None:
+    version = root.get("version", "1.0")
+    if version not in VERSIONS:
+        report.add(root, f"URDF version '{version}' is unknown; valid: 1.0, 1.1, 1.2", code="version")
 
 
 def _has_xacro(source: Path, raw: bytes) -> bool:
