@@ -84,6 +84,34 @@ def test_errors_exit_2_all_at_once(invoke: Invoke, urdf: Callable[..., Path]) ->
     assert out.endswith("r.urdf: 3 errors\n")
 
 
+def test_many_warnings_alike_are_grouped_and_errors_never(
+    invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    links = "".join(
+        f"<link name='l{i}'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial></link>\n"
+        for i in range(9)
+    )
+    joints = "".join(
+        f"<joint name='j{i}' type='fixed'><origin rpy='0 0 1.57'/>"
+        f"<parent link='l0'/><child link='l{i}'/></joint>\n"
+        for i in range(1, 9)
+    )
+    Path("many.urdf").write_text(f"<robot name='r'>\n{links}{joints}</robot>", encoding="utf-8")
+    _, out, _ = invoke("check", "many.urdf")
+    assert out.splitlines()[-2:] == [
+        "many.urdf: warning[rounded-angle]: and 3 more, in full with --all: "
+        "joint 'j6' (16), joint 'j7' (17), joint 'j8' (18)",
+        "many.urdf: 8 warnings (9 links, 8 joints)",
+    ]
+    assert out.count("fix:") == 5
+    assert invoke("check", "many.urdf", "--all")[1].count("fix:") == 8
+    assert len(json.loads(invoke("check", "many.urdf", "--json")[1])["diagnostics"]) == 8
+    Path("bad.urdf").write_text("<robot name='r'>" + "<link/>\n" * 9 + "</robot>", encoding="utf-8")
+    _, out, _ = invoke("check", "bad.urdf")
+    assert out.count("error[missing-attribute]") == 9
+
+
 def test_json_for_tools(invoke: Invoke, urdf: Callable[..., Path]) -> None:
     code, out, _ = invoke("check", urdf("0 0 1.57"), "--json", "--strict")
     document = json.loads(out)

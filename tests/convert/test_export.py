@@ -229,6 +229,7 @@ def test_a_root_named_world_is_in_the_ledger(tmp_path: Path) -> None:
     assert [d.code for d in check(description)] == []
     report = export(description, tmp_path / "out")
     entry = next(entry for entry in report["ledger"] if entry["element"] == "link 'world'")
+    assert not any(guess["element"].startswith("base") for guess in report["guesses"]), "the file says it"
     assert (report["base"], entry["outcome"]) == ("fixed", "translated")
 
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 @reads_robot
 def check(
     file: RobotFile,
+    every: Annotated[
+        bool, typer.Option("--all", help="Print every warning in full, however many are alike.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON, for tools.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit 1 if there are warnings.")] = False,
     drive: Annotated[
@@ -42,7 +45,7 @@ def check(
     if json:
         sys.stdout.write(inspection_json(found, {} if driven is None else {"drive": drive_json(driven)}))
     else:
-        stdout().print(inspection_text(found))
+        stdout().print(inspection_text(found, every=every))
         if driven is not None:
             stdout().print(drive_text(driven))
     if found.count("error"):

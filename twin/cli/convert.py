@@ -60,7 +60,9 @@ def convert(
     driven = report["self_check"].get("drive")
     if driven is not None and not driven["passed"]:
         missed = ", ".join(driven["words"])
-        stdout().print(f"does not drive as its plugin says: {missed}; see `twin check --drive {file}`")
+        stdout().print(
+            f"does not drive as its plugin says: {missed}; see `twin check --drive {file}`", markup=False
+        )
     if warnings:
         stdout().print(
             f"{counted(warnings, 'warning')}: see `twin check {file}` or report.json",

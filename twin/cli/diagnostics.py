@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.text import Text
 
     from twin.convert.inspection import Inspection
@@ -16,16 +19,22 @@ if TYPE_CHECKING:
 
 EXCERPT = 120
 """Longest source line that is shown."""
+MOST_ALIKE = 5
+"""Warnings of one code that are shown in full: large robots have dozens, which hide all others."""
 STYLES = {"error": "bold red", "warning": "bold yellow"}
 
 
-def inspection_text(found: Inspection) -> Text:
-    """Return `file:line: severity[code]: element: message`, the source line, the fix; last a summary."""
+def inspection_text(found: Inspection, *, every: bool = False) -> Text:
+    """Return `file:line: severity[code]: element: message`, the source line, the fix; last a summary.
+
+    Unless `every`, of many warnings of one code the first are shown in full, of the others the places.
+    """
     from rich.text import Text
 
     text = Text()
     sources = _Sources()
-    for diagnostic in found.diagnostics:
+    shown, others = (found.diagnostics, {}) if every else _abridged(found.diagnostics)
+    for diagnostic in shown:
         where = str(diagnostic.file) + (f":{diagnostic.line}" if diagnostic.line else "")
         text.append(f"{where}: ", "bold")
         text.append(f"{diagnostic.severity}[{diagnostic.code}]: ", STYLES[diagnostic.severity])
@@ -36,6 +45,11 @@ def inspection_text(found: Inspection) -> Text:
             text.append(f"    {excerpt}\n", "dim")
         text.append("    fix: ", "green")
         text.append(f"{diagnostic.fix}\n")
+    for code, alike in others.items():
+        text.append(f"{found.file}: ", "bold")
+        text.append(f"warning[{code}]: ", STYLES["warning"])
+        places = ", ".join(dict.fromkeys(_place(diagnostic, found.file) for diagnostic in alike))
+        text.append(f"and {len(alike)} more, in full with --all: {places}\n")
     return text.append(_summary(found))
 
 
@@ -55,6 +69,28 @@ def inspection_json(found: Inspection, more: Mapping[str, Any] = MappingProxyTyp
 def counted(number: int, noun: str) -> str:
     """Return such as `1 link` or `2 links`."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _abridged(
+    diagnostics: Sequence[Diagnostic],
+) -> tuple[Sequence[Diagnostic], Mapping[str, Sequence[Diagnostic]]]:
+    """Return what to show in full, errors always, and the other warnings by code."""
+    shown: list[Diagnostic] = []
+    others: dict[str, list[Diagnostic]] = {}
+    seen: Counter[str] = Counter()
+    for diagnostic in diagnostics:
+        seen[diagnostic.code] += 1
+        if diagnostic.severity == "error" or seen[diagnostic.code] <= MOST_ALIKE:
+            shown.append(diagnostic)
+        else:
+            others.setdefault(diagnostic.code, []).append(diagnostic)
+    return shown, others
+
+
+def _place(diagnostic: Diagnostic, file: Path) -> str:
+    where = "" if diagnostic.file == file else f"{diagnostic.file.name}:"
+    line = where + (str(diagnostic.line) if diagnostic.line else "")
+    return f"{diagnostic.element} ({line.rstrip(':')})" if line else diagnostic.element
 
 
 def _summary(found: Inspection) -> str:

@@ -18,13 +18,11 @@ from twin.convert.roles import roles_of
 from twin.convert.stand_ins import refuse_singular
 from twin.convert.tyres import carry_load
 from twin.errors import ConversionError, Problem
-from twin.models.description import RobotDescription
+from twin.models.description import WORLD, RobotDescription
 from twin.models.mesh.meshes import mesh_faults
 
 DEEPEST = 450
 """Links in a row; tinyxml2 reads 500 elements inside of each other."""
-WORLD = "world"
-"""A root link of this name means a robot that is bolted down."""
 
 
 def convert(

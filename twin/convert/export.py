@@ -25,7 +25,7 @@ from twin.convert.sensors import add_sensors
 from twin.convert.tag_ledger import counts, tag_ledger
 from twin.errors import ConversionError, Problem
 from twin.models.checks import Diagnostic
-from twin.models.description import RobotDescription
+from twin.models.description import WORLD, RobotDescription
 
 MODEL, REPORT, ASSETS = "robot.xml", "report.json", "assets"
 
@@ -59,8 +59,9 @@ def export(
     """
     folder = _checked(folder)
     conversion = convert(description, base=base or natural_base(description))
-    if base is None and conversion.root_joint is None:
-        note = "bolted down, as it weighs nothing or the file says so"
+    said = description.static or description.root == WORLD
+    if base is None and conversion.root_joint is None and not said:
+        note = "bolted down, as it weighs nothing"
         guess = LedgerEntry(element=f"base '{description.root}'", outcome="guessed", note=note)
         conversion = replace(conversion, ledger=(*conversion.ledger, guess))
     spec = conversion.spec.copy()

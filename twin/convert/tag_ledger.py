@@ -10,13 +10,12 @@ import numpy as np
 
 from twin.convert.command_fates import CommandFates
 from twin.convert.conversion import Outcome
-from twin.convert.convert import WORLD
 from twin.convert.fates import Fate, lost_attributes
 from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.roles import Roles
 from twin.models.checks.source import is_repeated, number, read_source
-from twin.models.description import RobotDescription
+from twin.models.description import WORLD, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.shapes import Cylinder, Mesh
 from twin.models.urdf.document import Element, place

@@ -10,6 +10,7 @@ import numpy as np
 from twin.controllers.skid_steer import weight_shares
 from twin.convert.roles import Roles
 from twin.geometry import Array
+from twin.models.dynamics import STANDARD_GRAVITY
 
 STIFF_SOLREF_S = 0.004
 """Contact time constant of wheels and gripping surfaces [s]; at least two time steps.
@@ -59,7 +60,7 @@ def carry_load(spec: mujoco.MjSpec, model: mujoco.MjModel, roles: Roles) -> None
     mujoco.mj_comPos(model, data)
     names = sorted(roles.wheels)
     bodies = [model.body(name).id for name in names]
-    weight = 9.81 * float(model.body_subtreemass[1])
+    weight = STANDARD_GRAVITY * float(model.body_subtreemass[1])
     shares = weight_shares(data.xpos[bodies, :2], data.subtree_com[1, :2])
     for name, body, share in zip(names, bodies, shares, strict=True):
         load = share * weight * float(model.body_invweight0[body, 0])

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from twin.models.kinematics import Positions
     from twin.models.mass_properties import Settlement
 
+WORLD = "world"
+"""A root link of this name means a robot that is bolted down."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Inertial:
@@ -137,13 +140,13 @@ class RobotDescription:
     states: Mapping[str, tuple[Interface, ...]] = field(default_factory=dict)
     """What `<ros2_control>` reads of joints, by joint."""
     sensors: tuple[SensorSpec, ...] = ()
+    """Those that `twin.sim` samples."""
     warnings: tuple[Problem, ...] = ()
     """What was left out when the file was read."""
     lines: LineTable | None = field(default=None, repr=False)
     """Where the elements of `urdf` come from, if it is not the text of `source`."""
     skipped_meshes: tuple[SkippedMesh, ...] = ()
     """In file order."""
-    """Those that `twin.sim` samples."""
     cameras: tuple[CameraSpec, ...] = ()
     springs: Mapping[str, Spring] = field(default_factory=dict)
     """By joint."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from twin.errors import Problem
 from twin.models.catalogue import resolve
-from twin.models.description import Joint, Link, RobotDescription, Surface
+from twin.models.description import WORLD, Joint, Link, RobotDescription, Surface
 from twin.models.expansion.expand import expand
 from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import describe_repair
@@ -41,8 +41,6 @@ MOST = {
     "ros2_control/joint": 2000,
 }
 """Elements of a kind; the largest robots known have 200 links."""
-WORLD = "world"
-"""A root link of this name is bolted down."""
 
 
 def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDescription:
@@ -85,10 +83,7 @@ def parse_urdf(
     report = Report(source, lines)
     root = parse(raw, report)
     _refuse_too_many(root, report)
-    if root.get("version", "1.0") not in VERSIONS:
-        report.add(
-            root, f"URDF version '{root.get('version')}' is unknown; valid: 1.0, 1.1, 1.2", code="version"
-        )
+    _check_version(root, report)
     colour_visuals(root)
     surfaces = read_surfaces(root, report)
     packages = Packages(PackagePath.of(source, options))
@@ -131,6 +126,12 @@ def _refuse_too_many(root: Element, report: Report) -> None:
             what = path.rpartition("/")[2]
             report.add(None, f"the robot has {found} <{what}>; at most {most} are read", code="too-large")
     report.raise_if_any()
+
+
+def _check_version(root: Element, report: Report) -> None:
+    version = root.get("version", "1.0")
+    if version not in VERSIONS:
+        report.add(root, f"URDF version '{version}' is unknown; valid: 1.0, 1.1, 1.2", code="version")
 
 
 def _has_xacro(source: Path, raw: bytes) -> bool:

@@ -58,11 +58,6 @@ class Frames:
         return self.body(namespace, frame_id) or self.belief(namespace, frame_id)
 
     @staticmethod
-    def is_map(frame: str) -> bool:
-        """Tell whether a believed frame is a map frame, which coincides with `world`."""
-        return frame.rsplit("/", 1)[-1] == "map"
-
-    @staticmethod
     def _link(namespace: str, frame_id: str) -> str:
         link = frame_id.lstrip("/")
         return link.removeprefix(f"{namespace}/") if namespace else link

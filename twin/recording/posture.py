@@ -163,10 +163,10 @@ class Posture:
             if joint is not None and joint.mimic is not None:
                 return f"joint '{name}' follows '{joint.mimic.joint}', set that one"
             if joint is not None and joint.type == "fixed":
-                return f"joint '{name}' is fixed"
+                return f"joint '{name}' is fixed; {nearest(name, self._coordinates)}"
             return f"no joint '{name}' to set: {nearest(name, self._coordinates)}"
         if not math.isfinite(value):
-            return f"joint '{name}': {value} is not a finite number"
+            return f"joint '{name}': {value} is not a finite number; give one in {coordinate.unit}"
         if coordinate.limited and not coordinate.lower <= value <= coordinate.upper:
             bounds = f"[{coordinate.lower:g}, {coordinate.upper:g}] {coordinate.unit}"
             return f"joint '{name}': {value:g} is outside of its limits {bounds}"

@@ -16,6 +16,7 @@ from twin.errors import ModelError, SimulationError
 from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.models.drive_guess import guess_drive
+from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.specs import DriveSpec
 from twin.sim.driving import Driven, ProvingGround
 from twin.sim.physics import Physics
@@ -248,7 +249,7 @@ def _circle(ground: ProvingGround, radius: float, lateral: float, bar: float) ->
 def _hold(ground: ProvingGround, drive: DriveSpec, mass: float, name: str, heading: float) -> Manoeuvre:
     wheels = len(drive.left_joints) + len(drive.right_joints)
     slope = math.radians(SLOPE_DEG)
-    needed = mass * 9.81 * math.sin(slope) * abs(math.cos(heading)) * drive.wheel_radius / wheels
+    needed = mass * STANDARD_GRAVITY * math.sin(slope) * abs(math.cos(heading)) * drive.wheel_radius / wheels
     torque = drive.max_wheel_torque or math.inf
 
     def judge(moved: float) -> tuple[float, str]:

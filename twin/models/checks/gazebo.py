@@ -154,8 +154,8 @@ class _Check:
             title = f"transmission '{item.element.get('name', '')}'"
             if item.fault and "commands nothing" not in item.fault:
                 message = f"{title} has no effect: {item.fault}"
-                fix = "give joints a <command_interface> in <ros2_control>"
-                yield self._found("not-simulated", item.element, message, fix)
+                fix = "to command a joint that moves, give it a <command_interface> in <ros2_control>"
+                yield self._found("not-simulated", item.element, message, fix, where=title)
             elif item.joint and len(named) > 1:
                 yield self._several(item.element, item.joint, named, item.interface or "")
 
@@ -163,7 +163,9 @@ class _Check:
         message = f"joint '{joint}' has the command interfaces {', '.join(named)}; {counts} counts"
         return self._found("several-interfaces", element, message, "leave the one that is used")
 
-    def _found(self, code: str, element: Element, message: str, fix: str) -> Diagnostic:
+    def _found(
+        self, code: str, element: Element, message: str, fix: str, *, where: str | None = None
+    ) -> Diagnostic:
         line = self._report.line(element)
-        where = place(element)
+        where = where or place(element)
         return finding(self._description, code, where, line, message=message, fix=fix)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import RobotDescription
+from twin.models.description import WORLD, RobotDescription
 from twin.models.kinematics import rigid_groups
-
-WORLD = "world"
 
 
 def masses(description: RobotDescription) -> Iterator[Diagnostic]:

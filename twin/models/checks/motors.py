@@ -10,10 +10,8 @@ import numpy as np
 from twin.geometry import Array, Pose3, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import Joint, RobotDescription
+from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.kinematics import ONE_DOF, link_poses
-
-GRAVITY = 9.81
-"""[m/s²]"""
 
 
 def weak_motor(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -62,7 +60,7 @@ def static_load(
         return 0.0, 0.0
     frame = poses[joint.child]
     axis = rotate_wxyz(frame.quat_wxyz, joint.axis)
-    weight = np.array([0.0, 0.0, -mass * GRAVITY])
+    weight = np.array([0.0, 0.0, -mass * STANDARD_GRAVITY])
     if joint.type == "prismatic":
         return mass, abs(float(axis @ weight))
     arm = moment / mass - frame.xyz

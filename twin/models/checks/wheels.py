@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from twin.models.checks.discs import Disc, disc_of
 from twin.models.description import Joint, Link, RobotDescription
 from twin.models.kinematics import link_poses
 from twin.models.shapes import Cylinder
+from twin.models.solids import is_solid, lowest
 
 TOLERANCE_DEG = 2.0
 LEVEL = math.cos(math.radians(60.0))
@@ -49,7 +50,9 @@ def wheels_of(description: RobotDescription) -> tuple[Wheel, ...]:
             disc = _disc(link)
             if disc is not None and _is_round_about(disc, joint):
                 centre = pose.apply(disc.centre)
-                wheels.append(Wheel(joint=joint, link=link.name, centre=centre, radius=disc.radius))
+                wheel = Wheel(joint=joint, link=link.name, centre=centre, radius=disc.radius)
+                if isinstance(disc.shape.geometry, Cylinder) or _is_low(wheel, description, poses):
+                    wheels.append(wheel)
     return tuple(wheels)
 
 
@@ -92,6 +95,17 @@ def wheel_fixed(description: RobotDescription) -> Iterator[Diagnostic]:
             message=f"wheel '{link.name}' is fixed to '{joint.parent}' {where}",
             fix="make the joint continuous, and give it the wheel's <origin> and <axis xyz='0 1 0'/>",
         )
+
+
+def _is_low(wheel: Wheel, description: RobotDescription, poses: Mapping[str, Pose3]) -> bool:
+    """Tell whether a wheel reaches down to where the robot ends: arms have round parts on roll joints too."""
+    ends = [
+        lowest(shape.geometry, poses[name] @ shape.T_link_geometry)
+        for name, link in description.links.items()
+        for shape in link.collisions or link.visuals
+        if is_solid(shape)
+    ]
+    return float(wheel.centre[2]) - wheel.radius < min(ends) + wheel.radius
 
 
 def _disc(link: Link) -> Disc | None:

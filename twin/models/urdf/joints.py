@@ -146,22 +146,7 @@ def check_tree(
         elements: XML element of each joint, for messages.
         report: Where problems go.
     """
-    parent_joint: dict[str, Joint] = {}
-    for joint in joints.values():
-        element = elements[joint.name]
-        for role, name in (("parent", joint.parent), ("child", joint.child)):
-            if name and name not in links:
-                missing = f"{role} link '{name}' of joint '{joint.name}' does not exist"
-                report.add(element, f"{missing}; {nearest(name, links)}", code="unknown-link")
-        if joint.child in parent_joint:
-            other = parent_joint[joint.child].name
-            both = f"joints '{other}' and '{joint.name}'"
-            report.add(
-                element,
-                f"link '{joint.child}' has two parents: {both}; a robot is a tree",
-                code="two-parents",
-            )
-        parent_joint.setdefault(joint.child, joint)
+    parent_joint = _parent_joints(links, joints, elements, report)
     _check_mimics(joints, elements, report)
     roots = [name for name in links if name not in parent_joint]
     if not links:
@@ -181,6 +166,29 @@ def check_tree(
     else:
         _check_reachable(links, parent_joint, report)
     return roots[0] if roots else ""
+
+
+def _parent_joints(
+    links: Mapping[str, Link], joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report
+) -> dict[str, Joint]:
+    """Return the joint above each link, the first one if there are more, which is noted."""
+    parent_joint: dict[str, Joint] = {}
+    for joint in joints.values():
+        element = elements[joint.name]
+        for role, name in (("parent", joint.parent), ("child", joint.child)):
+            if name and name not in links:
+                missing = f"{role} link '{name}' of joint '{joint.name}' does not exist"
+                report.add(element, f"{missing}; {nearest(name, links)}", code="unknown-link")
+        if joint.child in parent_joint:
+            other = parent_joint[joint.child].name
+            both = f"joints '{other}' and '{joint.name}'"
+            report.add(
+                element,
+                f"link '{joint.child}' has two parents: {both}; a robot is a tree",
+                code="two-parents",
+            )
+        parent_joint.setdefault(joint.child, joint)
+    return parent_joint
 
 
 def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint], report: Report) -> None:
