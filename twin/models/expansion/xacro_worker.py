@@ -205,6 +205,8 @@ def _explain(error: Exception) -> dict[str, Any]:
         message += (
             f"; give --arg {name}:=VALUE, or <xacro:arg name='{name}' default=''/> before its first use"
         )
+    if "substitution command [find-pkg-share" in message:
+        message += "; $(find-pkg-share …) is of launch files, here write $(find PACKAGE)"
     return _fault(message, file or xacro.filestack[-1], line, refused.code if refused else "xacro")
 
 
