@@ -66,8 +66,10 @@ def test_json_has_the_numbers(invoke: Invoke, mirrored: Path) -> None:
 
 
 def test_nothing_to_drive(invoke: Invoke) -> None:
-    code, _, err = invoke("check", "r2d2", "--drive")
+    code, out, err = invoke("check", "r2d2", "--drive")
     assert code == 2
+    assert "(7 links, 6 joints)" in out, "what was found is told all the same"
+    assert json.loads(invoke("check", "r2d2", "--drive", "--json")[1])["robot"] == "r2d2"
     assert "robot 'r2d2' has no drive to check; it needs a diff-drive plugin" in err
 
 

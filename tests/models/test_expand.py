@@ -119,7 +119,14 @@ XACRO_FAULTS = {
         ":2: xacro: Undefined parameters [n] (in macro 'm')",
     ),
     "no such file": ("\n<xacro:include filename='part.xacro'/>", ":2: xacro: No such file or directory: "),
-    "undefined argument": ("\n<a b='$(arg n)'/>", ":2: xacro: Undefined substitution argument n"),
+    "substitution of launch files": (
+        "\n<a b='$(find-pkg-share n)/x'/>",
+        "'arg']; $(find-pkg-share …) is of launch files, here write $(find PACKAGE)",
+    ),
+    "undefined argument": (
+        "\n<a b='$(arg n)'/>",
+        ":2: xacro: Undefined substitution argument n; give --arg n:=",
+    ),
     "no such key": ("\n<a b=\"${dict(a=1)['b']}\"/>", ":2: xacro: no such key 'b'"),
 }
 

@@ -85,6 +85,11 @@ REFUSED = {
         "bad-xml",
         ":3: not well-formed XML: mismatched tag; <link> of",
     ),
+    "comment before the declaration": (
+        b"<!-- exported -->\n" + declared("utf-8").encode(),
+        "bad-xml",
+        ":2: not well-formed XML: XML or text declaration not at start of entity; <?xml",
+    ),
     "twice": (ROBOT + b"\n" + ROBOT, "bad-xml", ":2: not well-formed XML: junk after document element"),
     "attribute twice": (b"<robot>\n<a b='' b=''/></robot>", "bad-xml", ":2: not well-formed XML: duplicate"),
     "unknown entity": (

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.model_options import RobotFile, reads_robot
+from twin.errors import TwinError
 from twin.models.options import ReadOptions
 
 if TYPE_CHECKING:
@@ -41,13 +42,18 @@ def check(
     from twin.convert.inspection import inspect_file
 
     found = inspect_file(file, read)
-    driven = _driven(found) if drive else None
+    try:
+        driven, fault = (_driven(found) if drive else None), None
+    except TwinError as error:
+        driven, fault = None, error
     if json:
         sys.stdout.write(inspection_json(found, {} if driven is None else {"drive": drive_json(driven)}))
     else:
         stdout().print(inspection_text(found, every=every))
         if driven is not None:
             stdout().print(drive_text(driven))
+    if fault is not None:
+        raise fault
     if found.count("error"):
         raise typer.Exit(2)
     missed = driven is not None and not driven.passed

@@ -22,7 +22,7 @@ from twin.sim.driving import Driven, ProvingGround
 from twin.sim.physics import Physics
 
 STRAIGHT_BAR_M = 0.005
-"""On 5 m."""
+"""On 5 m, and on less: most of it comes up when the robot starts and stops."""
 SPIN_BAR_DEG = 0.3
 """On 360 degrees."""
 CIRCLE_BAR_PERCENT, UNEQUAL_CIRCLE_BAR_PERCENT = 0.5, 2.5
@@ -212,8 +212,8 @@ def _straight(ground: ProvingGround, distance: float) -> Manoeuvre:
         aside = f" and {abs(y):.3g} m aside" if abs(y) > STRAIGHT_BAR_M else ""
         return driven.distance_error, f"drives {x:.4g} m of {length:g} m{backwards}{aside}"
 
-    bar = STRAIGHT_BAR_M * length / 5.0
-    return _judged(f"straight {length:g} m{backwards}", lambda: ground.straight(distance), judge, bar, "m")
+    name = f"straight {length:g} m{backwards}"
+    return _judged(name, lambda: ground.straight(distance), judge, STRAIGHT_BAR_M, "m")
 
 
 def _spin(ground: ProvingGround, side: int) -> Manoeuvre:

@@ -44,6 +44,8 @@ def gazebo(description: RobotDescription) -> Iterator[Diagnostic]:
             yield from check.plugin(plugin)
         for sensor in element.findall("sensor"):
             yield from check.sensor(sensor, name)
+    for element in root.findall("sensor"):
+        yield check.bare_sensor(element)
     for name, element in extensions_of(root):
         yield from check.values(element, name)
     for joint in root.iterfind("ros2_control/joint"):
@@ -76,6 +78,15 @@ class _Check:
             plugin,
             f"plugin '{what}' is not simulated",
             "drives are DiffDrive and skid steer; give joints a <command_interface>, followers a <mimic>",
+        )
+
+    def bare_sensor(self, sensor: Element) -> Diagnostic:
+        # wiki.ros.org/urdf/XML/sensor is a proposal: urdfdom can parse it, no simulator reads it.
+        message = (
+            f"sensor '{sensor.get('name', '')}' stands directly under <robot>, where no simulator reads it"
+        )
+        return self._found(
+            "not-simulated", sensor, message, "put it into <gazebo reference='LINK'>, as SDF has it"
         )
 
     def sensor(self, sensor: Element, link: str) -> Iterator[Diagnostic]:

@@ -39,6 +39,7 @@ MAX_INCLUDES = 50
 """Files inside of each other."""
 LONGEST = 400
 """Characters of a message: an expression may be part of it."""
+UNDEFINED_ARGUMENT = re.compile(r"Undefined substitution argument (\w+)")
 FRAMES = 20_000
 """Of the interpreter; a macro takes up to ten."""
 
@@ -199,6 +200,13 @@ def _explain(error: Exception) -> dict[str, Any]:
     if len(message) > LONGEST:
         message = message[:LONGEST] + "…"
     message += f" (in macro '{macro}')" if macro else ""
+    if missing := UNDEFINED_ARGUMENT.search(message):
+        name = missing[1]
+        message += (
+            f"; give --arg {name}:=VALUE, or <xacro:arg name='{name}' default=''/> before its first use"
+        )
+    if "substitution command [find-pkg-share" in message:
+        message += "; $(find-pkg-share …) is of launch files, here write $(find PACKAGE)"
     return _fault(message, file or xacro.filestack[-1], line, refused.code if refused else "xacro")
 
 

@@ -117,6 +117,8 @@ class _Scanner:
             if self._open and reason in ("mismatched tag", "no element found", "unclosed token"):
                 tag, line = self._open[-1]
                 reason += f"; <{tag[:SHOWN]}>{f' of line {line}' if self._has_lines else ''} is not closed"
+            elif error.code == expat.errors.codes[expat.errors.XML_ERROR_MISPLACED_XML_PI]:
+                reason += "; <?xml …?> must be the very first thing in the file: remove what stands before it"
             raise self._fault(f"not well-formed XML: {reason}", error.lineno) from None
         return self._lines
 
