@@ -44,7 +44,13 @@ def _options(
     ] = None,
     allow_path: Annotated[
         list[Path] | None,
-        typer.Option("--allow-path", metavar="DIR", help="Another folder that the file may read from."),
+        typer.Option(
+            "--allow-path",
+            metavar="DIR",
+            exists=True,
+            file_okay=False,
+            help="Another folder that the file may read from.",
+        ),
     ] = None,
     missing_mesh: Annotated[
         MissingMesh, typer.Option(help="skip: leave out shapes whose mesh is missing or unreadable.")

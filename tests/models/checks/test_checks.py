@@ -211,6 +211,13 @@ def test_a_drive_that_is_its_wheels_is_left_in_peace() -> None:
     assert [d.code for d in diagnose(cart(extra=PLUGIN.format(0.3, 0.05)))] == []
 
 
+def test_a_shape_may_be_touched_in_part_only() -> None:
+    half = CUBE.replace("<collision>", "<collision><origin xyz='0 0 0.025'/>").replace(
+        f"{BOX}</collision>", "<geometry><box size='0.1 0.1 0.05'/></geometry></collision>"
+    )
+    assert diagnose(arm(AXIS + LIMIT, half)) == ()
+
+
 def test_the_fix_of_a_tumbling_wheel_mends_it() -> None:
     (found,) = (diagnostic for diagnostic in diagnose(cart(left=TUMBLING)) if diagnostic.code == "wheel-axis")
     rpy = re.search(r"rpy='(.*?)'", found.fix)

@@ -44,6 +44,8 @@ def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
 
 def _moved(link: Link) -> str | None:
     (low, high), (touch_low, touch_high) = bounds(link.visuals), bounds(link.collisions)
+    if np.all(touch_low > low - LEAST) and np.all(touch_high < high + LEAST):
+        return None  # a part of what is seen may be left untouched, such as an end inside of another link
     seen, touched = (low + high) / 2.0, (touch_low + touch_high) / 2.0
     distance = float(np.linalg.norm(seen - touched))
     if distance <= max(LEAST, SHARE * float(np.linalg.norm(high - low))):
