@@ -41,6 +41,23 @@ def everything(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
+def test_numbers_beside_others_that_are_nearly_zero_are_exact_too(tmp_path: Path) -> None:
+    """MuJoCo writes such as 1e-17 as 0, which does not make the rest of the vector any rounder."""
+    tiny = "<inertia ixx='1.23456789e-2' ixy='1e-13' ixz='0' iyy='2.3456789e-2' iyz='0' izz='3.456789e-2'/>"
+    description = saved(
+        tmp_path,
+        f"<link name='base'>{INERTIAL}</link><link name='tip'><inertial><origin xyz='0.123456789 1e-15 0'/>"
+        f"<mass value='1.23456789'/>{tiny}</inertial></link>"
+        "<joint name='j' type='continuous'>"
+        "<origin xyz='0.3333333333 -1e-14 0' rpy='1.5707963267948966 0 0.1'/>"
+        "<parent link='base'/><child link='tip'/><axis xyz='0.6 1e-15 0.8'/></joint>",
+    )
+    export(description, tmp_path / "out", base="fixed")
+    body = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml")).body("tip")
+    assert body.pos[0] == 0.3333333333
+    assert body.ipos[0] == 0.123456789
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_written_model_is_exact(robot: str, tmp_path: Path) -> None:
     report = export(load(robot), tmp_path / "out")

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from twin.convert import convert
+from twin.convert.export import export
 from twin.errors import ConversionError
+from twin.models import load
 from twin.models.loader import parse_urdf
 
 INERTIAL = "<inertial><mass value='1'/><inertia ixx='0.1' iyy='0.1' izz='0.1'/></inertial>"
@@ -48,6 +50,14 @@ def test_a_universal_joint_swings_as_one_of_two_hinges_in_one_body() -> None:
         mujoco.mj_step(model, data, 500)
         states.append(data.qpos.copy())
     np.testing.assert_allclose(*states, atol=1e-9)
+
+
+def test_what_is_written_has_the_trifle_too(tmp_path: Path) -> None:
+    """MuJoCo writes masses below 1e-12 kg as 0, and then refuses them."""
+    (tmp_path / "r.urdf").write_text(robot("1 0 0", "0 1 0"), encoding="utf-8")
+    report = export(load(tmp_path / "r.urdf"), tmp_path / "out", base="fixed")
+    assert report["self_check"]["passed"]
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml")).body("cross").mass[0] > 0.0
 
 
 def test_nothing_to_carry_is_refused() -> None:

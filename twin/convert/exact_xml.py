@@ -11,6 +11,8 @@ from lxml import etree
 
 SAME = 1e-5
 """Relative difference up to which a number is taken for the rounded form of another."""
+WRITTEN_AS_ZERO = 2e-12
+"""MuJoCo writes smaller numbers as 0 [SI]."""
 BODY = {"pos": "pos", "quat": "quat"}
 INERTIAL = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
 GEOM = {"pos": "pos", "quat": "quat", "size": "size"}
@@ -81,7 +83,9 @@ def _sources(
 def _exact(text: str, value: Any) -> str:
     rounded = np.array(text.split(), dtype=np.float64)
     exact = np.ravel(value)[: len(rounded)]
-    if len(exact) != len(rounded) or not np.allclose(rounded, exact, rtol=SAME, atol=0.0):
+    # A component that is nearly zero beside others, or by itself, is written as zero.
+    slack = max(WRITTEN_AS_ZERO, SAME * float(np.max(np.abs(rounded), initial=0.0)))
+    if len(exact) != len(rounded) or not np.allclose(rounded, exact, rtol=SAME, atol=slack):
         return text
     return " ".join(_shortest(number) for number in exact.tolist())
 
