@@ -12,8 +12,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from twin.cli import app as app_module
-
 GOOD = (
     "<robot name='r'>\n<link name='a'>\n<inertial><mass value='0.6'/>"
     "<inertia ixx='0.001' iyy='0.001' izz='0.001'/></inertial>\n"
@@ -28,19 +26,6 @@ XACRO = (
 HEAVY = ("mujoco", "zenoh", "rerun", "numpy", "scipy", "lxml")
 
 Invoke = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def invoke(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Invoke:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["twin", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_info:
-            app_module.run_app()
-        captured = capsys.readouterr()
-        assert isinstance(exit_info.value.code, int)
-        return exit_info.value.code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

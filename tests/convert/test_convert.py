@@ -255,7 +255,6 @@ def test_a_root_named_world_is_fixed_and_renamed() -> None:
     model = conversion.spec.compile()
     assert model.nv == 1
     assert {model.body(i).name for i in range(model.nbody)} == {"world", "world_link", "arm"}
-    assert "link 'world'" in {entry.element for entry in conversion.ledger}
 
 
 def test_unreadable_mesh_is_named(tmp_path: Path) -> None:
@@ -284,18 +283,11 @@ def test_mesh_is_converted(tmp_path: Path) -> None:
     assert np.sum(model.body_mass) == pytest.approx(1.37)
 
 
-def test_ledger_is_honest_about_what_is_dropped_and_guessed() -> None:
-    description = load("warehouse_bot")
-    entries = {entry.element: entry for entry in convert(description).ledger}
-    assert entries["velocity limit of joint 'lift_joint'"].outcome == "dropped"
-    assert entries["collision of link 'wheel_left'"].outcome == "translated"
-    assert entries["friction of link 'base_link'"].outcome == "guessed"
-    for link in description.links:
-        assert entries[f"link '{link}'"].outcome == "kept"
-    camera = "<gazebo reference='base'><sensor name='eye' type='camera'/><kp>1</kp></gazebo>"
-    text = f"<robot name='r'><link name='base'>{INERTIAL}</link>{camera}<transmission name='t'/></robot>"
-    dropped = {e.element for e in convert(parse_urdf(text, Path("r.urdf"))).ledger if e.outcome == "dropped"}
-    assert dropped == {"sensor 'eye'", "<kp> of gazebo 'base'", "<transmission> 't'"}
+def test_what_the_file_does_not_say_is_called_a_guess() -> None:
+    guesses = {guess.element: guess.note for guess in convert(load("warehouse_bot")).guesses}
+    assert "larger of 1" in guesses["friction of link 'base_link'"]
+    assert "critically damped" in guesses["servo of joint 'lift_joint'"]
+    assert "friction of link 'wheel_left'" not in guesses  # it has a mu1
 
 
 def test_conversion_is_deterministic() -> None:

@@ -52,6 +52,7 @@ def test_the_viewer_follows_the_posture(tmp_path: Path) -> None:
             view.move(posture)
             player.wait_for(lambda: times(client) == [1])
             player.wait_for(lambda: complaints(client) == [])
+            assert times(client) == [1]
             view.close()
         finally:
             process.terminate()

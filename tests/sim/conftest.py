@@ -91,7 +91,7 @@ def hand_made(base: str = "free", sensors: tuple[SensorSpec, ...] | None = None)
     spec.body("base_link").mocap = base == "kinematic"
     robot = description() if sensors is None else description(sensors)
     return Conversion(
-        description=robot, spec=spec, spawn_height=0.05, ledger=(),
+        description=robot, spec=spec, spawn_height=0.05, guesses=(),
         root_joint="base_link" if base == "free" else None,
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from twin.convert import mujoco_log as mujoco_log
 from twin.convert.bodies import Base
-from twin.convert.conversion import Conversion, LedgerEntry, Outcome
+from twin.convert.conversion import Conversion, Guess
 from twin.convert.convert import convert
 
-__all__ = ["Base", "Conversion", "LedgerEntry", "Outcome", "convert"]
+__all__ = ["Base", "Conversion", "Guess", "convert"]

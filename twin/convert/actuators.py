@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.convert.bodies import LEAST_RANGE
-from twin.convert.conversion import LedgerEntry
+from twin.convert.conversion import Guess
 from twin.convert.roles import commanded_wheels
 from twin.models.checks.wheels import Wheel
 from twin.models.description import Joint, RobotDescription
@@ -31,7 +31,7 @@ FOLLOWER_SOLIMP = [0.99, 0.999, 0.001, 0.5, 2.0]
 
 def add_actuators(
     spec: mujoco.MjSpec, description: RobotDescription, model: mujoco.MjModel, *, timestep: float
-) -> list[LedgerEntry]:
+) -> list[Guess]:
     """Add what drives the joints; return what was chosen.
 
     Args:
@@ -40,18 +40,21 @@ def add_actuators(
         model: `spec` compiled without them, for the inertia that each joint moves.
         timestep: [s]
     """
-    entries = _add_wheels(spec, description)
+    guesses = _add_wheels(spec, description)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
     for command in description.commands.values():
         if spec.actuator(command.joint) is None:
-            entries.append(_add_commanded(spec, description, command, model))
+            inertia = moved_inertia(description, description.joints[command.joint], model, data)
+            guesses += _add_commanded(spec, description, command, inertia)
     for joint in description.joints.values():
         if joint.mimic is not None and joint.type in ONE_DOF:
             leader = description.joints[joint.mimic.joint]
             _add_follower(spec, joint, timestep, leader=leader.name if leader.type in ONE_DOF else "")
-    return entries
+    return guesses
 
 
-def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[LedgerEntry]:
+def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[Guess]:
     wheels = commanded_wheels(description)
     if not wheels:
         return []
@@ -66,28 +69,26 @@ def _add_wheels(spec: mujoco.MjSpec, description: RobotDescription) -> list[Ledg
         speed = joint.limit.velocity
         _limit_command(actuator, description.commands.get(joint.name), *((-speed, speed) if speed else ()))
     of = "commanded wheels" if drive is None else f"wheels of the {drive.kind}"
-    return [LedgerEntry(element=of, outcome="guessed", note=f"velocity actuators, gain {gain:.3g} Nm s/rad")]
+    return [Guess(element=of, note=f"velocity actuators, gain {gain:.3g} Nm s/rad")]
 
 
 def _wheel_gain(description: RobotDescription, wheels: tuple[Wheel, ...]) -> float:
-    masses = [link.inertial.mass for link in description.links.values() if link.inertial is not None]
     radius = max(wheel.radius for wheel in wheels)
-    return max(WHEEL_KV, sum(masses) * radius**2 / len(wheels) / WHEEL_TIME_CONSTANT_S)
+    return max(WHEEL_KV, description.mass * radius**2 / len(wheels) / WHEEL_TIME_CONSTANT_S)
 
 
 def _add_commanded(
-    spec: mujoco.MjSpec, description: RobotDescription, command: CommandSpec, model: mujoco.MjModel
-) -> LedgerEntry:
+    spec: mujoco.MjSpec, description: RobotDescription, command: CommandSpec, inertia: float
+) -> list[Guess]:
     joint = description.joints[command.joint]
     limit = joint.limit
     actuator = _add(spec, joint)
     _limit_force(actuator, limit.effort)
-    inertia = moved_inertia(description, joint, model)
     if command.interface == "effort":
         actuator.set_to_motor()
         _limit_command(actuator, command)
-        note = "motor"
-    elif command.interface == "velocity":
+        return []
+    if command.interface == "velocity":
         gain = inertia / WHEEL_TIME_CONSTANT_S
         actuator.set_to_velocity(gain)
         _limit_command(actuator, command)
@@ -98,14 +99,14 @@ def _add_commanded(
         known = limit.lower is not None and limit.upper is not None
         _limit_command(actuator, command, *((limit.lower, limit.upper) if known else ()))
         note = f"position actuator, stiffness {stiffness:.3g}, critically damped"
-    element = f"command interface {command.interface} of joint '{joint.name}'"
-    return LedgerEntry(
-        element=element, outcome="translated", note=f"{note}; it moves {inertia:.3g} (kg or kg m²)"
-    )
+    element = f"servo of joint '{joint.name}'"
+    return [Guess(element=element, note=f"{note}; it moves {inertia:.3g} (kg or kg m²)")]
 
 
-def moved_inertia(description: RobotDescription, joint: Joint, model: mujoco.MjModel) -> float:
-    """Return the inertia [kg or kg m²] that `joint` and its followers move, at position zero, base still."""
+def moved_inertia(
+    description: RobotDescription, joint: Joint, model: mujoco.MjModel, data: mujoco.MjData
+) -> float:
+    """Return the inertia [kg or kg m²] that `joint` and its followers move, base still, at `data`."""
     speed = np.zeros(model.nv)
     for other in description.joints.values():
         share, leader = 1.0, other
@@ -114,8 +115,6 @@ def moved_inertia(description: RobotDescription, joint: Joint, model: mujoco.MjM
             leader = description.joints[leader.mimic.joint]
         if leader.name == joint.name and other.type in ONE_DOF:
             speed[model.joint(other.name).dofadr[0]] = share
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     momentum = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, momentum, speed)
     return float(speed @ momentum)

@@ -144,14 +144,17 @@ def _refuse_taken_names(description: RobotDescription) -> None:
 
 def natural_base(description: RobotDescription) -> Base:
     """Return `free`, or `fixed` for a robot whose base weighs nothing, so that it can only be bolted down."""
+    return "free" if description.root in _heavy_heads(description) else "fixed"
+
+
+def _heavy_heads(description: RobotDescription) -> set[str]:
+    """Return the first links of rigid groups that have mass."""
     heads = rigid_groups(description)
-    heavy = {heads[name] for name in description.settlement.bodies}
-    return "free" if heads[description.root] in heavy else "fixed"
+    return {heads[name] for name in description.settlement.bodies}
 
 
 def _refuse_massless(description: RobotDescription, base: Base) -> None:
-    heads = rigid_groups(description)
-    heavy = {heads[name] for name in description.settlement.bodies}
+    heavy = _heavy_heads(description)
     still = description.root if base != "free" else None
     problems = [
         Problem(
@@ -162,7 +165,7 @@ def _refuse_massless(description: RobotDescription, base: Base) -> None:
             code="massless",
             element=f"link '{head}'",
         )
-        for head in dict.fromkeys(heads.values())
+        for head in dict.fromkeys(rigid_groups(description).values())
         if head not in heavy and head != still
     ]
     if problems:

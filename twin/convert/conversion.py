@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import mujoco
 
 from twin.models.description import RobotDescription
 
-Outcome = Literal["kept", "translated", "guessed", "dropped"]
-"""kept: means the same in MuJoCo. translated: other words, same meaning. guessed: the file does not say, so a
-default was chosen. dropped: has no effect in the simulation."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class LedgerEntry:
-    """What became of one element of the robot file."""
+class Guess:
+    """What was chosen because the robot file does not say it."""
 
     element: str
-    """Such as `joint 'lift_joint'`."""
-    outcome: Outcome
+    """Such as `friction of link 'base'`."""
     note: str
-    """What it is in MuJoCo, or why not."""
+    """What was chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,11 +31,12 @@ class Conversion:
     """
 
     description: RobotDescription
-    """As given; only a root link `world` is called `world_link`, as MuJoCo has a body `world` of its own."""
+    """As given; only a link `world` has another name, as MuJoCo has a body `world` of its own."""
     spec: mujoco.MjSpec
     """The robot alone, without floor, light or options; copy it before a change."""
     spawn_height: float
     """Height of the root link at which the lowest collision point, all joints at zero, touches z = 0 [m]."""
     root_joint: str | None
     """Name of the free joint of the root link; None for a fixed or kinematic base."""
-    ledger: tuple[LedgerEntry, ...]
+    guesses: tuple[Guess, ...]
+    """Of everything else, `twin.convert.tag_ledger` tells what became of it."""

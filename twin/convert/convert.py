@@ -9,10 +9,10 @@ import mujoco
 from twin.convert.actuators import add_actuators
 from twin.convert.bodies import Base, add_bodies, free_name
 from twin.convert.contacts import add_excludes, spawn_height
-from twin.convert.conversion import Conversion, LedgerEntry
+from twin.convert.conversion import Conversion
 from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
-from twin.convert.ledger import describe_conversion
+from twin.convert.guesses import contact_guesses
 from twin.convert.mujoco_log import without_warnings
 from twin.convert.roles import roles_of
 from twin.convert.stand_ins import refuse_singular
@@ -48,7 +48,7 @@ def convert(
     _refuse_deep(description)
     if (description.root == WORLD or description.static) and base == "free":
         base = "fixed"
-    description, renamed = _without_world(description)
+    description = _without_world(description)
     roles = roles_of(description)
     # Some steps need to know how the bodies move; shapes, which take far longer, do not matter to that.
     bare = mujoco.MjSpec()
@@ -63,13 +63,13 @@ def convert(
     add_excludes(spec, description)
     add_extensions(spec, description)
     carry_load(spec, moving, roles)
-    entries = add_actuators(spec, description, moving, timestep=timestep)
+    servos = add_actuators(spec, description, moving, timestep=timestep)
     return Conversion(
         description=description,
         spec=spec,
         spawn_height=spawn_height(_compile(spec, description)),
         root_joint=root_joint,
-        ledger=(*renamed, *describe_conversion(description, roles, base), *entries),
+        guesses=(*contact_guesses(description, roles), *servos),
     )
 
 
@@ -96,10 +96,10 @@ def _refuse_deep(description: RobotDescription) -> None:
         level, depth = [joint.child for link in level for joint in description.children(link)], depth + 1
 
 
-def _without_world(description: RobotDescription) -> tuple[RobotDescription, list[LedgerEntry]]:
-    """Return the robot with a link `world` renamed, and what to note about it."""
+def _without_world(description: RobotDescription) -> RobotDescription:
+    """Return the robot with a link `world` renamed, as MuJoCo has a body of this name."""
     if WORLD not in description.links:
-        return description, []
+        return description
     name = free_name(f"{WORLD}_link", description.links)
     links = {(name if key == WORLD else key): link for key, link in description.links.items()}
     links[name] = replace(links[name], name=name)
@@ -113,9 +113,5 @@ def _without_world(description: RobotDescription) -> tuple[RobotDescription, lis
     }
     sensors = tuple(replace(s, link=name) if s.link == WORLD else s for s in description.sensors)
     cameras = tuple(replace(c, link=name) if c.link == WORLD else c for c in description.cameras)
-    note = f"body '{name}'; MuJoCo has a body '{WORLD}' of its own"
-    entry = LedgerEntry(element=f"link '{WORLD}'", outcome="translated", note=note)
     root = name if description.root == WORLD else description.root
-    return replace(description, root=root, links=links, joints=joints, sensors=sensors, cameras=cameras), [
-        entry
-    ]
+    return replace(description, root=root, links=links, joints=joints, sensors=sensors, cameras=cameras)

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 
 from twin.convert.bodies import Base, natural_base
-from twin.convert.conversion import Conversion, LedgerEntry
+from twin.convert.conversion import Conversion, Guess
 from twin.convert.convert import convert
 from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
@@ -62,8 +62,8 @@ def export(
     said = description.static or description.root == WORLD
     if base is None and conversion.root_joint is None and not said:
         note = "bolted down, as it weighs nothing"
-        guess = LedgerEntry(element=f"base '{description.root}'", outcome="guessed", note=note)
-        conversion = replace(conversion, ledger=(*conversion.ledger, guess))
+        guess = Guess(element=f"base '{description.root}'", note=note)
+        conversion = replace(conversion, guesses=(*conversion.guesses, guess))
     spec = conversion.spec.copy()
     if set_options is not None:
         set_options(spec)
@@ -186,7 +186,7 @@ def _report(
         "diagnostics": [diagnostic_json(item) for item in inspect_robot(description, converts=True)],
         "tags": counts(tags),
         "ledger": [asdict(entry) for entry in tags],
-        "guesses": [asdict(entry) for entry in conversion.ledger if entry.outcome == "guessed"],
+        "guesses": [asdict(guess) for guess in conversion.guesses],
     }
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
+from typing import Literal
 
-from twin.convert.conversion import Outcome
 from twin.models.checks.ignored import ATTRIBUTES
 from twin.models.urdf.document import Element
 
+Outcome = Literal["kept", "translated", "guessed", "dropped"]
+"""kept: means the same in MuJoCo. translated: other words, same meaning. guessed: the file does not say, or
+not what is possible, so something was chosen. dropped: has no effect in the model."""
 Fate = tuple[Outcome, str]
 """What became of an element, and how or why."""
 INSIDE: Fate = ("translated", "see what is inside")

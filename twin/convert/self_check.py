@@ -60,7 +60,7 @@ def self_check(model: mujoco.MjModel, description: RobotDescription) -> SelfChec
         drawn = {joint.name: _draw(joint, rng) for joint in description.joints.values()} if sample else {}
         positions = joint_positions(description, drawn)
         worst = np.maximum(worst, _differences(model, description, positions))
-    expected = sum(link.inertial.mass for link in description.links.values() if link.inertial)
+    expected = description.mass
     found = float(np.sum(model.body_mass))
     return SelfCheck(
         mass=abs(found - expected) / max(expected, 1e-12),

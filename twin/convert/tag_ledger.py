@@ -9,8 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from twin.convert.command_fates import CommandFates
-from twin.convert.conversion import Outcome
-from twin.convert.fates import Fate, lost_attributes
+from twin.convert.fates import Fate, Outcome, lost_attributes
 from twin.convert.gazebo_fates import gazebo_fate
 from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.roles import Roles

@@ -166,6 +166,11 @@ class RobotDescription:
             below.setdefault(joint.parent, []).append(joint)
         return {link: tuple(joints) for link, joints in below.items()}
 
+    @property
+    def mass(self) -> float:
+        """Of all links [kg]."""
+        return sum(link.inertial.mass for link in self.links.values() if link.inertial is not None)
+
     @cached_property
     def settlement(self) -> Settlement:
         """Mass properties that a physics engine can take, by `twin.models.mass_properties.settle`."""

@@ -177,10 +177,6 @@ def _check(
     )
 
 
-def _mass(description: RobotDescription) -> float:
-    return sum(link.inertial.mass for link in description.links.values() if link.inertial is not None)
-
-
 def _quick(ground: ProvingGround, description: RobotDescription) -> Iterator[Manoeuvre]:
     yield _straight(ground, 1.0)
     yield _spin(ground, 1)
@@ -200,7 +196,7 @@ def _manoeuvres(ground: ProvingGround, description: RobotDescription) -> Iterato
         yield _circle(ground, radius, lateral, bar)
         yield _circle(ground, -radius, lateral, bar)
     for name, heading in HEADINGS:
-        yield _hold(ground, drive, _mass(description), name, heading)
+        yield _hold(ground, drive, description.mass, name, heading)
 
 
 def _straight(ground: ProvingGround, distance: float) -> Manoeuvre:
