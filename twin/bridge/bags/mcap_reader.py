@@ -237,7 +237,8 @@ class McapReader:
 
     def _add_metadata(self, content: bytes) -> None:
         f = Fields(content)
-        self.metadata[f.text()] = f.text_map()
+        name = f.text()
+        self.metadata[name] = f.text_map()
 
     def _block(self, block: _Block) -> Iterator[Message]:
         op, _ = RECORD_HEAD.unpack(self._read(block.offset, RECORD_HEAD.size))

@@ -264,8 +264,7 @@ class Statistics(NamedTuple):
     def parse(cls, data: bytes) -> Statistics:
         """Read the record's content."""
         f = Fields(data)
-        totals: list[int] = list(_STATISTICS.unpack(f.take(_STATISTICS.size)))
-        return cls(*totals, by_channel=f.numbers())
+        return cls(f.u64(), f.u16(), f.u32(), f.u32(), f.u32(), f.u32(), f.u64(), f.u64(), f.numbers())
 
 
 class Attachment(NamedTuple):
