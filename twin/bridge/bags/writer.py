@@ -207,8 +207,10 @@ class _McapStorage:
         self._writer.flush()
 
     def close(self, info: BagInfo) -> None:
-        self._tell(info)
-        self._writer.close()
+        try:
+            self._tell(info)
+        finally:
+            self._writer.close()
 
     def _tell(self, info: BagInfo) -> None:
         self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(info)})
