@@ -12,7 +12,7 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import ExternalQueue
+from twin.bridge.external import Arrival, ExternalQueue
 from twin.bridge.node import Node
 from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
@@ -38,6 +38,8 @@ class Bus:
         """Whether other processes may take part."""
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.arrival_taps: list[Callable[[Arrival], None]] = []
+        """Called for everything from outside when it enters, before a node has it."""
         self._nodes: list[Node] = []
         self._ids = 0
         self._thread = threading.get_ident()
@@ -119,6 +121,8 @@ class Bus:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
         arrivals = self.external.drain()
         for arrival in arrivals:
+            for tap in self.arrival_taps:
+                tap(arrival)
             arrival.receiver.enqueue(arrival.data, True)
         return len(arrivals)
 

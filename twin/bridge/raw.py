@@ -11,9 +11,10 @@ import zenoh.ext
 
 from twin.bridge import types
 from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, parse_attachment
+from twin.bridge.keys import Attachment, gid, pack_attachment, parse_attachment, topic_key
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
+from twin.bridge.topics import declare_publisher
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
@@ -100,3 +101,50 @@ class RawSubscription:
             self.enqueue(data, False)
         else:
             bus.external.push(Arrival(source, self, data))
+
+
+class RawPublisher:
+    """Publishes bytes as a message of a type that need not be known."""
+
+    def __init__(self, node: Node, topic: str, typename: str, type_hash: str, qos: QoS) -> None:
+        """Offer the topic.
+
+        Args:
+            node: Whose endpoint it is in the graph.
+            topic: Absolute name.
+            typename: Such as 'geometry_msgs/msg/Twist'.
+            type_hash: 'RIHS01_<64 hex>'.
+            qos: Offered.
+
+        Raises:
+            BridgeError: not the name of a type.
+        """
+        bus, name = node.bus, types.dds_name(typename)
+        token = node.token.endpoint(bus.next_id(), "MP", topic, name, type_hash, qos)
+        self.name = topic
+        self.qos = qos
+        self.gid = gid(token)
+        self._bus = bus
+        self._sequence = 0
+        self._zenoh: Any = declare_publisher(
+            bus.session, topic_key(bus.domain_id, topic, name, type_hash), qos
+        )
+        self._declared = [bus.session.liveliness().declare_token(token), self._zenoh]
+        node.add_endpoint(self)
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether somebody listens now; always true if latched: Zenoh does not tell."""
+        return self.qos.durability == "transient_local" or self._zenoh.matching_status.matching
+
+    def publish(self, payload: bytes) -> None:
+        """Publish CDR at the clock's time."""
+        self._sequence += 1
+        attachment = pack_attachment(self._sequence, self._bus.clock.now_ns, self.gid)
+        self._zenoh.put(payload, attachment=attachment)
+
+    def destroy(self) -> None:
+        """Leave the graph. Harmless when repeated."""
+        for entity in reversed(self._declared):
+            entity.undeclare()
+        self._declared.clear()

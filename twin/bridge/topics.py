@@ -10,7 +10,7 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr import Codec, codec
+from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
 from twin.bridge.keys import EndpointKind, gid, pack_attachment, parse_attachment, topic_key
 from twin.bridge.qos import QoS
@@ -27,17 +27,20 @@ _HEARTBEAT_S = 0.5  # rmw_zenoh's period
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "time_ns", "topic")
+    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
-    def __init__(self, topic: str, time_ns: int, message: M, message_codec: Codec[M]) -> None:
-        self.topic = topic
+    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        """The publisher's count, from 1."""
+        self.topic: str = publisher.name
         """Absolute name."""
-        self.msgtype = message_codec.msgtype
+        self.msgtype = publisher.codec.msgtype
         self.time_ns = time_ns
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = message_codec
+        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
@@ -48,6 +51,21 @@ class Sample(Generic[M]):
         return self._payload
 
 
+def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+    """Declare Zenoh's side of a publisher as rmw_zenoh does: an advanced one with a cache if latched."""
+    if qos.durability != "transient_local":
+        return session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+    miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
+    return zenoh.ext.declare_advanced_publisher(
+        session,
+        key,
+        congestion_control=zenoh.CongestionControl.DROP,
+        cache=zenoh.ext.CacheConfig(qos.depth),
+        sample_miss_detection=miss if qos.reliability == "reliable" else None,
+        publisher_detection=True,
+    )
+
+
 class Endpoint:
     """What publishers, subscriptions, services and clients have in common: a key, a token, a gid."""
 
@@ -55,7 +73,7 @@ class Endpoint:
         bus = node.bus
         dds_name, type_hash = types.dds_name(typename), types.rihs01(typename)
         token = node.token.endpoint(bus.next_id(), kind, name, dds_name, type_hash, qos)
-        self.name = name
+        self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
         self.qos = qos
@@ -78,21 +96,8 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._sequence = 0
-        session = node.bus.session
         self._latched = qos.durability == "transient_local"
-        if self._latched:
-            reliable = qos.reliability == "reliable"
-            miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
-            self._zenoh: Any = zenoh.ext.declare_advanced_publisher(
-                session,
-                self.key,
-                congestion_control=zenoh.CongestionControl.DROP,
-                cache=zenoh.ext.CacheConfig(qos.depth),
-                sample_miss_detection=miss if reliable else None,
-                publisher_detection=True,
-            )
-        else:
-            self._zenoh = session.declare_publisher(self.key, congestion_control=zenoh.CongestionControl.DROP)
+        self._zenoh = declare_publisher(node.bus.session, self.key, qos)
         self._declared.append(self._zenoh)
 
     @property
@@ -112,7 +117,7 @@ class Publisher(Endpoint, Generic[M]):
         time_ns = self._bus.clock.now_ns
         sample = None
         if self._bus.taps:
-            sample = Sample(self.name, time_ns, message, self.codec)
+            sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.

@@ -19,6 +19,8 @@ class RunOptions:
     """Simulated seconds per second; None: as fast as possible."""
     listen: tuple[str, ...] = ()
     record: bool = True
+    bag: bool = False
+    """Whether a bag is written into the folder of the results."""
     save_model: Path | None = None
 
     def arguments(self, out: Path) -> list[str]:
@@ -28,6 +30,7 @@ class RunOptions:
         words += [] if self.pace is None else ["--pace", repr(self.pace)]
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
         words += [] if self.record else ["--no-record"]
+        words += ["--bag"] if self.bag else []
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 
 

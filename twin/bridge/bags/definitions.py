@@ -5,6 +5,7 @@ Source: rosbag2/docs/message_definition_encoding.md.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,6 @@ from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
 from twin.bridge.bags.metadata import BagTopic
-from twin.bridge.rihs01 import FieldDefs
 from twin.errors import BridgeError
 
 SEPARATOR = "=" * 80
@@ -25,11 +25,10 @@ def definition(typename: str) -> str:
     Raises:
         BridgeError: an unknown type.
     """
-    types.get(typename)
-    return text_of(typename, types.store.fielddefs)
+    return text_of(typename, types.definitions(typename))
 
 
-def text_of(typename: str, definitions: FieldDefs) -> str:
+def text_of(typename: str, definitions: Mapping[str, Any]) -> str:
     """Return the full definition of a type, which with all it uses is in `definitions`."""
     used: dict[str, str] = {}
     own = _text(typename, definitions, used)
@@ -61,7 +60,7 @@ def learn(typename: str, full: str) -> None:
     types.get(typename)
 
 
-def _text(typename: str, definitions: FieldDefs, used: dict[str, str]) -> str:
+def _text(typename: str, definitions: Mapping[str, Any], used: dict[str, str]) -> str:
     constants, fields = definitions[typename]
     lines = [f"{kind} {name}={_literal(kind, value)}" for name, kind, value in constants]
     for name, description in fields:
@@ -76,7 +75,7 @@ def _text(typename: str, definitions: FieldDefs, used: dict[str, str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _base(description: Any, definitions: FieldDefs, used: dict[str, str]) -> str:
+def _base(description: Any, definitions: Mapping[str, Any], used: dict[str, str]) -> str:
     node, value = description
     if node == Nodetype.BASE:
         name, bound = value

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from twin.bridge.bags.compression import decompress
+from twin.bridge.bags.mcap_fields import Fields
 from twin.bridge.bags.mcap_records import (
     FOOTER_SIZE,
     MAGIC,
@@ -18,7 +19,6 @@ from twin.bridge.bags.mcap_records import (
     Channel,
     ChunkHead,
     ChunkIndex,
-    Fields,
     Message,
     Op,
     Schema,

@@ -9,6 +9,7 @@ from io import FileIO
 from pathlib import Path
 
 from twin.bridge.bags.compression import Compression, compress, mcap_name
+from twin.bridge.bags.mcap_fields import text, text_map
 from twin.bridge.bags.mcap_records import (
     MAGIC,
     Attachment,
@@ -24,8 +25,6 @@ from twin.bridge.bags.mcap_records import (
     metadata_index,
     record,
     summary_offset,
-    text,
-    text_map,
 )
 from twin.errors import RecordingError
 
