@@ -14,6 +14,7 @@ from tests.bridge import bag_helpers as bags
 from twin.bridge.bags.convert import convert
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
+from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.bags.writer import BagWriter
 from twin.bridge.cdr import codec
 
@@ -199,7 +200,10 @@ def test_repairing_a_bag_that_was_cut_off(tmp_path: Path) -> None:
 
 def test_only_some_topics_are_converted(tmp_path: Path) -> None:
     source = bags.make_bag(tmp_path / "bag")
-    assert convert(source, tmp_path / "some", topics=["/scan"], storage="sqlite3").messages == bags.COUNT
+    assert (
+        convert(source, tmp_path / "some", topics=TopicChoice(topics=("/scan",)), storage="sqlite3").messages
+        == bags.COUNT
+    )
 
 
 def test_messages_of_unknown_types_are_kept_or_counted(tmp_path: Path) -> None:

@@ -88,19 +88,25 @@ class RawSubscription:
         self._pending.clear()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        data = self._parse(sample)
+        if data is None:
+            return
+        if self.node.bus.in_own_thread():
+            self.enqueue(data, False)
+        else:
+            self.node.bus.external.push(Arrival(data.source, self, data))
+
+    def _parse(self, sample: zenoh.Sample) -> RawSample | None:
+        """Return what came; what has no attachment is counted. Called in any thread."""
         bus = self.node.bus
         name, dds_name, type_hash = str(sample.key_expr).partition("/")[2].rsplit("/", 2)
         topic = f"/{name}"
         source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
         if source is None:
             bus.external.refuse("attachment", topic, "no rmw_zenoh attachment of 33 bytes")
-            return
+            return None
         typename = types.from_dds_name(dds_name) or dds_name
-        data = RawSample(topic, typename, type_hash, sample.payload.to_bytes(), source)
-        if bus.in_own_thread():
-            self.enqueue(data, False)
-        else:
-            bus.external.push(Arrival(source, self, data))
+        return RawSample(topic, typename, type_hash, sample.payload.to_bytes(), source)
 
 
 class RawPublisher:

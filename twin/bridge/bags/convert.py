@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol, cast, get_args
@@ -11,6 +10,7 @@ from typing import Any, Literal, Protocol, cast, get_args
 from twin.bridge.bags.compression import Compression
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
+from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.errors import BridgeError, RecordingError, nearest
 
@@ -52,7 +52,7 @@ def convert(
     target: Path,
     *,
     storage: Target = "mcap",
-    topics: Collection[str] | None = None,
+    topics: TopicChoice | None = None,
     compression: Compression = "none",
 ) -> Converted:
     """Write the messages of a bag into a new one.
@@ -68,9 +68,9 @@ def convert(
         RecordingError: the bag cannot be read or the new one not be written.
     """
     with BagReader(source) as bag:
-        wanted = select(tuple(bag.topics), topics or None)
+        wanted = (topics or TopicChoice()).of(bag.topics)
         notices = list(bag.notices)
-        writer = _open(target, storage, compression, bag.info.ros_distro)
+        writer = _open(target, storage, compression)
         count, usable = 0, set()
         try:
             for name in wanted:
@@ -88,52 +88,7 @@ def convert(
     return Converted(messages=count, topics=len(usable), notices=tuple(notices))
 
 
-def select(
-    names: Collection[str],
-    topics: Collection[str] | None = None,
-    regex: str = "",
-    exclude: str = "",
-) -> tuple[str, ...]:
-    """Return those of the names that are meant, sorted.
-
-    Args:
-        names: To choose from.
-        topics: Names; None is all, unless there is a regex.
-        regex: Chooses too; the whole name must match.
-        exclude: Regex of names to leave out.
-
-    Raises:
-        RecordingError: a topic that is not among the names, or no regular expression.
-    """
-    unknown = sorted(set(topics or ()) - set(names))
-    if unknown:
-        raise RecordingError(f"there is no topic {unknown[0]}; {nearest(unknown[0], names)}")
-    chosen = chooser(topics, regex, exclude)
-    return tuple(sorted(name for name in names if chosen(name)))
-
-
-def chooser(
-    topics: Collection[str] | None = None, regex: str = "", exclude: str = ""
-) -> Callable[[str], bool]:
-    """Return whether a topic's name is meant, as `select` says, for names that are not known yet."""
-    included, excluded = (_pattern(text) for text in (regex, exclude))
-    everything = topics is None and not regex
-
-    def chosen(name: str) -> bool:
-        wanted = everything or name in (topics or ()) or (regex and included.fullmatch(name))
-        return bool(wanted) and not (exclude and excluded.fullmatch(name))
-
-    return chosen
-
-
-def _pattern(text: str) -> re.Pattern[str]:
-    try:
-        return re.compile(text)
-    except re.error as fault:
-        raise RecordingError(f"{text!r} is not a regular expression: {fault}") from fault
-
-
-def _open(target: Path, storage: Target, compression: Compression, ros_distro: str) -> _Writer:
+def _open(target: Path, storage: Target, compression: Compression) -> _Writer:
     if storage == "rosbag1":
         return _Rosbag1Writer(target, compression)
     config = BagConfig(storage=storage, compression=compression)

@@ -105,6 +105,8 @@ def complete(topic: BagTopic) -> BagTopic:
         text, type_hash = definition(topic.type), types.rihs01(topic.type)
     except BridgeError:
         return topic
+    if topic.type_hash.startswith("RIHS01_") and topic.type_hash != type_hash:
+        return topic  # another definition of that name
     if topic.definition:
         return replace(topic, type_hash=type_hash)
     return replace(
