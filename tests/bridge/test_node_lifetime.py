@@ -25,10 +25,10 @@ def test_a_timer_tells_when_it_is_due(bus: Bus, clock: Clock) -> None:
     timer = node.create_timer(20, lambda: None, autostart=False)
     assert timer.is_canceled
     assert timer.time_until_next_call is None
-    assert node.next_timer_ns is None
+    assert node.wait_ns is None
     clock.now_ns = 25
     timer.reset()
-    assert (timer.time_until_next_call, timer.is_ready, node.next_timer_ns) == (15, False, 40)
+    assert (timer.time_until_next_call, timer.is_ready, node.wait_ns) == (15, False, 15)
     clock.now_ns = 41
     assert (timer.time_until_next_call, timer.is_ready) == (-1, True)
     bus.spin()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
@@ -17,7 +17,7 @@ from twin.bridge.qos import QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
 from twin.bridge.tasks import Execution, Task
 from twin.bridge.timers import Rate, Timer
-from twin.bridge.topics import Endpoint, Publisher, Subscription
+from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
 
@@ -25,6 +25,17 @@ if TYPE_CHECKING:
     from twin.bridge.bus import Bus
 
 M = TypeVar("M")
+E = TypeVar("E", bound="OwnedEndpoint")
+
+_EXECUTION_NS = 10_000_000
+"""How often actions go on in a process that runs by the wall clock [ns]."""
+
+
+class OwnedEndpoint(Protocol):
+    """What leaves the graph with its node."""
+
+    def destroy(self) -> None:
+        """Leave the graph. Harmless when repeated."""
 
 
 _PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
@@ -53,7 +64,7 @@ class Node(NodeParameters):
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
         self._liveliness: Any = bus.session.liveliness().declare_token(str(self.token))
-        self._endpoints: list[Endpoint] = []
+        self._endpoints: list[OwnedEndpoint] = []
         self._timers: list[Timer] = []
         self._executions: list[Execution] = []
         self._logger = Logger(Rosout(self), logger_name(self))
@@ -98,7 +109,7 @@ class Node(NodeParameters):
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
+        return self.add_endpoint(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
 
     def create_subscription(
         self, msg_type: type[M], topic: str, callback: Callable[[M], Any], qos: QoS | int = 10
@@ -108,7 +119,9 @@ class Node(NodeParameters):
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos)))
+        return self.add_endpoint(
+            Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
+        )
 
     def create_timer(self, period_ns: int, callback: Callable[[], Any], *, autostart: bool = True) -> Timer:
         """Call back at multiples of a period [ns] of simulated time, first at the next one.
@@ -159,7 +172,7 @@ class Node(NodeParameters):
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Service(self, srv_type, self.resolve_name(name), callback))
+        return self.add_endpoint(Service(self, srv_type, self.resolve_name(name), callback))
 
     def create_client(self, srv_type: ServiceType, name: str) -> Client:
         """Return a client of a service.
@@ -167,7 +180,7 @@ class Node(NodeParameters):
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Client(self, srv_type, self.resolve_name(name)))
+        return self.add_endpoint(Client(self, srv_type, self.resolve_name(name)))
 
     def destroy_publisher(self, publisher: Publisher[Any]) -> bool:
         """Leave a topic; return whether it was this node's."""
@@ -197,11 +210,6 @@ class Node(NodeParameters):
     def remove_execution(self, execution: Execution) -> None:
         """Advance something no more."""
         _remove(self._executions, execution)
-
-    @property
-    def next_timer_ns(self) -> int | None:
-        """When the next timer is due [ns]; None without a running one."""
-        return min((timer.next_ns for timer in self._timers if not timer.is_canceled), default=None)
 
     def advertise_parameter_events(self) -> Publisher[ParameterEvent]:
         """Return the publisher of /parameter_events."""
@@ -255,11 +263,21 @@ class Node(NodeParameters):
         self._liveliness.undeclare()
         self.bus.forget(self)
 
-    def _add(self, endpoint: Any) -> Any:
+    @property
+    def wait_ns(self) -> int | None:
+        """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
+        if self.inbox:
+            return 0
+        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_canceled]
+        due += [_EXECUTION_NS] * bool(self._executions)
+        return max(0, min(due)) if due else None
+
+    def add_endpoint(self, endpoint: E) -> E:
+        """Own an endpoint: it leaves the graph with the node."""
         self._endpoints.append(endpoint)
         return endpoint
 
-    def _destroy(self, endpoint: Endpoint) -> bool:
+    def _destroy(self, endpoint: OwnedEndpoint) -> bool:
         if not _remove(self._endpoints, endpoint):
             return False
         endpoint.destroy()
