@@ -27,6 +27,7 @@ definitions: ChainMap[str, Any] = ChainMap(store.fielddefs, derived)
 """Constants and fields of all loaded types."""
 defaults: dict[str, dict[str, Value]] = {
     "geometry_msgs/msg/Quaternion": {"w": 1.0},
+    "sensor_msgs/msg/NavSatStatus": {"status": -2},
 }
 """Default values, which rosbags drops: type name -> field -> value."""
 
@@ -286,7 +287,7 @@ def _is_interface(name: str) -> bool:
 def _near(name: str) -> str:
     """Return the tail of a message about an unknown type, with the nearest names."""
     package, kind, _ = name.split("/")
-    known = [*names(), *(n for n in store.types if kind != "msg")]
+    known = names()
     same = [n for n in known if n.startswith(f"{package}/{kind}/")]
     return nearest(name, same) if same else nearest(package, {n.split("/")[0] for n in known})
 
