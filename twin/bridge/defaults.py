@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
 from twin.bridge.interface_values import Value
@@ -36,8 +37,8 @@ def new(cls: type[M], **fields: Any) -> M:
 def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
     """Return what makes each field's default."""
     values = types.defaults(msgtype)
-    fields = types.store.get_msgdef(msgtype).fields
-    return {name: _maker(description, values.get(name)) for name, description in fields}
+    fields = types.store.fielddefs[msgtype][1]
+    return {normalize_fieldname(name): _maker(description, values.get(name)) for name, description in fields}
 
 
 def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
@@ -56,7 +57,8 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
     if element[0] in STRINGS:
         texts = [""] * count if default is None else default
         return lambda: list(texts)  # type: ignore[arg-type]
-    numbers = np.array([0] * count if default is None else default, types.dtype_of(element[0]))
+    dtype = types.dtype_of(element[0])
+    numbers = np.zeros(count, dtype) if default is None else np.array(default, dtype)
     return lambda: numbers.copy()
 
 
