@@ -19,7 +19,7 @@ from twin.bridge import type_store
 from twin.bridge.interface_parser import Definition
 from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import FieldDefs, rihs01_of
-from twin.bridge.type_names import Parts, dds_name, parts
+from twin.bridge.type_names import Parts, dds_name, from_dds_name, parts
 from twin.bridge.type_store import add_folder, add_folders, store
 from twin.errors import BridgeError
 
@@ -174,6 +174,7 @@ __all__ = [
     "defaults",
     "definitions",
     "dtype_of",
+    "from_dds_name",
     "get",
     "names",
     "parts",
