@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from twin.bridge import types
 from twin.bridge.cdr_packed import (
+    check_end,
     decode_imu,
     decode_joint_state,
     decode_odometry,
@@ -201,6 +202,7 @@ def _decode_tf(payload: bytes) -> TFMessage:
         at += _POSE.size
         transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
         transforms.append(TransformStamped(Header(Time(sec, nanosec), frame), child, transform))
+    check_end(payload, at)
     return TFMessage(transforms)
 
 
@@ -227,6 +229,7 @@ def _decode_poses(payload: bytes) -> PoseArray:
         at += (4 - at) % 8
     if n * _POSE.size > len(payload) - at:
         raise ValueError(f"{n} poses do not fit")
+    check_end(payload, at + n * _POSE.size)
     values = unpack_from(f"<{7 * n}d", payload, at)
     poses = [
         Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
