@@ -47,7 +47,7 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
         cls = types.get(value)
         return lambda: new(cls)
     if node == Nodetype.BASE:
-        constant = _ZEROS.get(value[0], 0) if default is None else default
+        constant = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
         return lambda: constant
     (inner, element), length = value
     count = length if node == Nodetype.ARRAY else 0
@@ -58,8 +58,15 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
         texts = [""] * count if default is None else default
         return lambda: list(texts)  # type: ignore[arg-type]
     dtype = types.dtype_of(element[0])
-    numbers = np.zeros(count, dtype) if default is None else np.array(default, dtype)
+    numbers = np.zeros(count, dtype) if default is None else np.array(_signed(element[0], default), dtype)
     return lambda: numbers.copy()
+
+
+def _signed(base: str, value: Any) -> Any:
+    """Return a value as rosbags has it, for which a byte is a signed number."""
+    if base != "byte":
+        return value
+    return [_signed(base, item) for item in value] if isinstance(value, list) else (value + 128) % 256 - 128
 
 
 _ZEROS: dict[str, Value] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}

@@ -93,9 +93,7 @@ def _value(field: Field, value: Any, path: str, now_ns: int | None, deep: bool) 
     items = [_item(field, item, f"{path}[{i}]", now_ns, deep) for i, item in enumerate(value)]
     if field.message or field.base in STRINGS:
         return items
-    return np.array(
-        [item & 255 for item in items] if field.base == "byte" else items, types.dtype_of(field.base)
-    )
+    return np.array(items, types.dtype_of(field.base))
 
 
 def _item(field: Field, value: Any, path: str, now_ns: int | None, deep: bool) -> Any:

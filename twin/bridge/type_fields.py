@@ -60,7 +60,10 @@ def fields_of(typename: str) -> tuple[Field, ...]:
 
 @cache
 def array_types(typename: str) -> tuple[tuple[Callable[[Any], Any], np.dtype[Any]], ...]:
-    """Return how to read each array of numbers of a message, and its type; not those inside of sequences."""
+    """Return how to read each array of numbers of a message, and its type.
+
+    Not those inside of sequences, and not those of bytes, which may be signed or not.
+    """
     found = []
     for path, field in _arrays(typename):
         found.append((attrgetter(path), types.dtype_of(field.base)))
@@ -71,7 +74,7 @@ def _arrays(typename: str) -> Iterator[tuple[str, Field]]:
     for field in fields_of(typename):
         if field.message and not field.many:
             yield from ((f"{field.attribute}.{path}", inner) for path, inner in _arrays(field.message))
-        elif field.many and not field.message and field.base not in STRINGS:
+        elif field.many and not field.message and field.base not in (*STRINGS, "byte"):
             yield field.attribute, field
 
 
