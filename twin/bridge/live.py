@@ -31,6 +31,7 @@ class LiveBus:
 
     def __init__(self, bus: Bus, clock: Clock, *, use_sim_time: bool) -> None:
         self.bus = bus
+        bus.use_sim_time = use_sim_time
         self._clock = clock
         self._sim_time: SimTime | None = SimTime(bus) if use_sim_time else None
         self._advance()
