@@ -17,7 +17,8 @@ from twin.bridge.external import ExternalQueue
 from twin.bridge.node import Node
 from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
-from twin.bridge.wire_naming import Naming, Wire
+from twin.bridge.wire import Wire
+from twin.bridge.wire_naming import Naming
 from twin.bridge.wire_ros2dds import bridge_token
 from twin.errors import BridgeError
 
@@ -81,13 +82,13 @@ class Bus:
         return cls.of(config, clock, domain_id=domain_id)
 
     @classmethod
-    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int = 0) -> Self:
+    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int | None = None) -> Self:
         """Open a bus on a session of any configuration.
 
         Raises:
             BridgeError: an endpoint or the configuration's file cannot be used.
         """
-        naming = Naming(config.wire, domain_id)
+        naming = Naming(config.wire, config.domain_id if domain_id is None else domain_id)
         return cls(open_session(config), clock, naming, config.networked)
 
     def create_node(

@@ -17,9 +17,10 @@ from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
-from twin.bridge.session import SessionConfig, direct, names_endpoints
+from twin.bridge.session import SessionConfig, direct, endpoints
+from twin.bridge.wire import Wire
 from twin.bridge.wire_entrance import Entrance
-from twin.bridge.wire_naming import Interface, Wire
+from twin.bridge.wire_naming import Interface
 from twin.errors import BridgeError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -126,7 +127,11 @@ def join(
     """
     file = config or _path(os.environ.get("ZENOH_SESSION_CONFIG_URI"))
     if connect is None:
-        connect = () if listen or (file and names_endpoints(file)) else (DEFAULT_ENDPOINT,)
+        connect = (
+            ()
+            if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
+            else (DEFAULT_ENDPOINT,)
+        )
     session = SessionConfig(
         mode="peer" if listen else "client",
         wire=wire,

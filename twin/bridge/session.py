@@ -12,7 +12,7 @@ from typing import Any, Literal
 import xxhash
 import zenoh
 
-from twin.bridge.wire_naming import Wire
+from twin.bridge.wire import Wire
 from twin.errors import BridgeError
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
@@ -40,6 +40,8 @@ class SessionConfig:
     """How long a client tries to connect [s] of wall time."""
     wire: Wire = "rmw_zenoh"
     """How keys and tokens are spelled."""
+    domain_id: int = 0
+    """ROS_DOMAIN_ID."""
 
     @property
     def networked(self) -> bool:
@@ -68,15 +70,16 @@ def open_session(config: SessionConfig) -> zenoh.Session:
         ) from error
 
 
-def names_endpoints(file: Path) -> bool:
-    """Return whether a configuration names somebody to connect to, or where to listen.
+def endpoints(file: Path, key: Literal["listen", "connect"]) -> tuple[str, ...]:
+    """Return the endpoints that a configuration names, for whatever mode; not Zenoh's default ones.
 
     Raises:
         BridgeError: the file is no Zenoh configuration.
     """
-    config = _from_file(file)
-    connect = json.loads(config.get_json("connect/endpoints"))
-    return bool(connect) or json.loads(config.get_json("listen/endpoints")) != _default("listen/endpoints")
+    found = json.loads(_from_file(file).get_json(f"{key}/endpoints"))
+    if found == _default(f"{key}/endpoints"):
+        return ()
+    return tuple(found) if isinstance(found, list) else tuple(e for part in found.values() for e in part)
 
 
 _FORM = "An endpoint looks like tcp/127.0.0.1:7447"

@@ -8,15 +8,14 @@ Source: rmw_zenoh docs/design.md and its humble branch; zenoh-plugin-ros2dds liv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 from twin.bridge import wire_ros2dds
 from twin.bridge.keys import EndpointKind, topic_key
 from twin.bridge.qos import QoS
+from twin.bridge.wire import WIRES, Wire
 from twin.errors import BridgeError
 
-Wire = Literal["rmw_zenoh", "humble", "ros2dds"]
-WIRES: tuple[Wire, ...] = get_args(Wire)
 HUMBLE_HASH = "TypeHashNotSupported"
 
 
