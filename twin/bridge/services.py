@@ -169,12 +169,20 @@ class Client(Endpoint):
             else:
                 bus.external.push(Arrival(source, self, data))
 
+        answered: list[bool] = []
+
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
+                answered.append(True)
                 deliver((future, reply.ok.payload.to_bytes()))
 
+        def on_end() -> None:
+            # May run in any thread, the bus's own too: it must not overtake a reply that waits outside.
+            if not answered:
+                deliver((future, None))
+
         self._querier.get(
-            direct(on_reply, lambda: deliver((future, None))),
+            direct(on_reply, on_end),
             payload=self._requests.encode(request),
             attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
         )
