@@ -25,6 +25,8 @@ from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
+    from twin.bridge.session import SessionConfig
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
@@ -148,6 +150,7 @@ def run(
     record: bool = True,
     pace: float | None = None,
     listen: Sequence[str] = (),
+    network: SessionConfig | None = None,
     bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -161,6 +164,7 @@ def run(
         pace: Simulated seconds per second; None is as fast as possible. Changes no result.
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`; they make the run
             non-deterministic, and the verdict says so.
+        network: How else the bus takes part in a network, instead of `listen`.
         bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
@@ -173,7 +177,7 @@ def run(
     taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
     bag_tap = None if bag is None else BagTap(bag)
     bag_taps = [] if bag_tap is None else [bag_tap.on_sample]
-    parts = build(scenario, taps=[*taps, *bag_taps], listen=listen, crash_folder=out)
+    parts = build(scenario, taps=[*taps, *bag_taps], listen=listen, network=network, crash_folder=out)
     try:
         if bag_tap is not None:
             parts.bus.arrival_taps.append(bag_tap.on_arrival)
@@ -184,7 +188,7 @@ def run(
             sink.declare(parts.world)
         warm_up()
         wall, cpu = _loop(simulation, pace, progress)
-        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not listen)
+        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not parts.bus.networked)
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
@@ -245,6 +249,11 @@ def _loop(
     return elapsed
 
 
+def _refused(bus: Bus) -> dict[str, float]:
+    """Return how much from outside was not delivered, by reason; nothing without a network."""
+    return {f"refused_{reason.replace(' ', '_')}": float(n) for reason, n in sorted(bus.refused.items())}
+
+
 def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
@@ -260,6 +269,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, det
             "cpu_time_s": cpu,
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
+            **_refused(simulation.bus),
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=deterministic,

@@ -30,6 +30,11 @@ class Period:
     sec: int = 9223372036
     nsec: int = 854775807
 
+    @classmethod
+    def of(cls, time_ns: int) -> Period:
+        """Return a duration [ns]."""
+        return cls(*divmod(time_ns, 1_000_000_000))
+
 
 INFINITE = Period()
 """RMW_DURATION_INFINITE."""
@@ -55,7 +60,14 @@ class OfferedQoS:
     def of(cls, qos: QoS) -> OfferedQoS:
         """Return the profile of one of our publishers."""
         return cls(
-            history="keep_last", depth=qos.depth, reliability=qos.reliability, durability=qos.durability
+            history=qos.history,
+            depth=qos.depth,
+            reliability=qos.reliability,
+            durability=qos.durability,
+            deadline=Period.of(qos.deadline_ns),
+            lifespan=Period.of(qos.lifespan_ns),
+            liveliness=qos.liveliness,
+            liveliness_lease_duration=Period.of(qos.lease_ns),
         )
 
     @property

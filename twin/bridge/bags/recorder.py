@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-import zenoh
-
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.topic_choice import TopicChoice
@@ -181,7 +179,5 @@ class _Ear(RawSubscription):
         self._recorder = recorder
         super().__init__(node, topic, lambda sample: None, _HISTORY)
 
-    def _on_sample(self, sample: zenoh.Sample) -> None:
-        data = self._parse(sample)
-        if data is not None:
-            self._recorder.hear(data)
+    def _take(self, data: RawSample) -> None:
+        self._recorder.hear(data)

@@ -16,7 +16,7 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.node import Node
-from twin.bridge.raw import RawPublisher
+from twin.bridge.raw_publisher import RawPublisher
 from twin.bridge.topics import Sample
 from twin.errors import BridgeError, RecordingError
 
