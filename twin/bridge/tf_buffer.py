@@ -20,7 +20,7 @@ from twin.bridge.tf_errors import (
     TransformTimeoutError,
     UnknownFrameError,
 )
-from twin.bridge.tf_math import IDENTITY, Rigid, as_from_matrix, compose, inverse, rigid
+from twin.bridge.tf_math import IDENTITY, Rigid, as_from_matrix, compose, inverse, normalized, rigid
 from twin.bridge.tf_walk import latest_common, solve
 from twin.geometry import Pose2, Pose3
 
@@ -207,7 +207,7 @@ class TransformBuffer:
         self._check(target, source, fixed)
         T_fixed_source, _ = self._lookup(fixed, source, source_time_ns)
         T_target_fixed, time_ns = self._lookup(target, fixed, target_time_ns)
-        return as_from_matrix(compose(T_target_fixed, T_fixed_source)), time_ns
+        return as_from_matrix(compose(normalized(T_target_fixed), T_fixed_source)), time_ns
 
     def _lookup(self, target: str, source: str, time_ns: int | None) -> tuple[Rigid, int]:
         """Take the remembered path if parents do not depend on the time, else walk as tf2 does."""
@@ -254,6 +254,7 @@ class TransformBuffer:
                 raise UnknownFrameError(f"the frame {name!r} is not in the transform tree; it has: {valid}")
 
     def _find_path(self, target: str, source: str) -> _Path | None:
+        """Return the way that every look-up takes, None if there is none or a loop."""
         up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in down), None)
         if common is None or target == source:
@@ -263,10 +264,12 @@ class TransformBuffer:
         return below, opposite, tuple(cache for cache in (*below, *opposite) if not cache.static)
 
     def _ancestors(self, frame: str) -> list[str]:
-        """Return the frame and its ancestors; a loop ends where it closes."""
+        """Return the frame and its ancestors; none if they form a loop."""
         names = [frame]
         cache = self.frames.get(frame)
-        while cache is not None and cache.parent not in names:
+        while cache is not None:
+            if cache.parent in names:
+                return []
             names.append(cache.parent)
             cache = self.frames.get(cache.parent)
         return names

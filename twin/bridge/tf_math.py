@@ -52,8 +52,9 @@ def interpolate(a: Rigid, b: Rigid, ratio: float) -> Rigid:
     bx, by, bz, bw, bi, bj, bk = b
     rest = 1.0 - ratio
     x, y, z = rest * ax + ratio * bx, rest * ay + ratio * by, rest * az + ratio * bz
-    dot = aw * bw + ai * bi + aj * bj + ak * bk
-    length2 = (aw * aw + ai * ai + aj * aj + ak * ak) * (bw * bw + bi * bi + bj * bj + bk * bk)
+    # In tf2's order of adding: of rotations that are nearly the same, the last bit decides.
+    dot = ai * bi + aj * bj + ak * bk + aw * bw
+    length2 = (ai * ai + aj * aj + ak * ak + aw * aw) * (bi * bi + bj * bj + bk * bk + bw * bw)
     angle = math.acos(min(1.0, abs(dot) / math.sqrt(length2)))
     if angle == 0.0:
         return x, y, z, aw, ai, aj, ak
@@ -64,13 +65,18 @@ def interpolate(a: Rigid, b: Rigid, ratio: float) -> Rigid:
     return x, y, z, wa * aw + wb * bw, wa * ai + wb * bi, wa * aj + wb * bj, wa * ak + wb * bk
 
 
+def normalized(a: Rigid) -> Rigid:
+    """Return the same motion with a unit quaternion."""
+    x, y, z, w, i, j, k = a
+    norm = math.sqrt(w * w + i * i + j * j + k * k)
+    return x, y, z, w / norm, i / norm, j / norm, k / norm
+
+
 def as_from_matrix(a: Rigid) -> Rigid:
     """Return the same motion with the unit quaternion that tf2 reads out of a rotation matrix.
 
     Of q and -q it is the one whose w, or the largest other component if w² <= 1/4, is positive.
     """
-    x, y, z, w, i, j, k = a
-    norm = math.sqrt(w * w + i * i + j * j + k * k)
-    w, i, j, k = w / norm, i / norm, j / norm, k / norm
+    x, y, z, w, i, j, k = normalized(a)
     leading = w if w * w > 0.25 else max((i, j, k), key=abs)
     return (x, y, z, w, i, j, k) if leading >= 0.0 else (x, y, z, -w, -i, -j, -k)

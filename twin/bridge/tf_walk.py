@@ -77,8 +77,12 @@ def extrapolation(cache: FrameCache, time_ns: int, target: str, source: str) -> 
     if not cache.stamps:
         return ExtrapolationError(f"{edge} has no samples any more; {asked}{wanted}")
     first, last = cache.stamps[0], cache.stamps[-1]
-    known = f"from {seconds(first)} s to {seconds(last)} s" if first != last else f"only at {seconds(first)} s"
-    gap, side = (first - time_ns, "before the first") if time_ns < first else (time_ns - last, "after the last")
+    known = (
+        f"from {seconds(first)} s to {seconds(last)} s" if first != last else f"only at {seconds(first)} s"
+    )
+    gap, side = (
+        (first - time_ns, "before the first") if time_ns < first else (time_ns - last, "after the last")
+    )
     return ExtrapolationError(f"{edge} is known {known}; {asked}, {seconds(gap)} s {side}{wanted}")
 
 
