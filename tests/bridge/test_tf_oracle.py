@@ -1,4 +1,4 @@
-"""The buffer beside the real tf2: look-ups it answered once (tests/oracles/tf2_goldens.json), and fresh ones."""
+"""The buffer beside the real tf2: look-ups that it gave once (tests/oracles/tf2_goldens.json), and now."""
 
 from __future__ import annotations
 

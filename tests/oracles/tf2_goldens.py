@@ -84,8 +84,8 @@ def tree(rng, prefix, frames, static_share, common=None):
             steps.append(["set", parent, names[i], rng.choice((0, common[0])), pose(rng), True])
             continue
         own = rng.choice((common, stamps(rng, rng.randrange(2, 7))))
-        for stamp in own:
-            steps.append(["set", parent, names[i], stamp, pose(rng, rng.choice((0.2, math.pi))), False])
+        spread = rng.choice((0.2, math.pi))
+        steps += [["set", parent, names[i], stamp, pose(rng, spread), False] for stamp in own]
         known += own
     return steps, names, known or common
 
@@ -98,7 +98,7 @@ def trees(rng):
         for _ in range(3):
             steps.append(["can", rng.choice(names), rng.choice(names), some_time(rng, known)])
             steps.append(["common", rng.choice(names), rng.choice(names)])
-        yield "tree %d" % number, steps
+        yield f"tree {number}", steps
 
 
 def two_times(rng):
@@ -111,7 +111,7 @@ def two_times(rng):
         steps.append(["can_full", names[0], known[0], names[-1], known[-1], names[0]])
         steps.append(["full", names[0], known[0], "nobody", known[0], names[0]])
         steps.append(["full", names[0], known[0], names[1], known[0], "nobody"])
-        yield "two times %d" % number, steps
+        yield f"two times {number}", steps
 
 
 def forests(rng):
@@ -126,27 +126,25 @@ def forests(rng):
             )
         for name in ("nobody", "", "/a0"):
             steps += [["lookup", name, name, 0], ["lookup", name, name, 5 * S], ["can", "a0", name, 0]]
-        yield "forest %d" % number, steps
+        yield f"forest {number}", steps
 
 
 def evicted(rng):
     for number in range(3):
         start = 200 * S
-        steps = []
-        for i in range(30):
-            steps.append(["set", "odom", "base", start + i * S // 2, pose(rng), False])
+        steps = [["set", "odom", "base", start + i * S // 2, pose(rng), False] for i in range(30)]
         last = start + 29 * S // 2
-        for time in (last - 10 * S, last - 10 * S - 1, last - 10 * S + 1, last - 12 * S, start, last, 0):
-            steps.append(["lookup", "odom", "base", time])
+        times = last - 10 * S, last - 10 * S - 1, last - 10 * S + 1, last - 12 * S, start, last, 0
+        steps += [["lookup", "odom", "base", time] for time in times]
         steps.append(["set", "odom", "base", last - 10 * S - 1, pose(rng), False])
         steps.append(["set", "odom", "base", last - 9 * S - 7, pose(rng), False])
-        for time in (last - 9 * S - 7, last - 9 * S - 8, last - 10 * S - 1):
-            steps.append(["lookup", "odom", "base", time])
+        times = last - 9 * S - 7, last - 9 * S - 8, last - 10 * S - 1
+        steps += [["lookup", "odom", "base", time] for time in times]
         jump = last + rng.randrange(9 * S, 12 * S)
         steps.append(["set", "odom", "base", jump, pose(rng), False])
-        for time in (last, jump, jump - 10 * S, jump - S, jump - 10 * S - 1):
-            steps.append(["lookup", "base", "odom", time])
-        yield "evicted %d" % number, steps
+        times = last, jump, jump - 10 * S, jump - S, jump - 10 * S - 1
+        steps += [["lookup", "base", "odom", time] for time in times]
+        yield f"evicted {number}", steps
 
 
 def disorder(rng):
@@ -158,7 +156,7 @@ def disorder(rng):
             steps.append(["lookup", "odom", "base", stamp])
         for _ in range(8):
             steps.append(["lookup", "base", "odom", some_time(rng, known)])
-        yield "out of order and repeated %d" % number, steps
+        yield f"out of order and repeated {number}", steps
 
 
 def reparented(rng):
@@ -167,7 +165,7 @@ def reparented(rng):
         steps = [["set", "world", "a", 0, pose(rng), True]]
         steps += [["set", "world", "b", stamp, pose(rng), False] for stamp in known]
         halves = known[:5], known[5:]
-        for parent, half in zip(rng.sample(("a", "b", "other"), 2), halves):
+        for parent, half in zip(rng.sample(("a", "b", "other"), 2), halves, strict=False):
             steps += [["set", parent, "cup", stamp, pose(rng), False] for stamp in half]
         steps += [["set", "cup", "tea", stamp, pose(rng), False] for stamp in known]
         for _ in range(16):
@@ -177,7 +175,7 @@ def reparented(rng):
         for _ in range(4):
             times = [rng.choice(known), rng.choice(known)]
             steps.append(["full", "tea", times[0], "tea", times[1], rng.choice(("world", "a", "b"))])
-        yield "another parent %d" % number, steps
+        yield f"another parent {number}", steps
 
 
 def single(rng):
@@ -193,7 +191,7 @@ def single(rng):
             steps.append(["lookup", "map", "laser", time])
             steps.append(["lookup", "laser", "odom", time])
             steps.append(["can", "map", "odom", time])
-        yield "one sample %d" % number, steps
+        yield f"one sample {number}", steps
 
 
 def loops(rng):
@@ -239,7 +237,7 @@ def rotations(rng):
     """Nearly the same, nearly opposite, q and -q, rounded by hand, refused."""
     steps, names = [], []
     for i, turn in enumerate((0.0, 1e-9, 3e-8, 1e-6, 1e-3, math.pi - 1e-9, math.pi, 2 * math.pi - 1e-7)):
-        name = "turn%d" % i
+        name = f"turn{i}"
         names.append(name)
         q = quaternion(rng)
         half = turn / 2
@@ -268,8 +266,8 @@ def rotations(rng):
         steps += [["lookup", *frames, time] for time in (10 * S, 10 * S + 123_456_789, 11 * S, 12 * S, 0)]
         steps.append(["full", frames[0], 10 * S, frames[1], 11 * S, "world"])
     for i, q in enumerate(((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.02), (0.0, 0.0, float("nan"), 1.0))):
-        steps.append(["set", "world", "bad%d" % i, 10 * S, [0.0, 0.0, 0.0, *q], False])
-        steps.append(["lookup", "world", "bad%d" % i, 10 * S])
+        steps.append(["set", "world", f"bad{i}", 10 * S, [0.0, 0.0, 0.0, *q], False])
+        steps.append(["lookup", "world", f"bad{i}", 10 * S])
     for frames in (("world", "world"), ("", "child"), ("world", ""), ("/world", "/slash")):
         steps.append(["set", *frames, 10 * S, pose(rng), False])
         steps.append(["lookup", "world", frames[1].strip("/") or "child", 10 * S])
@@ -348,7 +346,7 @@ def main():
             tf2 = Tf2()
             cases.append({"name": name, "steps": steps, "gave": [tf2.do(step) for step in steps]})
     lines = ",\n".join(json.dumps(case, separators=(",", ":")) for case in cases)
-    text = '{"seed":%d,"tf2":"0.7.6","cases":[\n%s\n]}\n' % (arguments.seed, lines)
+    text = f'{{"seed":{arguments.seed},"tf2":"0.7.6","cases":[\n{lines}\n]}}\n'
     if arguments.output == "-":
         sys.stdout.write(text)
     else:

@@ -179,7 +179,7 @@ class TransformBuffer:
         return Pose2(x, y, math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)))
 
     def lookup_stamped(self, target: str, source: str, time_ns: int | None = None) -> tuple[Rigid, int]:
-        """Return `lookup` as numbers, and the time [ns] that it is of: 0 if all transforms between are static.
+        """Return `lookup` as numbers, and the time [ns] that it is of: 0 if all between are static.
 
         Raises:
             TransformError: as `lookup`.
