@@ -14,7 +14,7 @@ from twin.bridge import names
 from twin.bridge.clock import Clock
 from twin.bridge.external import ExternalQueue
 from twin.bridge.node import Node
-from twin.bridge.session import open_session
+from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
 from twin.errors import BridgeError
 
@@ -67,9 +67,18 @@ class Bus:
         Raises:
             BridgeError: an endpoint cannot be used.
         """
-        networked = bool(listen or connect)
-        name = session or ("" if networked else "twin")
-        return cls(open_session(name, listen, connect), clock, domain_id, networked)
+        name = session or ("" if listen or connect else "twin")
+        config = SessionConfig(listen=tuple(listen), connect=tuple(connect), name=name)
+        return cls.of(config, clock, domain_id=domain_id)
+
+    @classmethod
+    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int = 0) -> Self:
+        """Open a bus on a session of any configuration.
+
+        Raises:
+            BridgeError: an endpoint or the configuration's file cannot be used.
+        """
+        return cls(open_session(config), clock, domain_id, config.networked)
 
     def create_node(
         self,

@@ -39,6 +39,7 @@ class ExternalQueue:
         self._arrivals: deque[Arrival] = deque()
         self._depth = depth
         self._lock = threading.Lock()
+        self._arrived = threading.Event()
         self._to_report: list[str] = []
         self._reported: set[tuple[str, str]] = set()
 
@@ -46,6 +47,14 @@ class ExternalQueue:
     def waiting(self) -> int:
         """How much the next `drain` returns."""
         return len(self._arrivals)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for something to arrive, at most so long [s] of wall time; return whether something did."""
+        return self._arrived.wait(timeout_s)
+
+    def wake(self) -> None:
+        """End a `wait` although nothing was queued; called in any thread."""
+        self._arrived.set()
 
     def push(self, arrival: Arrival) -> None:
         """Queue; called in any thread."""
@@ -56,6 +65,7 @@ class ExternalQueue:
                 self._refuse(
                     "overflow", dropped.receiver.name, f"more than {self._depth} samples in one tick"
                 )
+        self._arrived.set()
 
     def refuse(self, reason: str, name: str, detail: str) -> None:
         """Count something that cannot be delivered; the first of its kind is logged. Called in any thread."""
@@ -64,6 +74,7 @@ class ExternalQueue:
 
     def drain(self) -> list[Arrival]:
         """Return what has arrived, sorted by (topic, source, sequence), and log what was refused."""
+        self._arrived.clear()
         with self._lock:
             arrivals, self._arrivals = self._arrivals, deque()
             reports, self._to_report = self._to_report, []

@@ -11,13 +11,12 @@ from typing import Literal, NamedTuple
 
 import xxhash
 
-from twin.bridge.qos import QoS
+from twin.bridge.qos import RMW_DEFAULT_DEPTH, QoS
 
 EndpointKind = Literal["MP", "MS", "SS", "SC"]
 """Message publisher, message subscription, service server, service client."""
 
 _ATTACHMENT = Struct("<qqB16s")
-_DEFAULT_DEPTH = 42
 
 
 class Attachment(NamedTuple):
@@ -53,7 +52,7 @@ def qos_string(qos: QoS) -> str:
     """Return a QoS as tokens spell it; what equals the default (reliable, volatile, depth 42) is empty."""
     reliability = "2" if qos.reliability == "best_effort" else ""
     durability = "1" if qos.durability == "transient_local" else ""
-    depth = "" if qos.depth == _DEFAULT_DEPTH else str(qos.depth)
+    depth = "" if qos.depth == RMW_DEFAULT_DEPTH else str(qos.depth)
     return f"{reliability}:{durability}:,{depth}:,:,:,,"
 
 
@@ -93,3 +92,8 @@ class NodeToken:
 def mangle(name: str) -> str:
     """Return a name as one chunk of a key: '/' becomes '%'."""
     return name.replace("/", "%")
+
+
+def demangle(chunk: str) -> str:
+    """Return the name of which `mangle` made a chunk."""
+    return chunk.replace("%", "/")

@@ -12,7 +12,7 @@ from twin.bridge.logger import Logger
 from twin.bridge.parameters import Parameter, Parameters
 from twin.bridge.qos import QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
-from twin.bridge.topics import Endpoint, Publisher, Subscription
+from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
 
@@ -20,6 +20,17 @@ if TYPE_CHECKING:
     from twin.bridge.bus import Bus
 
 M = TypeVar("M")
+E = TypeVar("E", bound="OwnedEndpoint")
+
+_EXECUTION_NS = 10_000_000
+"""How often actions go on in a process that runs by the wall clock [ns]."""
+
+
+class OwnedEndpoint(Protocol):
+    """What leaves the graph with its node."""
+
+    def destroy(self) -> None:
+        """Leave the graph. Harmless when repeated."""
 
 
 class Execution(Protocol):
@@ -51,6 +62,11 @@ class Timer:
         """Fire no more, until reset."""
         self._cancelled = True
 
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether it fires no more."""
+        return self._cancelled
+
     def run(self, now_ns: int) -> None:
         """Call back if due."""
         if now_ns >= self.next_ns and not self._cancelled:
@@ -79,7 +95,7 @@ class Node:
         self._names = names.Resolver(self.namespace, self.name, remappings)
         self._parameters = Parameters(self.fully_qualified_name, parameters)
         self._liveliness: Any = bus.session.liveliness().declare_token(str(self.token))
-        self._endpoints: list[Endpoint] = []
+        self._endpoints: list[OwnedEndpoint] = []
         self._timers: list[Timer] = []
         self._executions: list[Execution] = []
         self._logger = Logger(self)
@@ -112,7 +128,7 @@ class Node:
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
+        return self.add_endpoint(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
 
     def create_subscription(
         self, msg_type: type[M], topic: str, callback: Callable[[M], Any], qos: QoS | int = 10
@@ -122,7 +138,9 @@ class Node:
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos)))
+        return self.add_endpoint(
+            Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
+        )
 
     def create_timer(self, period_ns: int, callback: Callable[[], Any]) -> Timer:
         """Call back at multiples of a period [ns] of simulated time, first at the next one.
@@ -152,7 +170,7 @@ class Node:
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Service(self, srv_type, self.resolve_name(name), callback))
+        return self.add_endpoint(Service(self, srv_type, self.resolve_name(name), callback))
 
     def create_client(self, srv_type: ServiceType, name: str) -> Client:
         """Return a client of a service.
@@ -160,7 +178,7 @@ class Node:
         Raises:
             BridgeError: an invalid name.
         """
-        return self._add(Client(self, srv_type, self.resolve_name(name)))
+        return self.add_endpoint(Client(self, srv_type, self.resolve_name(name)))
 
     def declare_parameter(self, name: str, default: Any) -> Parameter:
         """Declare a parameter; the value given at the node's creation goes before the default.
@@ -230,6 +248,16 @@ class Node:
             self._liveliness = None
         self.bus.forget(self)
 
-    def _add(self, endpoint: Any) -> Any:
+    @property
+    def wait_ns(self) -> int | None:
+        """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
+        if self.inbox:
+            return 0
+        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_cancelled]
+        due += [_EXECUTION_NS] * bool(self._executions)
+        return max(0, min(due)) if due else None
+
+    def add_endpoint(self, endpoint: E) -> E:
+        """Own an endpoint: it leaves the graph with the node."""
         self._endpoints.append(endpoint)
         return endpoint

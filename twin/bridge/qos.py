@@ -22,6 +22,8 @@ class QoS:
             raise ValueError(f"a QoS depth of {self.depth}; valid is 1 or more")
 
 
+RMW_DEFAULT_DEPTH = 42
+"""rmw_zenoh's, which tokens leave out."""
 SENSOR_DATA = QoS(depth=5, reliability="best_effort")
 """rclpy's qos_profile_sensor_data."""
 LATCHED = QoS(depth=1, durability="transient_local")
@@ -31,3 +33,14 @@ LATCHED = QoS(depth=1, durability="transient_local")
 def as_qos(qos: QoS | int) -> QoS:
     """Return a QoS; a number is the depth of a reliable, volatile one, as in rclpy."""
     return QoS(depth=qos) if isinstance(qos, int) else qos
+
+
+def parse_qos(text: str) -> QoS:
+    """Return the QoS that a token spells; what it leaves out or spells otherwise is rmw_zenoh's default."""
+    reliability, durability, history, *_ = (*text.split(":"), "", "", "")
+    depth = history.rpartition(",")[2]
+    return QoS(
+        depth=int(depth) if depth.isdecimal() and int(depth) > 0 else RMW_DEFAULT_DEPTH,
+        reliability="best_effort" if reliability == "2" else "reliable",
+        durability="transient_local" if durability == "1" else "volatile",
+    )

@@ -60,6 +60,14 @@ def dds_name(typename: str) -> str:
     return f"{package}::{kind}::dds_::{name}_"
 
 
+def from_dds_name(name: str) -> str | None:
+    """Return the type of which `dds_name` made a name, or None if it is of another form."""
+    package, _, tail = name.partition("::")
+    kind, _, plain = tail.partition("::dds_::")
+    full = f"{package}/{kind}/{plain.removesuffix('_')}"
+    return full if _NAME.fullmatch(full) and plain.endswith("_") else None
+
+
 def register(typename: str, text: str) -> None:
     """Make a type known by its definition, as in a .msg, .srv or .action file; types it uses may come later.
 

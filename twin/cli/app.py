@@ -8,6 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
+from twin.cli.ros import topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -33,12 +34,18 @@ _COMMANDS = (
     ("robots", robots.robots, "twin robots"),
 )
 
+_GROUPS = (("topic", topic.app),)
+
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
 
 for _name, _function, _example in _COMMANDS:
     app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in _NEED_ARGUMENTS)(
         _function
     )
+
+
+for _name, _group in _GROUPS:
+    app.add_typer(_group, name=_name)
 
 
 @app.callback()

@@ -1,0 +1,51 @@
+"""A graph in another process, and commands that talk to it."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+GRAPH = Path(__file__).with_name("some_graph.py")
+
+Twin = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """A process with some nodes (some_graph.py), and where it listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    with subprocess.Popen(
+        [sys.executable, str(GRAPH), address], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        yield address
+        process.communicate()  # closes its input: it ends
+    assert process.returncode == 0
+
+
+@pytest.fixture
+def twin(endpoint: str) -> Twin:
+    """Run `twin …` in a process of its own, connected to the graph."""
+
+    def run(*arguments: str, timeout: float = 30.0) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "twin.cli", *arguments, "--connect", endpoint]
+        return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+
+    return run
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
+    """Poll for what another process does."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, "the other process did nothing"
+        time.sleep(0.005)

@@ -1,0 +1,198 @@
+"""Who is there: the nodes and endpoints of a ROS graph, from rmw_zenoh's liveliness tokens."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self, cast, get_args
+
+from twin.bridge import types
+from twin.bridge.keys import EndpointKind, demangle, gid
+from twin.bridge.qos import QoS, parse_qos
+from twin.bridge.session import direct
+
+if TYPE_CHECKING:
+    import zenoh
+
+    from twin.bridge.bus import Bus
+
+_TIMEOUT_S = 2.0
+_ACTION = "/_action/"
+
+
+@dataclass(frozen=True, order=True)
+class NodeInfo:
+    """A node of the graph."""
+
+    namespace: str
+    """'/' or '/robot'."""
+    name: str
+    session_id: str
+    """Of its Zenoh session, hexadecimal."""
+    node_id: str
+    """Unique in the session."""
+
+    @property
+    def full_name(self) -> str:
+        """Namespace and name: '/robot/amcl'."""
+        return f"{self.namespace.rstrip('/')}/{self.name}"
+
+
+@dataclass(frozen=True)
+class EndpointInfo:
+    """A publisher, subscription, service server or service client of the graph."""
+
+    node: NodeInfo
+    kind: EndpointKind
+    name: str
+    """Absolute name of the topic or service."""
+    type: str
+    """'geometry_msgs/msg/Twist'; as it was on the wire if it is no ROS 2 name."""
+    type_hash: str
+    """'RIHS01_<64 hex>'."""
+    qos: QoS
+    gid: bytes
+    """16 bytes."""
+
+
+def is_hidden(name: str) -> bool:
+    """Return whether `ros2` lists leave a name out: a part of it begins with _."""
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+def parse_token(token: str) -> NodeInfo | EndpointInfo | None:
+    """Return what a token declares, None if it is of another form; more fields, as in Lyrical, are ignored.
+
+    Source: rmw_zenoh liveliness_utils.cpp.
+    """
+    parts = token.split("/")
+    if len(parts) < 9 or parts[0] != "@ros2_lv":
+        return None
+    _, _, session_id, node_id, _, kind, _, namespace, name = parts[:9]
+    node = NodeInfo(demangle(namespace), name, session_id, node_id)
+    if kind == "NN":
+        return node
+    if kind not in get_args(EndpointKind) or len(parts) < 13:
+        return None
+    topic, dds_name, type_hash, qos = parts[9:13]
+    return EndpointInfo(
+        node,
+        cast(EndpointKind, kind),
+        demangle(topic),
+        types.from_dds_name(dds_name) or dds_name,
+        type_hash,
+        parse_qos(qos),
+        gid(token),
+    )
+
+
+class Graph:
+    """The nodes and endpoints that are alive, sorted by name."""
+
+    def __init__(self, tokens: Iterable[str] = ()) -> None:
+        self._lock = threading.Lock()
+        self._known: dict[str, NodeInfo | EndpointInfo] = {}
+        self._subscriber: Any = None
+        self.changes = 0
+        """How often something came or went."""
+        for token in tokens:
+            self._add(token)
+
+    @classmethod
+    def snapshot(cls, bus: Bus) -> Self:
+        """Return the graph as it is now, the bus's own nodes included."""
+        replies = bus.session.liveliness().get(f"@ros2_lv/{bus.domain_id}/**", timeout=_TIMEOUT_S)
+        return cls(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
+    @classmethod
+    def watch(cls, bus: Bus) -> Self:
+        """Return a graph that is kept up to date until `close`; each change ends a wait of the bus."""
+        graph = cls()
+
+        def on_change(sample: zenoh.Sample) -> None:
+            (graph._add if str(sample.kind).endswith("PUT") else graph._remove)(str(sample.key_expr))
+            bus.external.wake()
+
+        graph._subscriber = bus.session.liveliness().declare_subscriber(
+            f"@ros2_lv/{bus.domain_id}/**", direct(on_change), history=True
+        )
+        return graph
+
+    def close(self) -> None:
+        """Watch no more. Harmless when repeated."""
+        if self._subscriber is not None:
+            self._subscriber.undeclare()
+            self._subscriber = None
+
+    @property
+    def nodes(self) -> tuple[NodeInfo, ...]:
+        """Of all nodes, those included of which only endpoints were seen."""
+        known = self._all()
+        found = {item if isinstance(item, NodeInfo) else item.node for item in known}
+        return tuple(sorted(found))
+
+    @property
+    def endpoints(self) -> tuple[EndpointInfo, ...]:
+        """Sorted by name, node and kind."""
+        found = [item for item in self._all() if isinstance(item, EndpointInfo)]
+        return tuple(sorted(found, key=lambda e: (e.name, e.node, e.kind, e.gid)))
+
+    def publishers(self, name: str) -> tuple[EndpointInfo, ...]:
+        """Return who publishes a topic."""
+        return self._of("MP", name)
+
+    def subscriptions(self, name: str) -> tuple[EndpointInfo, ...]:
+        """Return who subscribes to a topic."""
+        return self._of("MS", name)
+
+    def servers(self, name: str) -> tuple[EndpointInfo, ...]:
+        """Return who offers a service."""
+        return self._of("SS", name)
+
+    def clients(self, name: str) -> tuple[EndpointInfo, ...]:
+        """Return who uses a service."""
+        return self._of("SC", name)
+
+    def topics(self) -> dict[str, tuple[str, ...]]:
+        """Return the types of every topic, hidden ones (a part of the name begins with _) included."""
+        return self._types("MP", "MS")
+
+    def services(self) -> dict[str, tuple[str, ...]]:
+        """Return the types of every service that is offered, those of actions and hidden ones included."""
+        return self._types("SS")
+
+    def actions(self) -> dict[str, tuple[str, ...]]:
+        """Return the types of every action that somebody offers or uses."""
+        suffix = f"{_ACTION}send_goal"
+        found: dict[str, set[str]] = {}
+        for endpoint in self.endpoints:
+            if endpoint.name.endswith(suffix):
+                types_ = found.setdefault(endpoint.name.removesuffix(suffix), set())
+                types_.add(endpoint.type.removesuffix("_SendGoal"))
+        return {name: tuple(sorted(types_)) for name, types_ in sorted(found.items())}
+
+    def _all(self) -> list[NodeInfo | EndpointInfo]:
+        with self._lock:
+            return list(self._known.values())
+
+    def _of(self, kind: EndpointKind, name: str) -> tuple[EndpointInfo, ...]:
+        return tuple(e for e in self.endpoints if e.kind == kind and e.name == name)
+
+    def _types(self, *kinds: EndpointKind) -> dict[str, tuple[str, ...]]:
+        found: dict[str, set[str]] = {}
+        for endpoint in self.endpoints:
+            if endpoint.kind in kinds:
+                found.setdefault(endpoint.name, set()).add(endpoint.type)
+        return {name: tuple(sorted(types_)) for name, types_ in found.items()}
+
+    def _add(self, token: str) -> None:
+        item = parse_token(token)
+        if item is not None:
+            with self._lock:
+                self._known[token] = item
+                self.changes += 1
+
+    def _remove(self, token: str) -> None:
+        with self._lock:
+            self.changes += self._known.pop(token, None) is not None

@@ -1,0 +1,86 @@
+"""The options by which every ros2-like command finds the graph it talks to."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from twin.bridge.live import LiveBus
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joining:
+    """Which graph a command joins, and how."""
+
+    connect: tuple[str, ...] | None
+    config: Path | None
+    domain_id: int | None
+    use_sim_time: bool
+
+    @contextmanager
+    def open(self) -> Iterator[LiveBus]:
+        """Join; raises BridgeError if nobody is there."""
+        from twin.bridge import live
+
+        with live.join(
+            self.connect, config=self.config, domain_id=self.domain_id, use_sim_time=self.use_sim_time
+        ) as process:
+            yield process
+
+
+def _options(
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Where a run or a router listens.",
+            show_default="tcp/127.0.0.1:7447",
+        ),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            envvar="ZENOH_SESSION_CONFIG_URI",
+            exists=True,
+            dir_okay=False,
+            help="Zenoh configuration.",
+        ),
+    ] = None,
+    domain: Annotated[
+        int | None, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.")
+    ] = None,
+    use_sim_time: Annotated[
+        bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
+    ] = False,
+) -> Joining:
+    return Joining(
+        connect=tuple(connect) if connect else None,
+        config=config,
+        domain_id=domain,
+        use_sim_time=use_sim_time,
+    )
+
+
+def joins(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
+    shared = inspect.signature(_options, eval_str=True).parameters
+    own = inspect.signature(command, eval_str=True)
+
+    @functools.wraps(command)
+    def wrapper(**given: Any) -> None:
+        joining = _options(**{name: given.pop(name) for name in shared})
+        command(**given, joining=joining)
+
+    parameters = [*(own.parameters[name] for name in own.parameters if name != "joining"), *shared.values()]
+    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return wrapper
