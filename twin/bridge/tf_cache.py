@@ -18,8 +18,8 @@ class FrameCache:
     def __init__(self, child: str, static: bool) -> None:
         self.child = child
         self.static = static
-        self.authority = UNKNOWN_AUTHORITY
-        """Who broadcast last."""
+        self.authority: object = UNKNOWN_AUTHORITY
+        """Who broadcast last; its `str` is the name."""
         self.parent = ""
         """Of the latest sample."""
         self.stamps: list[int] = []

@@ -12,7 +12,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr import Codec, codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import EndpointKind, gid, pack_attachment, parse_attachment, topic_key
+from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment, topic_key
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
 
@@ -129,6 +129,10 @@ class Subscription(Endpoint, Generic[M]):
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached."""
+        self.tells_source = False
+        """Whether `source` is set also for messages from this process."""
+        self.source: Attachment | None = None
+        """Of the message that the callback is given: its publisher's count, time and gid."""
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
         # From outside the hash may differ (other definition, Humble): hear it to be able to say so.
@@ -146,7 +150,7 @@ class Subscription(Endpoint, Generic[M]):
             subscriber = session.declare_subscriber(key, handler)
         self._declared.append(subscriber)
 
-    def enqueue(self, data: bytes, external: bool) -> None:
+    def enqueue(self, data: tuple[bytes, Attachment | None], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self.qos.depth:
             self._pending.popleft()[0] = None
@@ -155,9 +159,10 @@ class Subscription(Endpoint, Generic[M]):
         self._pending.append(entry)
         self.node.inbox.append(entry)
 
-    def handle(self, payload: bytes, external: bool) -> None:
+    def handle(self, data: tuple[bytes, Attachment | None], external: bool) -> None:
         """Decode and call back."""
         self._pending.popleft()
+        payload, self.source = data
         if external:
             try:
                 message = self.codec.decode(payload)
@@ -178,7 +183,8 @@ class Subscription(Endpoint, Generic[M]):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         bus = self.node.bus
         if bus.in_own_thread():
-            self.enqueue(sample.payload.to_bytes(), False)
+            source = parse_attachment(sample.attachment.to_bytes()) if self.tells_source else None
+            self.enqueue((sample.payload.to_bytes(), source), False)
             return
         if str(sample.key_expr) != self.key:
             theirs = str(sample.key_expr).rpartition("/")[2]
@@ -188,4 +194,4 @@ class Subscription(Endpoint, Generic[M]):
         if source is None:
             bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
             return
-        bus.external.push(Arrival(source, self, sample.payload.to_bytes()))
+        bus.external.push(Arrival(source, self, (sample.payload.to_bytes(), source)))
