@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from twin.bridge.conversions import transform_from_pose3
@@ -86,8 +86,9 @@ class TransformListener:
         self._node = node
         self._refused: set[str] = set()
         self._broadcasters: dict[bytes, Broadcaster] = {}
-        self._timer = node.create_timer(_EXPIRY_NS, self._expire)
-        self._timer.cancel()
+        self._expires = False
+        self.on_message: list[Callable[[TFMessage, object], None]] = []
+        """Called with every message and its broadcaster, whose `str` is its name."""
         for topic, qos, static in (("/tf", _DYNAMIC, False), ("/tf_static", _STATIC_LISTENER, True)):
             self._subscribe(topic, qos, static)
 
@@ -109,8 +110,9 @@ class TransformListener:
         """
         deadline_ns = None if timeout_ns is None else self._node.now_ns + timeout_ns
         future = self._buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
-        if deadline_ns is not None and not future.done:
-            self._timer.reset(self._node.now_ns)
+        if deadline_ns is not None and not self._expires:
+            self._expires = True
+            self._node.create_timer(_EXPIRY_NS, self._expire)
         return future
 
     def _subscribe(self, topic: str, qos: QoS, static: bool) -> None:
@@ -119,15 +121,14 @@ class TransformListener:
             self._on_message(message, static, None if source is None else source.gid)
 
         subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
-        subscription.tells_source = True
 
     def _expire(self) -> None:
         self._buffer.waiting.expire(self._node.now_ns)
-        if not self._buffer.waiting.is_timed:
-            self._timer.cancel()
 
     def _on_message(self, message: TFMessage, static: bool, gid: bytes | None) -> None:
         authority = self._broadcaster(gid)
+        for callback in self.on_message:
+            callback(message, authority)
         for item in message.transforms:
             try:
                 t, q = item.transform.translation, item.transform.rotation

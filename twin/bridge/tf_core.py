@@ -138,6 +138,18 @@ class BufferCore:
             return False
         return True
 
+    def chain(self, target: str, source: str) -> list[str]:
+        """Return the frames from source up to where it meets target, and down to target, as of the latest.
+
+        Raises:
+            UnknownFrameError, DisconnectedFramesError: there is no path.
+        """
+        self._check(target, source)
+        latest_common(self.frames, target, source)
+        up, down = self._ancestors(source), self._ancestors(target)
+        common = next(frame for frame in up if frame in down)
+        return [*up[: up.index(common) + 1], *reversed(down[: down.index(common)])]
+
     def latest_common_ns(self, target: str, source: str) -> int | None:
         """Return the latest time [ns] at which a lookup succeeds; None if all transforms between are static.
 

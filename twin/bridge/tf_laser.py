@@ -1,10 +1,11 @@
-"""Points of a laser scan, as laser_geometry makes them: without motion, and in a frame that the lidar moves in."""
+"""Points of a laser scan, as laser_geometry makes them: in its own frame, and in one that it moves in."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.bridge.msgs import LaserScan, PointCloud2, PointField, header, ns
 from twin.geometry import Array, Pose3
@@ -12,6 +13,7 @@ from twin.geometry import Array, Pose3
 if TYPE_CHECKING:
     from twin.bridge.tf_core import BufferCore
 
+Indices = NDArray[np.intp]
 _INT32, _FLOAT32 = 5, 7
 
 
@@ -55,7 +57,7 @@ def transform_laser_scan(
     return _cloud(scan, target, kept, _moving(points, start, end, ratio))
 
 
-def _polar(scan: LaserScan, range_cutoff: float) -> tuple[Array, Array]:
+def _polar(scan: LaserScan, range_cutoff: float) -> tuple[Indices, Array]:
     """Return the indices of rays that hit something, and their points, shape (n, 3)."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     cutoff = scan.range_max if range_cutoff < 0.0 else range_cutoff
@@ -81,8 +83,10 @@ def _moving(points: Array, start: Pose3, end: Pose3, ratio: Array) -> Array:
     return points + w * twice + np.cross(axis, twice) + origin
 
 
-def _cloud(scan: LaserScan, frame: str, kept: Array, points: Array) -> PointCloud2:
-    columns = [(name, "<f4", points[:, axis]) for axis, name in enumerate("xyz")]
+def _cloud(scan: LaserScan, frame: str, kept: Indices, points: Array) -> PointCloud2:
+    columns: list[tuple[str, str, NDArray[Any]]] = [
+        (name, "<f4", points[:, axis]) for axis, name in enumerate("xyz")
+    ]
     if len(scan.intensities):
         columns.append(("intensity", "<f4", np.asarray(scan.intensities)[kept]))
     columns.append(("index", "<i4", kept))

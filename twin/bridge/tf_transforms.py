@@ -37,7 +37,7 @@ QuaternionStamped: Any = types.get("geometry_msgs/msg/QuaternionStamped")
 def do_transform(message: Any, transform: TransformStamped) -> Any:
     """Return a message in the frame that a transform leads to; its header becomes the transform's.
 
-    A `Pose`, `Point`, `Vector3` or `Quaternion` without a header is taken to be in the transform's child frame.
+    One without a header, such as a `Pose`, is taken to be in the transform's child frame.
 
     Raises:
         BridgeError: messages of this type have no frame, or this one is not well-formed.
@@ -45,7 +45,7 @@ def do_transform(message: Any, transform: TransformStamped) -> Any:
     function = _FUNCTIONS.get(type(message))
     if function is None:
         name = getattr(type(message), "__msgtype__", type(message).__name__)
-        known = [cls.__msgtype__ for cls in _FUNCTIONS]
+        known = [str(getattr(cls, "__msgtype__", cls)) for cls in _FUNCTIONS]
         raise BridgeError(f"a {name} cannot be transformed; {nearest(name, known)}")
     return function(message, pose3_from_transform(transform.transform), transform.header)
 

@@ -41,11 +41,6 @@ class Waiting:
         self._futures: list[TransformFuture] = []
         buffer.on_change.append(self._on_change)
 
-    @property
-    def is_timed(self) -> bool:
-        """Whether somebody waits with a time-out."""
-        return any(future.deadline_ns is not None for future in self._futures)
-
     def add(self, target: str, source: str, time_ns: int | None, deadline_ns: int | None) -> TransformFuture:
         """Return a future, done at once if the transform is there."""
         future = TransformFuture(target, source, time_ns)
@@ -64,8 +59,12 @@ class Waiting:
                 future.finish(None, f"at {seconds(now_ns)} s the wait is over: {self._why(future)}")
 
     def _on_change(self) -> None:
+        if not self._futures:
+            return
         for future in tuple(self._futures):
-            if self._buffer.can_transform(future.target, future.source, future.time_ns):
+            if future.done:  # given up by who waited
+                self._futures.remove(future)
+            elif self._buffer.can_transform(future.target, future.source, future.time_ns):
                 self._futures.remove(future)
                 future.finish(True)
 

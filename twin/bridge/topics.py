@@ -129,10 +129,7 @@ class Subscription(Endpoint, Generic[M]):
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached."""
-        self.tells_source = False
-        """Whether `source` is set also for messages from this process."""
-        self.source: Attachment | None = None
-        """Of the message that the callback is given: its publisher's count, time and gid."""
+        self._sample: zenoh.Sample | None = None
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
         # From outside the hash may differ (other definition, Humble): hear it to be able to say so.
@@ -150,7 +147,12 @@ class Subscription(Endpoint, Generic[M]):
             subscriber = session.declare_subscriber(key, handler)
         self._declared.append(subscriber)
 
-    def enqueue(self, data: tuple[bytes, Attachment | None], external: bool) -> None:
+    @property
+    def source(self) -> Attachment | None:
+        """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        return None if self._sample is None else _source(self._sample)
+
+    def enqueue(self, data: tuple[bytes, zenoh.Sample], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self.qos.depth:
             self._pending.popleft()[0] = None
@@ -159,10 +161,10 @@ class Subscription(Endpoint, Generic[M]):
         self._pending.append(entry)
         self.node.inbox.append(entry)
 
-    def handle(self, data: tuple[bytes, Attachment | None], external: bool) -> None:
+    def handle(self, data: tuple[bytes, zenoh.Sample], external: bool) -> None:
         """Decode and call back."""
         self._pending.popleft()
-        payload, self.source = data
+        payload, self._sample = data
         if external:
             try:
                 message = self.codec.decode(payload)
@@ -172,6 +174,7 @@ class Subscription(Endpoint, Generic[M]):
         else:
             message = self.codec.decode(payload)
         self._callback(message)
+        self._sample = None
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
@@ -183,15 +186,18 @@ class Subscription(Endpoint, Generic[M]):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         bus = self.node.bus
         if bus.in_own_thread():
-            source = parse_attachment(sample.attachment.to_bytes()) if self.tells_source else None
-            self.enqueue((sample.payload.to_bytes(), source), False)
+            self.enqueue((sample.payload.to_bytes(), sample), False)
             return
         if str(sample.key_expr) != self.key:
             theirs = str(sample.key_expr).rpartition("/")[2]
             bus.external.refuse("type hash", self.name, f"{theirs} instead of {self.key.rpartition('/')[2]}")
             return
-        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
+        source = _source(sample)
         if source is None:
             bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
             return
-        bus.external.push(Arrival(source, self, (sample.payload.to_bytes(), source)))
+        bus.external.push(Arrival(source, self, (sample.payload.to_bytes(), sample)))
+
+
+def _source(sample: zenoh.Sample) -> Attachment | None:
+    return parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
