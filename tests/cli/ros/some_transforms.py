@@ -1,4 +1,4 @@
-"""Transforms to look at with commands: `python some_transforms.py ENDPOINT`; ends when its input is closed."""
+"""Transforms to look at with commands: `python some_transforms.py ENDPOINT`; ends when its input closes."""
 
 from __future__ import annotations
 
