@@ -74,7 +74,8 @@ class BagTap:
             return  # every other subscription of the topic has it too
         self._bus = receiver.node.bus
         now_ns = receiver.node.now_ns
-        message = BagMessage(receiver.name, arrival.data, now_ns, now_ns, source.sequence)
+        payload, _ = arrival.data
+        message = BagMessage(receiver.name, payload, now_ns, now_ns, source.sequence)
         self._record(message, receiver.codec.msgtype, _OUTSIDE)
 
     def close(self) -> None:
