@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.cli.ros.endings import quiet_pipe
+
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
 
@@ -78,7 +80,8 @@ def joins(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapper(**given: Any) -> None:
         joining = _options(**{name: given.pop(name) for name in shared})
-        command(**given, joining=joining)
+        with quiet_pipe():
+            command(**given, joining=joining)
 
     parameters = [*(own.parameters[name] for name in own.parameters if name != "joining"), *shared.values()]
     wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
