@@ -38,7 +38,7 @@ def message_repr(message: Any) -> str:
 
 
 def value_repr(value: Any, field: Field) -> str:
-    """Return a field's value as `print` shows it where rclpy holds it: an array('f', [0.5]), a number, a text."""
+    """Return a field's value as `print` shows it in rclpy: an array('f', [0.5]), a number, a text."""
     if isinstance(value, str):
         return value
     if field.many in ("sequence", "bounded") and field.base in _TYPECODES:

@@ -36,7 +36,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateStatistics:
-    """Gaps between messages; reports at most once in a second, and only if something came since."""
+    """Gaps between messages."""
 
     def __init__(self, window: int) -> None:
         self._gaps_ns: deque[int] = deque(maxlen=window)
@@ -58,14 +58,14 @@ class RateStatistics:
         self._last_ns = now_ns
         return False
 
-    def report(self) -> Spread | None:
-        """Return the gaps [ns], None if there is nothing new; the first call only starts the second."""
+    def report(self, at_least_ns: int = _SECOND_NS) -> Spread | None:
+        """Return the gaps [ns]; None if nothing came so long [ns] after the last report or first message."""
         if not self._gaps_ns:
             return None
-        if self._reported_ns == 0 or self._last_ns < self._reported_ns:
+        self._reported_ns = self._reported_ns or self._first_ns
+        if self._last_ns < self._reported_ns:
             self._reported_ns = self._last_ns
-            return None
-        if self._last_ns < self._reported_ns + _SECOND_NS:
+        if self._last_ns < self._reported_ns + at_least_ns:
             return None
         self._reported_ns = self._last_ns
         return _spread(self._gaps_ns)

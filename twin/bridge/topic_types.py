@@ -88,6 +88,6 @@ def _learn(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> N
             type_description.learn(future.result.type_description, endpoint.type_hash)
             return
     raise BridgeError(
-        f"the type {endpoints[0].type} of {endpoints[0].name} is not known here, and its nodes do not tell it "
-        f"({'; '.join(dict.fromkeys(reasons))}); give its files with --interfaces DIR"
+        f"the type {endpoints[0].type} of {endpoints[0].name} is not known here, and its nodes do not tell "
+        f"it ({'; '.join(dict.fromkeys(reasons))}); give its files with --interfaces DIR"
     )

@@ -39,6 +39,14 @@ def dds_name(typename: str) -> str:
     return f"{package}::{kind}::dds_::{name}_"
 
 
+def from_dds_name(name: str) -> str | None:
+    """Return the type of which `dds_name` made a name, or None if it is of another form."""
+    package, _, tail = name.partition("::")
+    kind, _, plain = tail.partition("::dds_::")
+    full = f"{package}/{kind}/{plain.removesuffix('_')}"
+    return full if _NAME.fullmatch(full) and plain.endswith("_") else None
+
+
 def whole(name: str) -> str:
     """Return the interface that a part belongs to: 'p/srv/S' of 'p/srv/S_Request'; a message is whole."""
     package, kind, tail = name.split("/")

@@ -19,17 +19,9 @@ from twin.bridge import type_store
 from twin.bridge.interface_parser import Definition
 from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import FieldDefs, rihs01_of
-from twin.bridge.type_names import Parts, dds_name, parts
+from twin.bridge.type_names import Parts, dds_name, from_dds_name, parts
 from twin.bridge.type_store import add_folder, add_folders, store
 from twin.errors import BridgeError
-
-
-def from_dds_name(name: str) -> str | None:
-    """Return the type of which `dds_name` made a name, or None if it is of another form."""
-    package, _, tail = name.partition("::")
-    kind, _, plain = tail.partition("::dds_::")
-    full = f"{package}/{kind}/{plain.removesuffix('_')}"
-    return full if _NAME.fullmatch(full) and plain.endswith("_") else None
 
 
 def register(typename: str, text: str) -> None:
@@ -182,6 +174,7 @@ __all__ = [
     "defaults",
     "definitions",
     "dtype_of",
+    "from_dds_name",
     "get",
     "names",
     "parts",

@@ -11,14 +11,14 @@ import operator
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from twin.errors import BridgeError
+from twin.errors import BridgeError, nearest
 
 Filter = Callable[[Any], bool]
 
 _VALID = (
-    "m and its fields, numbers, texts, lists, [index], comparisons, in, and, or, not, + - * / // %, a if b else c, "
-    "for … in … inside any(), all(), sum(), len(), min(), max(), abs(), round(), math functions, "
-    "and methods of texts such as m.data.startswith('a')"
+    "m and its fields, numbers, texts, lists, [index], comparisons, in, and, or, not, + - * / // %, "
+    "a if b else c, for … in … inside any(), all(), sum(), len(), min(), max(), abs(), round(), "
+    "math functions, and methods of texts such as m.data.startswith('a')"
 )
 
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
@@ -54,7 +54,19 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     for function in (abs, all, any, bool, float, int, len, max, min, round, sorted, str, sum)
 } | {
     name: getattr(math, name)
-    for name in ("sqrt", "hypot", "sin", "cos", "atan2", "fabs", "floor", "ceil", "isnan", "isinf", "isfinite")
+    for name in (
+        "sqrt",
+        "hypot",
+        "sin",
+        "cos",
+        "atan2",
+        "fabs",
+        "floor",
+        "ceil",
+        "isnan",
+        "isinf",
+        "isfinite",
+    )
 }
 _MATH = {"pi": math.pi, "inf": math.inf, "nan": math.nan, "tau": math.tau, "e": math.e}
 _TEXT_METHODS = ("startswith", "endswith", "lower", "upper", "strip", "find", "count", "split", "isdigit")
@@ -86,7 +98,17 @@ def compile_filter(expression: str) -> Filter:
 
 _ALLOWED = (
     *(ast.Attribute, ast.BinOp, ast.BoolOp, ast.Call, ast.Compare, ast.Constant, ast.GeneratorExp, ast.IfExp),
-    *(ast.List, ast.ListComp, ast.Load, ast.Name, ast.Slice, ast.Store, ast.Subscript, ast.Tuple, ast.UnaryOp),
+    *(
+        ast.List,
+        ast.ListComp,
+        ast.Load,
+        ast.Name,
+        ast.Slice,
+        ast.Store,
+        ast.Subscript,
+        ast.Tuple,
+        ast.UnaryOp,
+    ),
     *(ast.comprehension, ast.boolop, *_BINARY, *_COMPARE, *_UNARY),
 )
 
@@ -122,7 +144,7 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
         case ast.Attribute(value=ast.Name(id="math"), attr=name):
             return _MATH[name]
         case ast.Attribute():
-            return getattr(_value(node.value, names), _field(node.attr))
+            return _attribute(_value(node.value, names), node.attr)
         case ast.Subscript():
             return _value(node.value, names)[_value(node.slice, names)]
         case ast.Slice(lower=lower, upper=upper, step=step):
@@ -146,8 +168,16 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
     raise TypeError(f"{ast.unparse(node)} has no value")
 
 
-def _field(name: str) -> str:
-    return f"{name}_" if name in ("from", "import", "in", "is", "not", "global", "class") else name
+def _attribute(owner: Any, name: str) -> Any:
+    """Return a field of a message."""
+    from twin.bridge.type_fields import fields_of
+
+    if not hasattr(owner, "__msgtype__"):
+        raise AttributeError(f"{type(owner).__name__} has no field {name!r}")
+    fields = {field.name: field.attribute for field in fields_of(owner.__msgtype__)}
+    if name not in fields:
+        raise AttributeError(f"{owner.__msgtype__} has no field {name!r}; {nearest(name, fields)}")
+    return getattr(owner, fields[name])
 
 
 def _binary(node: ast.BinOp, names: Mapping[str, Any]) -> Any:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 HIDDEN_PREFIX = "_ros2cli"
 """Of the nodes of commands; names that begin with _ are left out of lists."""
+_COMPLETE_S = 1.0
+"""How long to wait for a watched graph to be complete [s], if somebody leaves in that moment."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,22 +43,23 @@ class TopicProcess:
         """Return a topic's absolute name."""
         return self.node.resolve_name(name)
 
+    def endpoints(self, name: str) -> tuple[EndpointInfo, ...]:
+        """Return a topic's publishers, then its subscriptions."""
+        return self.graph.publishers(name) + self.graph.subscriptions(name)
+
     def wait_for_topic(self, name: str, timeout_s: float | None = None) -> tuple[EndpointInfo, ...]:
         """Return a topic's publishers, then its subscriptions, as soon as there is one.
 
         Raises:
             BridgeError: there was none in this time [s].
         """
-        from twin.bridge.graph import Graph
-
-        known = Graph.snapshot(self.live.bus)
-        found = _endpoints(known, name)
+        found = self.endpoints(name)
         if found:
             return found
-        hint = did_you_mean(name, known.topics())
+        hint = did_you_mean(name, self.graph.topics())
         typer.echo(f"WARNING: topic [{name}] does not appear to be published yet{hint}", err=True)
-        self.live.spin(lambda: bool(_endpoints(self.graph, name)), timeout_s)
-        found = _endpoints(self.graph, name)
+        self.live.spin(lambda: bool(self.endpoints(name)), timeout_s)
+        found = self.endpoints(name)
         if not found:
             raise BridgeError(f"Could not determine the type for the passed topic {name}{hint}")
         return found
@@ -84,8 +87,11 @@ def open_topics(
     if interfaces:
         types.add_folders(interfaces)
     with joining.open() as live:
+        # Zenoh answers at once from what it has when a watch begins: so look first, then wait for the same.
+        there = set(Graph.snapshot(live.bus).endpoints)
         node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}")
         graph = Graph.watch(live.bus)
+        live.spin(lambda: there <= set(graph.endpoints), _COMPLETE_S)
         try:
             yield TopicProcess(live=live, node=node, graph=graph)
         finally:
@@ -100,7 +106,3 @@ def did_you_mean(name: str, known: Sequence[str] | dict[str, Any]) -> str:
         return ""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean {close[0]}?" if close else ""
-
-
-def _endpoints(graph: Graph, name: str) -> tuple[EndpointInfo, ...]:
-    return graph.publishers(name) + graph.subscriptions(name)
