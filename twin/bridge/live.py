@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
@@ -15,11 +17,13 @@ from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
+from twin.bridge.console_log import show_log
 from twin.bridge.keys import topic_key
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
+from twin.bridge.program_arguments import parser_of, split
 from twin.bridge.session import SessionConfig, direct
-from twin.errors import BridgeError
+from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 """Where rmw_zenoh expects a router."""
@@ -128,6 +132,50 @@ def join(
     clock = Clock()
     with Bus.of(session, clock, domain_id=_domain_id() if domain_id is None else domain_id) as bus:
         yield LiveBus(bus, clock, use_sim_time=use_sim_time)
+
+
+def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> None:
+    """Be a program: join a graph, create nodes with `make(bus)`, run them until Ctrl-C; log on stderr.
+
+    If `make` is a generator function, each of its `yield`s waits for what comes next, and the program is over
+    when it returns. What `make` takes after the bus are the program's arguments, see `parser_of`. A user's
+    mistake is one line on stderr and exit code 2.
+
+    Args:
+        make: Factory of the nodes.
+        arguments: Of the command line; None: those of the process.
+    """
+    show_log()
+    parser = parser_of(make)
+    joining, own = split(parser.parse_args(arguments))
+    try:
+        with join(**joining) as process, _signals() as received:
+            steps = make(process.bus, **own)
+            if isinstance(steps, Generator):
+                process.spin(lambda: bool(received) or next(steps, received) is received)
+            else:
+                process.spin(lambda: bool(received))
+    except TwinError as fault:
+        parser.exit(2, f"error: {fault}\n")
+    except KeyboardInterrupt:
+        parser.exit(130)
+
+
+@contextmanager
+def _signals() -> Iterator[list[int]]:
+    """Note SIGINT and SIGTERM, so that a program ends between two spins; a second one ends it at once."""
+    received: list[int] = []
+
+    def note(number: int, frame: object) -> None:
+        received.append(number)
+        signal.signal(number, before[signal.Signals(number)])
+
+    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _path(text: str | None) -> Path | None:
