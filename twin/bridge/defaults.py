@@ -15,7 +15,6 @@ from twin.bridge import types
 M = TypeVar("M")
 
 _STRINGS = ("string", "wstring")
-_BYTES = ("char", "byte", "octet")
 
 
 def new(cls: type[M], **fields: Any) -> M:
@@ -56,7 +55,7 @@ def _maker(description: Any, literal: str | None) -> Callable[[], Any]:
         return lambda: [new(cls) for _ in range(count)]
     if element[0] in _STRINGS:
         return lambda: [""] * count
-    dtype = np.dtype("uint8" if element[0] in _BYTES else element[0])
+    dtype = types.dtype_of(element[0])
     return lambda: np.zeros(count, dtype)
 
 

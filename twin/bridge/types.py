@@ -12,6 +12,7 @@ from functools import cache, cached_property
 from importlib import resources
 from typing import Any, NamedTuple
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -159,6 +160,11 @@ class ActionType:
     def GetResult(self) -> ServiceType:
         """The service that answers when the goal has ended."""
         return ServiceType(f"{self.name}_GetResult")
+
+
+def dtype_of(base: str) -> np.dtype[Any]:
+    """Return the numpy type of the elements of an array of a base type other than string."""
+    return np.dtype({"char": "uint8", "byte": "uint8", "octet": "uint8"}.get(base, base))
 
 
 def defaults(typename: str) -> dict[str, str]:
