@@ -149,7 +149,7 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
     parser = parser_of(make)
     joining, own = split(parser.parse_args(arguments))
     try:
-        with join(**joining) as process, _signals() as received:
+        with join(**joining) as process, noted_signals() as received:
             steps = make(process.bus, **own)
             if isinstance(steps, Generator):
                 process.spin(lambda: bool(received) or next(steps, received) is received)
@@ -162,8 +162,8 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
 
 
 @contextmanager
-def _signals() -> Iterator[list[int]]:
-    """Note SIGINT and SIGTERM, so that a program ends between two spins; a second one ends it at once."""
+def noted_signals() -> Iterator[list[int]]:
+    """Note SIGINT and SIGTERM, so that a program can end between two spins; a second one ends it at once."""
     received: list[int] = []
 
     def note(number: int, frame: object) -> None:

@@ -1,4 +1,4 @@
-"""Messages on one line, as `ros2 service call` and `ros2 topic pub` print them: `std_msgs.msg.String(data='')`."""
+"""Messages on one line, as `ros2 service call` prints them: `std_msgs.msg.String(data='')`."""
 
 from __future__ import annotations
 

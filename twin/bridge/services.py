@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -156,12 +157,20 @@ class Client(Endpoint):
             else:
                 bus.external.push(Arrival(source, self, data))
 
+        answered = threading.Event()
+
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
+                answered.set()
                 deliver((future, reply.ok.payload.to_bytes()))
 
+        def on_end() -> None:
+            # It may come in this thread, within `get`, while a reply from outside still waits to be admitted.
+            if not answered.is_set():
+                deliver((future, None))
+
         self._querier.get(
-            direct(on_reply, lambda: deliver((future, None))),
+            direct(on_reply, on_end),
             payload=self._requests.encode(request),
             attachment=pack_attachment(*source),
         )
