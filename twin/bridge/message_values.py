@@ -14,7 +14,8 @@ import numpy as np
 
 from twin.bridge import types
 from twin.bridge.defaults import new
-from twin.bridge.type_fields import FLOATS, INTEGERS, STRINGS, Field, fields_of
+from twin.bridge.type_bounds import FLOATS, INTEGERS, STRINGS
+from twin.bridge.type_fields import Field, fields_of
 from twin.errors import BridgeError, nearest
 
 M = TypeVar("M")

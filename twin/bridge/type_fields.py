@@ -4,27 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
+from twin.bridge.type_bounds import Many
 
 PADDING = "structure_needs_at_least_one_member"
 """The field that rosidl gives to an empty structure, and that no tool shows."""
-
-INTEGERS = {
-    f"{sign}int{bits}": (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    for sign in ("", "u")
-    for bits in (8, 16, 32, 64)
-} | {"char": (0, 255), "byte": (0, 255), "octet": (0, 255)}
-"""Base type -> smallest and largest value."""
-FLOATS = {"float32": 3.4028234663852886e38, "float64": float("inf")}
-"""Base type -> largest finite value that it is checked for."""
-STRINGS = ("string", "wstring")
-
-Many = Literal["", "array", "bounded", "sequence"]
 
 
 @dataclass(frozen=True, kw_only=True)
