@@ -36,7 +36,7 @@ def new(cls: type[M], **fields: Any) -> M:
 def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
     """Return what makes each field's default."""
     values = types.defaults(msgtype)
-    fields = types.store.get_msgdef(msgtype).fields
+    fields = types.store.fielddefs[msgtype][1]  # get_msgdef would compile a codec
     return {name: _maker(description, values.get(name)) for name, description in fields}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -13,7 +14,7 @@ from typing import Any
 
 import zenoh
 
-from twin.bridge import types
+from twin.bridge import ros_args, types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
@@ -21,6 +22,7 @@ from twin.bridge.console_log import show_log
 from twin.bridge.keys import topic_key
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
+from twin.bridge.node_options import NodeOptions
 from twin.bridge.program_arguments import parser_of, split
 from twin.bridge.session import SessionConfig, direct
 from twin.errors import BridgeError, TwinError
@@ -35,6 +37,7 @@ class LiveBus:
 
     def __init__(self, bus: Bus, clock: Clock, *, use_sim_time: bool) -> None:
         self.bus = bus
+        bus.use_sim_time = use_sim_time
         self._clock = clock
         self._sim_time: SimTime | None = SimTime(bus) if use_sim_time else None
         self._advance()
@@ -137,9 +140,10 @@ def join(
 def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> None:
     """Be a program: join a graph, create nodes with `make(bus)`, run them until Ctrl-C; log on stderr.
 
-    If `make` is a generator function, each of its `yield`s waits for what comes next, and the program is over
-    when it returns. What `make` takes after the bus are the program's arguments, see `parser_of`. A user's
-    mistake is one line on stderr and exit code 2.
+    If `make` is a generator function, it is a task: each `yield` waits for what comes next, and the program
+    is over when it returns. What `make` takes after the bus are the program's arguments, see `parser_of`;
+    after --ros-args come those of ROS (`-p name:=value`, `-r from:=to`). A user's mistake is one line on
+    stderr and exit code 2.
 
     Args:
         make: Factory of the nodes.
@@ -147,9 +151,11 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
     """
     show_log()
     parser = parser_of(make)
-    joining, own = split(parser.parse_args(arguments))
     try:
+        ros = ros_args.parse(sys.argv[1:] if arguments is None else arguments)
+        joining, own = split(parser.parse_args(ros.rest))
         with join(**joining) as process, noted_signals() as received:
+            process.bus.node_options = NodeOptions(arguments=ros)
             steps = make(process.bus, **own)
             if isinstance(steps, Generator):
                 process.spin(lambda: bool(received) or next(steps, received) is received)

@@ -15,6 +15,7 @@ from twin.bridge.external import Arrival
 from twin.bridge.keys import EndpointKind, gid, pack_attachment, parse_attachment, topic_key
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
+from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
@@ -105,9 +106,12 @@ class Publisher(Endpoint, Generic[M]):
 
         Raises:
             TypeError: a message of another type.
+            BridgeError: the publisher is destroyed.
         """
         if type(message) is not self.codec.cls:
             raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
+        if not self._declared:
+            raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         time_ns = self._bus.clock.now_ns
         sample = None
