@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import action, service, topic
+from twin.cli.ros import action, param, service, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -38,6 +38,7 @@ _GROUPS = (
     ("topic", topic.app),
     ("service", service.app),
     ("action", action.app),
+    ("param", param.app),
 )
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")

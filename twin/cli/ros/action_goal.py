@@ -8,6 +8,7 @@ import typer
 
 from twin.cli.ros.joining import Joining
 from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
+from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -45,15 +46,14 @@ def send_goal(
     with joining.open() as process, noted_signals() as signals:
         kind = _action_type(action_type)
         message = message_of(kind.Goal, text)
-        node = process.bus.create_node(f"_ros2cli_send_goal_{kind.name.replace('/', '_')}")
+        node = tool_node(process.bus, f"send_goal_{kind.name.replace('/', '_')}")
         client = ActionClient(node, kind, absolute(action))
         typer.echo("Waiting for an action server to become available...")
         _wait_for_server(process, client, kind.name, timeout, signals)
         typer.echo(f"Sending goal:\n     {message_to_yaml(message)}")
-        sent = client.send_goal(
-            message, (lambda m: typer.echo(f"Feedback:\n    {message_to_yaml(m)}")) if feedback else None
-        )
-        _follow(process, client, sent, timeout, signals)
+        heard: list[Any] = []
+        sent = client.send_goal(message, heard.append if feedback else None)
+        _follow(process, client, sent, timeout, signals, heard)
 
 
 def _wait_for_server(
@@ -73,10 +73,20 @@ def _wait_for_server(
 
 
 def _follow(
-    process: LiveBus, client: ActionClient, goal: ClientGoal, timeout_s: float | None, signals: list[int]
+    process: LiveBus,
+    client: ActionClient,
+    goal: ClientGoal,
+    timeout_s: float | None,
+    signals: list[int],
+    feedback: list[Any],
 ) -> None:
-    """Tell what becomes of a goal."""
+    """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
     from twin.bridge.yaml_messages import message_to_yaml
+
+    def is_over() -> bool:
+        while feedback:
+            typer.echo(f"Feedback:\n    {message_to_yaml(feedback.pop(0))}")
+        return goal.done or bool(signals)
 
     answered = process.spin(lambda: goal.accepted is not None or bool(signals), timeout_s)
     if goal.accepted is False and goal.error and "rejected" in goal.error:
@@ -84,7 +94,7 @@ def _follow(
         return
     if goal.accepted:
         typer.echo(f"Goal accepted with ID: {goal.goal_id.hex()}\n")
-        answered = process.spin(lambda: goal.done or bool(signals), timeout_s)
+        answered = process.spin(is_over, timeout_s)
     if goal.done:
         if goal.error is not None:
             raise BridgeError(f"the goal has no result: {goal.error}")

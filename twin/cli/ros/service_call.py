@@ -8,6 +8,7 @@ import typer
 
 from twin.cli.ros.joining import Joining
 from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
+from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def call(
         srv_type = _service_type(service_type)
         request = message_of(srv_type.Request, text)
         package, _, name = srv_type.name.split("/")
-        node = process.bus.create_node(f"_ros2cli_requester_{package}_{name}")
+        node = tool_node(process.bus, f"requester_{package}_{name}")
         client = node.create_client(srv_type, absolute(service))
         due: list[None] = []
         if rate is not None:
