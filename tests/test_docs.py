@@ -42,6 +42,7 @@ NOT_RUN = {
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
+    r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""
 
