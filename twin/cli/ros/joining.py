@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.bridge.wire import Wire
 from twin.cli.ros.endings import quiet_pipe
 from twin.cli.ros.option_groups import takes
 
@@ -26,6 +27,7 @@ class Joining:
     config: Path | None
     domain_id: int | None
     use_sim_time: bool
+    wire: Wire
 
     @contextmanager
     def open(self) -> Iterator[LiveBus]:
@@ -33,7 +35,11 @@ class Joining:
         from twin.bridge import live
 
         with live.join(
-            self.connect, config=self.config, domain_id=self.domain_id, use_sim_time=self.use_sim_time
+            self.connect,
+            config=self.config,
+            domain_id=self.domain_id,
+            use_sim_time=self.use_sim_time,
+            wire=self.wire,
         ) as process:
             yield process
 
@@ -63,12 +69,14 @@ def _options(
     use_sim_time: Annotated[
         bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
     ] = False,
+    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
 ) -> Joining:
     return Joining(
         connect=tuple(connect) if connect else None,
         config=config,
         domain_id=domain,
         use_sim_time=use_sim_time,
+        wire=wire,
     )
 
 
