@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import node, router, topic
+from twin.cli.ros import node, router, tf, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -38,6 +38,7 @@ _COMMANDS = (
 _GROUPS = (
     ("topic", topic.app),
     ("node", node.app),
+    ("tf", tf.app),
 )
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
