@@ -12,7 +12,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr import Codec, codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import EndpointKind, gid, pack_attachment
+from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.qos import INFINITE_NS, QoS
 from twin.bridge.session import direct
 from twin.bridge.wire_entrance import Entrance
@@ -132,6 +132,7 @@ class Subscription(Endpoint, Generic[M]):
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
+        self._origin: zenoh.Sample | Attachment | None = None
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
         self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
@@ -144,7 +145,15 @@ class Subscription(Endpoint, Generic[M]):
             self._declared.append(declare_subscriber(bus.session, key, self._on_sample, qos))
         self.announce()
 
-    def enqueue(self, data: bytes, external: bool) -> None:
+    @property
+    def source(self) -> Attachment | None:
+        """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if not isinstance(self._origin, zenoh.Sample):
+            return self._origin
+        attachment = self._origin.attachment  # read only if asked for: few want to know
+        return parse_attachment(attachment.to_bytes() if attachment else None)
+
+    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
@@ -155,12 +164,13 @@ class Subscription(Endpoint, Generic[M]):
         self._pending.append(entry)
         self.node.inbox.append(entry)
 
-    def handle(self, payload: bytes, external: bool) -> None:
+    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Decode and call back."""
         entry = self._pending.popleft()
         if len(entry) > 3 and self.node.now_ns > entry[3]:
             self.dropped += 1
             return
+        payload, self._origin = data
         if external:
             try:
                 message = self.codec.decode(payload)
@@ -170,6 +180,7 @@ class Subscription(Endpoint, Generic[M]):
         else:
             message = self.codec.decode(payload)
         self._callback(message)
+        self._origin = None
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
@@ -183,13 +194,13 @@ class Subscription(Endpoint, Generic[M]):
         if bus.in_own_thread():
             # The wide expressions of a networked bus match this process's topics of other types too.
             if not self._networked or str(sample.key_expr) == self.key:
-                self.enqueue(sample.payload.to_bytes(), self._untyped)
+                self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
         attachment = sample.attachment.to_bytes() if sample.attachment else None
         source = self._entrance.source(str(sample.key_expr), attachment)
         if source is not None:
             payload = sample.payload.to_bytes()
-            bus.external.push(Arrival(source, self, payload, len(payload)))
+            bus.external.push(Arrival(source, self, (payload, source), len(payload)))
 
 
 def _declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
