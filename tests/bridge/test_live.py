@@ -11,6 +11,7 @@ from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, Twist, stamp
+from twin.bridge.node_options import BARE
 from twin.bridge.qos import LATCHED
 from twin.bridge.raw import RawSample, RawSubscription
 from twin.bridge.srvs import AddTwoInts
@@ -95,7 +96,7 @@ def test_zenohs_own_configuration_file(endpoint: str, tmp_path: Path) -> None:
 def test_the_graph_names_types_qos_and_owners(endpoint: str) -> None:
     with Bus.open(Clock(), listen=[endpoint]) as run, live.join([endpoint]) as process:
         graph = Graph.watch(process.bus)
-        node = run.create_node("amcl", "/robot")
+        node = run.create_node("amcl", "/robot", options=BARE)
         publisher = node.create_publisher(String, "map", LATCHED)
         node.create_subscription(Twist, "/cmd_vel", print, 1)
         node.create_service(AddTwoInts, "~/add", lambda request: None)

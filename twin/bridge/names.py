@@ -26,7 +26,7 @@ _RULES = (
     (re.compile(r".*//.*"), "it must not contain //"),
     (re.compile(r".+~.*"), "~ may only be the first character"),
     (re.compile(r"~[^/].*"), "~ must be followed by /"),
-    (re.compile(r"[^{}]*(\{[^{}]*\}[^{}]*)*[{}].*"), "every { needs its }, and none inside of another"),
+    (re.compile(r"(?![^{}]*(\{[^{}]*\}[^{}]*)*$).*"), "every { needs its }, and none inside of another"),
     (
         re.compile(r".*\{(?!node\}|ns\}|namespace\}).*"),
         "it may substitute {node}, {ns} and {namespace}, nothing else",

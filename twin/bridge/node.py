@@ -30,14 +30,15 @@ E = TypeVar("E", bound="OwnedEndpoint")
 _EXECUTION_NS = 10_000_000
 """How often actions go on in a process that runs by the wall clock [ns]."""
 
-_PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
-
 
 class OwnedEndpoint(Protocol):
     """What leaves the graph with its node."""
 
     def destroy(self) -> None:
         """Leave the graph. Harmless when repeated."""
+
+
+_PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
 
 
 class Node(NodeParameters):
@@ -210,15 +211,6 @@ class Node(NodeParameters):
         """Advance something no more."""
         _remove(self._executions, execution)
 
-    @property
-    def wait_ns(self) -> int | None:
-        """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
-        if self.inbox:
-            return 0
-        due = [left for timer in self._timers if (left := timer.time_until_next_call) is not None]
-        due += [_EXECUTION_NS] * bool(self._executions)
-        return max(0, min(due)) if due else None
-
     def advertise_parameter_events(self) -> Publisher[ParameterEvent]:
         """Return the publisher of /parameter_events."""
         if self._parameter_events is None:
@@ -270,6 +262,15 @@ class Node(NodeParameters):
         self.inbox.clear()
         self._liveliness.undeclare()
         self.bus.forget(self)
+
+    @property
+    def wait_ns(self) -> int | None:
+        """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
+        if self.inbox:
+            return 0
+        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_canceled]
+        due += [_EXECUTION_NS] * bool(self._executions)
+        return max(0, min(due)) if due else None
 
     def add_endpoint(self, endpoint: E) -> E:
         """Own an endpoint: it leaves the graph with the node."""

@@ -58,10 +58,11 @@ class StandardServices:
 
 def offer(node: Node) -> None:
     """Declare the standard services of a node, and its publishers of /rosout and /parameter_events."""
-    node.get_logger().advertise()
-    node.advertise_parameter_events()
     offered: Offered = {}
+    if node.options.enable_rosout:
+        node.get_logger().advertise()
     if node.options.start_parameter_services:
+        node.advertise_parameter_events()
         offered |= ParameterServices(node.parameters).offered
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered

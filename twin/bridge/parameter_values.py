@@ -177,7 +177,7 @@ def from_value_msg(name: str, message: ParameterValue) -> tuple[Type, Any]:
         return kind, None
     value = getattr(message, _FIELDS[kind])
     if kind is Type.BYTE_ARRAY:
-        return kind, [bytes([byte]) for byte in value]
+        return kind, [bytes([byte]) for byte in value.astype(np.uint8)]  # int8 when received
     return kind, value.tolist() if isinstance(value, np.ndarray) else value
 
 

@@ -23,6 +23,7 @@ from twin.bridge.parameter_errors import (
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
+from twin.bridge.parameter_listing import SEPARATOR, listed
 from twin.bridge.parameter_ranges import objection
 from twin.bridge.parameter_values import Parameter, Type, coerced
 from twin.errors import BridgeError
@@ -31,9 +32,6 @@ PreSet = Callable[[list[Parameter]], list[Parameter]]
 OnSet = Callable[[list[Parameter]], SetParametersResult | None]
 PostSet = Callable[[list[Parameter]], None]
 
-SEPARATOR = "."
-DEPTH_RECURSIVE = 0
-"""rcl_interfaces/srv/ListParameters: as deep as there are names."""
 _WRONG_TYPE = "Wrong parameter type"
 _EMPTIED = (
     "parameter list cannot be empty, this might be due to pre_set_parameters_callback "
@@ -221,24 +219,9 @@ class Parameters:
             raise InvalidParameterValueException(self.node, name, value, result.reason)
         return self._declared.get(name, parameter)
 
-    def listed(self, prefixes: Sequence[str] = (), depth: int = DEPTH_RECURSIVE) -> ListParametersResult:
+    def listed(self, prefixes: Sequence[str] = (), depth: int = 0) -> ListParametersResult:
         """Return names below the prefixes, at most `depth` levels deep (0: all), and their parents."""
-
-        def wanted(name: str) -> bool:
-            if not prefixes:
-                return depth == DEPTH_RECURSIVE or name.count(SEPARATOR) < depth
-            return any(
-                name == prefix
-                or (
-                    name.startswith(prefix + SEPARATOR)
-                    and (depth == DEPTH_RECURSIVE or name[len(prefix) + 1 :].count(SEPARATOR) < depth)
-                )
-                for prefix in prefixes
-            )
-
-        names = [name for name in self._declared if wanted(name)]
-        below = dict.fromkeys(name.rpartition(SEPARATOR)[0] for name in names if SEPARATOR in name)
-        return ListParametersResult(names, [*below])
+        return listed(self.names, prefixes, depth)
 
     def by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """Return the parameters below a prefix, by their names without it; all for an empty one."""
