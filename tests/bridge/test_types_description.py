@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -86,6 +87,21 @@ def test_nonsense_is_refused_and_leaves_nothing(fault: str) -> None:
     with pytest.raises(BridgeError):
         learn(description)
     assert not any("nonsense_msgs" in name for name in types.names())
+
+
+def test_defaults_are_written_as_rosidl_writes_them() -> None:
+    types.add_folder(Path(__file__).parent / "data" / "test_msgs")
+    fields = {
+        field.name: field.default_value for field in describe("test_msgs/msg/Arrays").type_description.fields
+    }
+    assert fields["bool_values_default"] == "(False, True, False)"
+    assert fields["byte_values_default"] == "(0, 1, 255)"
+    assert fields["string_values_default"] == "('', 'max value', 'min value')"
+    assert fields["bool_values"] == ""
+    (w,) = [
+        field for field in describe("geometry_msgs/Quaternion").type_description.fields if field.name == "w"
+    ]
+    assert w.default_value == "1.0"
 
 
 def test_sources_hold_the_texts() -> None:

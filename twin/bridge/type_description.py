@@ -12,6 +12,7 @@ from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
 from twin.bridge.defaults import new
+from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import BASE_NAMES, FieldDefs, description_of, rihs01_of
 from twin.bridge.type_bounds import MOST_NUMBERS, MOST_OBJECTS, STRINGS
 from twin.errors import BridgeError
@@ -82,8 +83,19 @@ def learn(description: Any, type_hash: str | None = None) -> str:
 
 
 def _individual(plain: dict[str, Any]) -> Any:
-    fields = [_Field(field["name"], _FieldType(**field["type"]), "") for field in plain["fields"]]
-    return _Individual(plain["type_name"], fields)
+    name, defaults = plain["type_name"], {}
+    if name in types.store.types:
+        defaults = types.defaults(name)
+    fields = [
+        _Field(field["name"], _FieldType(**field["type"]), _default_text(defaults.get(field["name"])))
+        for field in plain["fields"]
+    ]
+    return _Individual(name, fields)
+
+
+def _default_text(value: Value | None) -> str:
+    """Return a default as rosidl writes it: 1.0, True, (0, 1)."""
+    return "" if value is None else str(tuple(value) if isinstance(value, list) else value)
 
 
 def _source(name: str) -> Any:

@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import topic
+from twin.cli.ros import interface, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -34,7 +34,7 @@ _COMMANDS = (
     ("robots", robots.robots, "twin robots"),
 )
 
-_GROUPS = (("topic", topic.app),)
+_GROUPS = (("topic", topic.app), ("interface", interface.app))
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
 
