@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,8 @@ defaults: dict[str, dict[str, Value]] = {
     "sensor_msgs/msg/NavSatStatus": {"status": -2},
     "type_description_interfaces/msg/FieldType": {"type_id": 0},
 }
-"""Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from the
-Jazzy branches of common_interfaces and rcl_interfaces."""
+"""Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from
+the Jazzy branches of common_interfaces and rcl_interfaces."""
 
 _PADDING: Any = ("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
@@ -103,7 +103,7 @@ def load(name: str) -> None:
         raise BridgeError(f"{owner} has no part {name}")
 
 
-def add_fields(given: FieldDefs) -> None:
+def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
     """Make types known by their fields; see `types.add_definitions`."""
     for name, (_, fields) in given.items():
         if _exists(name):
@@ -116,6 +116,7 @@ def add_fields(given: FieldDefs) -> None:
                 derived[name] = definition
             else:
                 _register(name, *definition)
+                defaults[name] = values.get(name, {})
 
 
 def text_of(name: str) -> str | None:
