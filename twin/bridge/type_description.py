@@ -138,7 +138,7 @@ def _defaults(item: Any, fields: list[tuple[str, Any]]) -> dict[str, Value]:
     for field, (name, (node, value)) in zip(item.fields, fields, strict=True):
         if not field.default_value:
             continue
-        inner, element = (node, value) if node == Nodetype.BASE else value[0]
+        inner, element = (node, value) if node in (Nodetype.BASE, Nodetype.NAME) else value[0]
         try:
             if inner != Nodetype.BASE:
                 raise ValueError("only plain values have a default")
