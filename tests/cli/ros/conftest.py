@@ -19,13 +19,14 @@ Twin = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    """A process with some nodes (some_graph.py), and where it listens."""
+def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
+    """A process with some nodes (some_graph.py, or what the module names as GRAPH), and where it listens."""
+    graph = GRAPH.with_name(getattr(request.module, "GRAPH", GRAPH.name))
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     with subprocess.Popen(
-        [sys.executable, str(GRAPH), address],
+        [sys.executable, str(graph), address],
         stdout=subprocess.PIPE,
         stdin=subprocess.PIPE,
         text=True,
