@@ -17,7 +17,7 @@ from twin.cli.ros.node_graph import GraphChoice, NodeGraph, Topic, graphviz, nod
 from twin.cli.ros.node_layout import GAP_Y, LINE_GAP, Edge, Layout, Size, lay_out
 
 TOPICS = (Path(__file__).with_name("warehouse_topics.txt")).read_text("utf-8").split("\n")
-"""Of a run of scenarios/warehouse.yaml: 'MP /amcl /amcl_pose' is a publisher, MS a subscription, NN a node."""
+"""Of a run of scenarios/warehouse.yaml: 'MP /amcl /amcl_pose' is a publisher; NN is a node."""
 
 
 def warehouse(choice: GraphChoice | None = None) -> NodeGraph:

@@ -11,7 +11,6 @@ from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.option_groups import takes
 from twin.cli.ros.topic_options import (
-    Interfaces,
     NodeName,
     QosChoice,
     TopicName,
@@ -112,7 +111,6 @@ def echo(
     *,
     style: EchoStyle,
     choice: QosChoice,
-    interfaces: Interfaces = None,
     node_name: NodeName = None,
     joining: Joining,
 ) -> None:
@@ -122,7 +120,7 @@ def echo(
     from twin.cli.ros.topic_process import open_topics
 
     accepts = compile_filter(filter_expr) if filter_expr else None
-    with open_topics(joining, node_name=node_name, interfaces=interfaces) as process:
+    with open_topics(joining, node_name=node_name) as process:
         name = process.topic(topic)
         if message_type is None:
             endpoints = process.wait_for_topic(name, timeout)

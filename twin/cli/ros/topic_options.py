@@ -1,10 +1,9 @@
-"""Options that several commands about topics share: quality of service, files with interfaces."""
+"""Options that several commands about topics share: names, quality of service."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,16 +17,6 @@ NodeName = Annotated[
     typer.Option("--node-name", "-n", metavar="NAME", help="Name of the node.", show_default="a hidden one"),
 ]
 Window = Annotated[int, typer.Option("--window", "-w", min=1, metavar="N", help="Messages to average over.")]
-Interfaces = Annotated[
-    list[Path] | None,
-    typer.Option(
-        metavar="DIR",
-        envvar="TWIN_INTERFACES",
-        exists=True,
-        file_okay=False,
-        help="Folder with packages of .msg, .srv and .action files.",
-    ),
-]
 
 
 class Profile(StrEnum):
