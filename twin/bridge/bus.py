@@ -48,6 +48,8 @@ class Bus:
         self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.node_options: NodeOptions | None = None
+        """Of nodes that are created without options: the program's command line."""
         self._nodes: list[Node] = []
         self._ids = 0
         self._thread = threading.get_ident()
@@ -116,6 +118,7 @@ class Bus:
         Raises:
             BridgeError: an invalid name, or one that is taken.
         """
+        options = options or self.node_options
         rules = options.arguments.remappings if options else ()
         name, namespace = names.renamed(name, namespace, rules)
         full_name = names.expand(names.node_name(name), names.namespace(namespace), name)

@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import router, tf, topic
+from twin.cli.ros import action, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -35,7 +35,14 @@ _COMMANDS = (
     ("router", router.router, "twin router --listen tcp/127.0.0.1:7447"),
 )
 
-_GROUPS = (("topic", topic.app), ("tf", tf.app))
+_GROUPS = (
+    ("topic", topic.app),
+    ("node", node.app),
+    ("service", service.app),
+    ("action", action.app),
+    ("param", param.app),
+    ("tf", tf.app),
+)
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
 

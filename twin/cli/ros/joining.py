@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.bridge.wire import Wire
+from twin.cli.ros.endings import quiet_pipe
+from twin.cli.ros.option_groups import takes
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -81,15 +82,11 @@ def _options(
 
 def joins(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
-    shared = inspect.signature(_options, eval_str=True).parameters
-    own = inspect.signature(command, eval_str=True)
+    joined = takes("joining", _options)(command)
 
-    @functools.wraps(command)
+    @functools.wraps(joined)
     def wrapper(**given: Any) -> None:
-        joining = _options(**{name: given.pop(name) for name in shared})
-        command(**given, joining=joining)
+        with quiet_pipe():
+            joined(**given)
 
-    parameters = [*(own.parameters[name] for name in own.parameters if name != "joining"), *shared.values()]
-    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapper
