@@ -19,12 +19,14 @@ from twin.bridge.bus import Bus
 from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
 from twin.bridge.console_log import show_log
-from twin.bridge.keys import topic_key
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.program_arguments import parser_of, split
-from twin.bridge.session import SessionConfig, direct
+from twin.bridge.session import SessionConfig, direct, endpoints
+from twin.bridge.wire import Wire
+from twin.bridge.wire_entrance import Entrance
+from twin.bridge.wire_naming import Interface
 from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -79,8 +81,11 @@ class SimTime:
         self._lock = threading.Lock()
         self._now_ns = 0
         name = self._codec.msgtype
-        key = topic_key(bus.domain_id, "/clock", types.dds_name(name), types.rihs01(name))
-        self._subscriber = bus.session.declare_subscriber(key, direct(self._on_sample))
+        clock = Interface("/clock", types.dds_name(name), types.rihs01(name))
+        self._entrance = Entrance(bus.external, clock)
+        self._subscribers = [
+            bus.session.declare_subscriber(key, direct(self._on_sample)) for key in bus.naming.heard(clock)
+        ]
 
     @property
     def now_ns(self) -> int:
@@ -89,6 +94,9 @@ class SimTime:
             return self._now_ns
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        attachment = sample.attachment.to_bytes() if sample.attachment else None
+        if self._entrance.source(str(sample.key_expr), attachment) is None:
+            return
         try:
             now_ns = ns(self._codec.decode(sample.payload.to_bytes()).clock)
         except Exception as error:  # whatever the bytes were, they are not our bug
@@ -108,6 +116,7 @@ def join(
     domain_id: int | None = None,
     use_sim_time: bool = False,
     timeout_s: float = 3.0,
+    wire: Wire = "rmw_zenoh",
 ) -> Iterator[LiveBus]:
     """Join a ROS graph, as a Zenoh client that opens no listener, and leave it at the end.
 
@@ -118,15 +127,21 @@ def join(
         domain_id: Default: ROS_DOMAIN_ID, or 0.
         use_sim_time: Whether the clock follows `/clock` instead of the wall clock.
         timeout_s: How long to try to connect [s].
+        wire: How keys and tokens are spelled; what comes in may be spelled in every way.
 
     Raises:
         BridgeError: nobody answers, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
     """
     file = config or _path(os.environ.get("ZENOH_SESSION_CONFIG_URI"))
     if connect is None:
-        connect = () if listen or file else (DEFAULT_ENDPOINT,)
+        connect = (
+            ()
+            if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
+            else (DEFAULT_ENDPOINT,)
+        )
     session = SessionConfig(
         mode="peer" if listen else "client",
+        wire=wire,
         listen=tuple(listen),
         connect=tuple(connect),
         file=file,

@@ -1,8 +1,7 @@
-"""Services and their clients, over Zenoh queryables with rmw_zenoh's keys."""
+"""Services and their clients, over Zenoh queryables."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +9,14 @@ import zenoh
 
 from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, pack_attachment, parse_attachment
+from twin.bridge.keys import Attachment, pack_attachment
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
+from twin.bridge.wire_entrance import Entrance
+from twin.bridge.wire_naming import parse_key
+from twin.bridge.wire_ros2dds import pack_request_id
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -98,8 +100,12 @@ class Service(Endpoint):
         self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
         self._callback = callback
         self._open: set[zenoh.Query] = set()
-        session = node.bus.session
-        self._declared.append(session.declare_queryable(self.key, direct(self._on_query), complete=True))
+        bus = node.bus
+        self._entrance = Entrance(bus.external, self.interface)
+        for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
+            queryable = bus.session.declare_queryable(key, direct(self._on_query), complete=True)
+            self._declared.append(queryable)
+        self.announce()
 
     def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
         """Put a request into the node's inbox."""
@@ -137,23 +143,26 @@ class Service(Endpoint):
                     return  # destroyed meanwhile: the client knows
                 raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
             self._open.discard(query)
-            attachment = pack_attachment(source.sequence, self.node.bus.clock.now_ns, source.gid)
+            now_ns = self.node.bus.clock.now_ns
+            typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
+            attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
             with query:
-                query.reply(self.key, self._responses.encode(response), attachment=attachment)
+                query.reply(query.key_expr, self._responses.encode(response), attachment=attachment)
 
         self._open.add(query)
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
         bus = self.node.bus
-        source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)
+        key, attachment = str(query.key_expr), query.attachment
+        source = self._entrance.source(key, attachment.to_bytes() if attachment else None)
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
-            bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
         elif bus.in_own_thread():
             self.enqueue((query, source), False)
         else:
-            bus.external.push(Arrival(source, self, (query, source)))
+            size = len(query.payload) if query.payload else 0
+            bus.external.push(Arrival(source, self, (query, source), size))
 
 
 class Client(Endpoint):
@@ -165,13 +174,16 @@ class Client(Endpoint):
         self._sequence = 0
         self._pending: dict[Future, None] = {}
         node.bus.standard_services.want(name, node.bus.nodes)
+        self._bridged = node.bus.naming.wire == "ros2dds"
         self._querier = node.bus.session.declare_querier(
             self.key,
-            target=zenoh.QueryTarget.ALL_COMPLETE,
+            # The bridge's queryables do not say that they are complete.
+            target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=_FOREVER_S,
         )
         self._declared.append(self._querier)
+        self.announce()
 
     @property
     def service_is_ready(self) -> bool:
@@ -224,22 +236,22 @@ class Client(Endpoint):
             else:
                 bus.external.push(Arrival(source, self, data))
 
-        answered = threading.Event()
+        answered: list[bool] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                answered.set()
+                answered.append(True)
                 deliver((future, reply.ok.payload.to_bytes()))
 
         def on_end() -> None:
-            # It may come in this thread, within `get`, while a reply from outside still waits to be admitted.
-            if not answered.is_set():
+            # May run in any thread, the bus's own too: it must not overtake a reply that waits outside.
+            if not answered:
                 deliver((future, None))
 
         self._querier.get(
             direct(on_reply, on_end),
             payload=self._requests.encode(request),
-            attachment=pack_attachment(*source),
+            attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
         )
         return future
 

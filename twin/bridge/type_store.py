@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,12 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from twin.bridge.interface_folders import find_definitions
-from twin.bridge.interface_parser import Definition, Structure
+from twin.bridge.interface_parser import Definition, Reference, Structure
 from twin.bridge.interface_shipped import shipped, shipped_names
 from twin.bridge.interface_text import definition_text
 from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import FieldDefs
+from twin.bridge.type_bounds import BASE_TYPES
 from twin.bridge.type_names import whole
 from twin.errors import BridgeError, Problem, nearest
 
@@ -27,6 +28,7 @@ definitions: ChainMap[str, Any] = ChainMap(store.fielddefs, derived)
 """Constants and fields of all loaded types."""
 defaults: dict[str, dict[str, Value]] = {
     "geometry_msgs/msg/Quaternion": {"w": 1.0},
+    "sensor_msgs/msg/NavSatStatus": {"status": -2},
 }
 """Default values, which rosbags drops: type name -> field -> value."""
 
@@ -84,7 +86,9 @@ def load(name: str) -> None:
     _loading.append(owner)
     try:
         sections = definition.parse()
-        _check_references([(definition, sections)])
+        unknown = _unknown_references(definition, sections)
+        if unknown:
+            raise BridgeError(unknown)
         for section in sections:
             for reference in section.references:
                 load(reference.typename)
@@ -135,36 +139,28 @@ def _exists(name: str) -> bool:
 
 
 def _add_all(given: list[Definition]) -> None:
-    problems: list[Problem] = []
-    parsed = []
-    for definition in given:
-        try:
-            parsed.append((definition, definition.parse()))
-        except BridgeError as fault:
-            problems += fault.problems
+    names = {definition.typename for definition in given}
     new: dict[str, Definition] = {}
-    for definition, sections in parsed:
+    problems: list[Problem] = []
+    for definition in given:
         name = definition.typename
+        sections, faults = definition.read()
+        if definition.file is not None:  # a text's references may still come
+            faults += _unknown_references(definition, sections, names)
         other = new.get(name) or _own.get(name) or shipped(name)
-        if other is None and name not in _in_library:
-            new[name] = definition
-        elif not _same(definition, sections, other):
+        if (
+            not faults
+            and (other is not None or name in _in_library)
+            and not _same(definition, sections, other)
+        ):
             where = other.where if other is not None else "ROS's own definition"
-            problems.append(
-                definition.problem(f"{name} is already known with another definition: {where}", 1)
-            )
-        elif other is not None and other.file is None:
+            faults.append(definition.problem(f"{name} is already known with another definition: {where}", 1))
+        problems += sorted(faults, key=lambda fault: fault.line or 0)
+        if other is None or other.file is None:
             new[name] = definition
     if problems:
         raise BridgeError(problems)
-    before = dict(_own)
     _own.update(new)
-    try:
-        _check_references([item for item in parsed if item[0].file is not None])
-    except BridgeError:
-        _own.clear()
-        _own.update(before)
-        raise
 
 
 def _same(definition: Definition, sections: tuple[Structure, ...], other: Definition | None) -> bool:
@@ -191,19 +187,18 @@ def _plain(description: Any) -> Any:
     return int(node), _plain(value[0]), value[1]
 
 
-def _check_references(parsed: list[tuple[Definition, tuple[Structure, ...]]]) -> None:
-    """Tell every type that a field names and that nobody knows."""
-    problems = [
+def _unknown_references(
+    definition: Definition, sections: Iterable[Structure], coming: Collection[str] = ()
+) -> list[Problem]:
+    """Return a fault for every type that a field names and that nobody knows."""
+    return [
         definition.problem(
-            f"the type {reference.written} is not known; {_near(reference.typename)}", reference.line
+            f"the type {reference.written} is not known; {_near(reference, definition)}", reference.line
         )
-        for definition, sections in parsed
         for section in sections
         for reference in section.references
-        if not _exists(reference.typename)
+        if reference.typename not in coming and not _exists(reference.typename)
     ]
-    if problems:
-        raise BridgeError(problems)
 
 
 def _register_message(name: str, section: Structure) -> None:
@@ -283,10 +278,19 @@ def _is_interface(name: str) -> bool:
     return kind != "msg" and (name == whole(name) or name.endswith(("_SendGoal", "_GetResult")))
 
 
-def _near(name: str) -> str:
-    """Return the tail of a message about an unknown type, with the nearest names."""
+def _near(reference: Reference, definition: Definition) -> str:
+    """Return the tail of a message about an unknown type in a definition, with the nearest names."""
+    if "/" in reference.written:
+        return _nearest_name(reference.typename)
+    own = definition.typename.split("/")[0] + "/msg/"
+    return nearest(
+        reference.written, [*BASE_TYPES, *(n.removeprefix(own) for n in names() if n.startswith(own))]
+    )
+
+
+def _nearest_name(name: str) -> str:
     package, kind, _ = name.split("/")
-    known = [*names(), *(n for n in store.types if kind != "msg")]
+    known = names()
     same = [n for n in known if n.startswith(f"{package}/{kind}/")]
     return nearest(name, same) if same else nearest(package, {n.split("/")[0] for n in known})
 
@@ -294,5 +298,5 @@ def _near(name: str) -> str:
 def _unknown(name: str) -> str:
     package, kind, _ = name.split("/")
     if any(n.startswith(f"{package}/{kind}/") for n in names()):
-        return f"the type {name} is not known; {_near(name)}"
-    return f"the type {name} is not known, nor any {kind} of {package}; {_near(name)}"
+        return f"the type {name} is not known; {_nearest_name(name)}"
+    return f"the type {name} is not known, nor any {kind} of {package}; {_nearest_name(name)}"

@@ -147,8 +147,8 @@ class ActionType:
 
 
 def dtype_of(base: str) -> np.dtype[Any]:
-    """Return the numpy type of the elements of an array of a base type other than string."""
-    return np.dtype({"char": "uint8", "byte": "uint8", "octet": "uint8"}.get(base, base))
+    """Return the numpy type of the elements of an array of a base type other than string, as received."""
+    return np.dtype({"char": "uint8", "byte": "int8", "octet": "int8"}.get(base, base))
 
 
 def defaults(typename: str) -> dict[str, Value]:

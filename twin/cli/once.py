@@ -33,7 +33,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 out=folder,
                 record=options.record,
                 pace=options.pace,
-                listen=options.listen,
+                network=options.network,
                 save_model=options.save_model,
                 progress=progress,
             )

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from twin.bridge.wire import Wire
 from twin.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from twin.bridge.session import SessionConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,8 +23,28 @@ class RunOptions:
     pace: float | None = None
     """Simulated seconds per second; None: as fast as possible."""
     listen: tuple[str, ...] = ()
+    connect: tuple[str, ...] = ()
+    wire: Wire = "rmw_zenoh"
+    zenoh_config: Path | None = None
+    domain_id: int = 0
     record: bool = True
     save_model: Path | None = None
+
+    @property
+    def network(self) -> SessionConfig | None:
+        """How the bus takes part in a network, None if it does not."""
+        if not (self.listen or self.connect or self.zenoh_config):
+            return None
+        from twin.bridge.session import SessionConfig
+
+        return SessionConfig(
+            mode="client" if self.connect and not self.listen else "peer",
+            listen=self.listen,
+            connect=self.connect,
+            file=self.zenoh_config,
+            wire=self.wire,
+            domain_id=self.domain_id,
+        )
 
     def arguments(self, out: Path) -> list[str]:
         """Return the arguments of a `twin` that does the same and prints JSON."""
@@ -27,6 +52,10 @@ class RunOptions:
         words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
         words += [] if self.pace is None else ["--pace", repr(self.pace)]
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
+        words += [word for endpoint in self.connect for word in ("--connect", endpoint)]
+        if self.network is not None:
+            words += ["--wire", self.wire, "--domain", str(self.domain_id)]
+        words += [] if self.zenoh_config is None else ["--zenoh-config", str(self.zenoh_config)]
         words += [] if self.record else ["--no-record"]
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 

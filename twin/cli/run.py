@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from twin.bridge.wire import Wire
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 
 
@@ -26,6 +27,18 @@ def run(
         list[str] | None,
         typer.Option(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
     ] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),
+    ] = None,
+    zenoh_config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", exists=True, dir_okay=False, help="Join as a Zenoh configuration says."),
+    ] = None,
+    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    domain: Annotated[
+        int, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain, if others may join.")
+    ] = 0,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")
     ] = None,
@@ -44,6 +57,10 @@ def run(
         overrides=parse_overrides(sets or [], seed),
         pace=parse_pace(pace),
         listen=tuple(listen or ()),
+        connect=tuple(connect or ()),
+        zenoh_config=zenoh_config,
+        wire=wire,
+        domain_id=domain,
         record=not no_record,
         save_model=save_model,
     )

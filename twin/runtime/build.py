@@ -10,6 +10,7 @@ from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.session import SessionConfig
 from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
@@ -56,6 +57,7 @@ def build(
     *,
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
     listen: Sequence[str] = (),
+    network: SessionConfig | None = None,
     crash_folder: Path | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
@@ -64,6 +66,7 @@ def build(
         scenario: What to build.
         taps: Called for every sample, from the first one on that a node publishes while it is made.
         listen: Endpoints for other processes.
+        network: How else the bus takes part in a network, instead of `listen`.
         crash_folder: Where the last states go if the physics diverges.
 
     Raises:
@@ -85,7 +88,7 @@ def build(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
     )
     clock = Clock()
-    bus = Bus.open(clock, listen=listen)
+    bus = Bus.open(clock, listen=listen) if network is None else Bus.of(network, clock)
     for tap in taps:
         bus.tap(tap)
     try:

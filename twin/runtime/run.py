@@ -24,6 +24,8 @@ from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
+    from twin.bridge.session import SessionConfig
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
@@ -147,6 +149,7 @@ def run(
     record: bool = True,
     pace: float | None = None,
     listen: Sequence[str] = (),
+    network: SessionConfig | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
@@ -159,6 +162,7 @@ def run(
         pace: Simulated seconds per second; None is as fast as possible. Changes no result.
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`; they make the run
             non-deterministic, and the verdict says so.
+        network: How else the bus takes part in a network, instead of `listen`.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
 
@@ -168,7 +172,7 @@ def run(
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
     taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
-    parts = build(scenario, taps=taps, listen=listen, crash_folder=out)
+    parts = build(scenario, taps=taps, listen=listen, network=network, crash_folder=out)
     try:
         if save_model is not None:
             _save_model(parts, save_model)
@@ -177,7 +181,7 @@ def run(
             sink.declare(parts.world)
         warm_up()
         wall, cpu = _loop(simulation, pace, progress)
-        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not listen)
+        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not parts.bus.networked)
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
@@ -236,6 +240,11 @@ def _loop(
     return elapsed
 
 
+def _refused(bus: Bus) -> dict[str, float]:
+    """Return how much from outside was not delivered, by reason; nothing without a network."""
+    return {f"refused_{reason.replace(' ', '_')}": float(n) for reason, n in sorted(bus.refused.items())}
+
+
 def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
@@ -251,6 +260,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, det
             "cpu_time_s": cpu,
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
+            **_refused(simulation.bus),
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=deterministic,

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.bridge.wire import Wire
+
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
 
@@ -24,6 +26,7 @@ class Joining:
     config: Path | None
     domain_id: int | None
     use_sim_time: bool
+    wire: Wire
 
     @contextmanager
     def open(self) -> Iterator[LiveBus]:
@@ -31,7 +34,11 @@ class Joining:
         from twin.bridge import live
 
         with live.join(
-            self.connect, config=self.config, domain_id=self.domain_id, use_sim_time=self.use_sim_time
+            self.connect,
+            config=self.config,
+            domain_id=self.domain_id,
+            use_sim_time=self.use_sim_time,
+            wire=self.wire,
         ) as process:
             yield process
 
@@ -61,12 +68,14 @@ def _options(
     use_sim_time: Annotated[
         bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
     ] = False,
+    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
 ) -> Joining:
     return Joining(
         connect=tuple(connect) if connect else None,
         config=config,
         domain_id=domain,
         use_sim_time=use_sim_time,
+        wire=wire,
     )
 
 
