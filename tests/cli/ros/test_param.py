@@ -78,6 +78,7 @@ def test_a_parameter_is_changed(twin_here: Twin) -> None:
     ("name", "value", "reason"),
     [
         ("max_speed", "9.0", "out of range"),
+        ("max_speed", "-1.0", "out of range"),
         ("serial", "8", "read-only"),
         ("robot_name", "5", "type"),
         ("wheel", "5", "wheel"),
