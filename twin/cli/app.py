@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import action, param, router, service, tf, topic
+from twin.cli.ros import action, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -37,10 +37,12 @@ _COMMANDS = (
 
 _GROUPS = (
     ("topic", topic.app),
+    ("node", node.app),
     ("service", service.app),
     ("action", action.app),
     ("param", param.app),
     ("tf", tf.app),
+    ("interface", interface.app),
 )
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 GRAPH = Path(__file__).with_name("some_graph.py")
+ROOT = Path(__file__).parents[3]
 
 Twin = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -24,7 +26,11 @@ def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     with subprocess.Popen(
-        [sys.executable, str(graph), address], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
+        [sys.executable, str(graph), address],
+        stdout=subprocess.PIPE,
+        stdin=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
