@@ -85,7 +85,7 @@ def test_every_default_of_rosidls_own_test_message() -> None:
     assert arrays.uint64_values_default.tolist() == [0, 1, 2**64 - 1]
     assert arrays.float32_values_default.dtype == np.float32
     assert arrays.string_values_default == ["", "max value", "min value"]
-    assert (arrays.byte_values_default & 255).tolist() == [0, 1, 255]
+    assert arrays.byte_values_default.view(np.uint8).tolist() == [0, 1, 255]
     assert arrays.bool_values_default.tolist() == [False, True, False]
     strings = new(types.get("test_msgs/msg/Strings"))
     assert strings.string_value_default2 == strings.string_value_default4 == "Hello'world!"

@@ -27,19 +27,35 @@ if TYPE_CHECKING:
     from twin.bridge.node import Node
 
 __all__ = [
+    "Buffer",
+    "ConnectivityException",
     "DisconnectedFramesError",
     "ExtrapolationError",
+    "ExtrapolationException",
+    "InvalidArgumentException",
     "InvalidFrameError",
+    "LookupException",
     "StaticTransformBroadcaster",
+    "TimeoutException",
     "TransformBroadcaster",
     "TransformBuffer",
     "TransformError",
+    "TransformException",
     "TransformFuture",
     "TransformListener",
     "TransformTimeoutError",
     "UnknownFrameError",
     "transform_stamped",
 ]
+
+# The names that programs for tf2_ros use.
+Buffer = TransformBuffer
+TransformException = TransformError
+LookupException = UnknownFrameError
+ConnectivityException = DisconnectedFramesError
+ExtrapolationException = ExtrapolationError
+InvalidArgumentException = InvalidFrameError
+TimeoutException = TransformTimeoutError
 
 # As in tf2_ros/qos.hpp
 _DYNAMIC = QoS(depth=100)

@@ -86,11 +86,7 @@ class BufferCore:
         static: bool = False,
         authority: object = UNKNOWN_AUTHORITY,
     ) -> bool:
-        """Do what `set_transform` does, with the numbers as they are in a message's order of reading.
-
-        Raises:
-            ValueError: as `set_transform`.
-        """
+        """Do what `set_transform` does, and raise what it raises, with plain numbers."""
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         if not parent or not child or parent == child:
             raise ValueError(f"{child!r} cannot be a child of {parent!r} (from {authority})")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import FieldDefs
 from twin.bridge.type_bounds import BASE_TYPES
 from twin.bridge.type_names import whole
+from twin.bridge.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
 store = get_typestore(Stores.ROS2_JAZZY)
@@ -27,10 +28,13 @@ derived: FieldDefs = {}
 definitions: ChainMap[str, Any] = ChainMap(store.fielddefs, derived)
 """Constants and fields of all loaded types."""
 defaults: dict[str, dict[str, Value]] = {
-    "geometry_msgs/msg/Quaternion": {"w": 1.0},
+    "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
     "sensor_msgs/msg/NavSatStatus": {"status": -2},
+    "type_description_interfaces/msg/FieldType": {"type_id": 0},
 }
-"""Default values, which rosbags drops: type name -> field -> value."""
+"""Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from
+the Jazzy branches of common_interfaces and rcl_interfaces."""
 
 _PADDING: Any = ("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
@@ -92,14 +96,14 @@ def load(name: str) -> None:
         for section in sections:
             for reference in section.references:
                 load(reference.typename)
-        _REGISTER[owner.split("/")[1]](owner, *sections)
+        _register_all(owner, sections)
     finally:
         _loading.pop()
     if name not in definitions:
         raise BridgeError(f"{owner} has no part {name}")
 
 
-def add_fields(given: FieldDefs) -> None:
+def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
     """Make types known by their fields; see `types.add_definitions`."""
     for name, (_, fields) in given.items():
         if _exists(name):
@@ -112,6 +116,7 @@ def add_fields(given: FieldDefs) -> None:
                 derived[name] = definition
             else:
                 _register(name, *definition)
+                defaults[name] = values.get(name, {})
 
 
 def text_of(name: str) -> str | None:
@@ -120,10 +125,11 @@ def text_of(name: str) -> str | None:
     if definition is not None:
         return definition.text
     load(name)
-    if name.split("/")[1] != "msg":
+    if name != whole(name):
         return None
-    constants, fields = store.fielddefs[name]
-    return definition_text(name, constants, fields, defaults.get(name, {}))
+    suffixes = {"msg": [""], "srv": ["_Request", "_Response"], "action": ["_Goal", "_Result", "_Feedback"]}
+    parts = [name + suffix for suffix in suffixes[name.split("/")[1]]]
+    return "---\n".join(definition_text(p, *store.fielddefs[p], defaults.get(p, {})) for p in parts)
 
 
 def names() -> list[str]:
@@ -201,11 +207,18 @@ def _unknown_references(
     ]
 
 
-def _register_message(name: str, section: Structure) -> None:
-    fields = section.fields or [_PADDING]
-    _register(name, section.constants, fields)
-    if section.defaults:
-        defaults[name] = section.defaults
+def _register_all(owner: str, sections: tuple[Structure, ...]) -> None:
+    """Register a definition's messages, and the structures as which a service or an action is hashed."""
+    kind = owner.split("/")[1]
+    if kind == "msg":
+        messages = {owner: sections[0]}
+    else:
+        messages = (service_parts if kind == "srv" else action_parts)(owner, *sections)
+        derived.update((service_structure if kind == "srv" else action_structures)(owner))
+    for name, section in messages.items():
+        _register(name, section.constants, section.fields or [_PADDING])
+        if section.defaults:
+            defaults[name] = section.defaults
 
 
 def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
@@ -214,62 +227,6 @@ def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
         store.register(plain)
     except TypesysError as error:  # such as fields `from` and `from_`, which Python cannot tell apart
         raise BridgeError(f"{name} cannot be used: {error}") from error
-
-
-def _register_service(name: str, request: Structure, response: Structure) -> None:
-    _register_message(f"{name}_Request", request)
-    _register_message(f"{name}_Response", response)
-    load("service_msgs/msg/ServiceEventInfo")
-    event = Structure(fields=[("info", _message("service_msgs/msg/ServiceEventInfo"))])
-    for field in ("request", "response"):
-        element = _message(f"{name}_{field.capitalize()}")
-        event.fields.append((field, (Nodetype.SEQUENCE, (element, 1))))
-    _register_message(f"{name}_Event", event)
-    _derive(name, request_message="_Request", response_message="_Response", event_message="_Event")
-
-
-def _register_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> None:
-    uuid = ("goal_id", _message("unique_identifier_msgs/msg/UUID"))
-    stamp = ("stamp", _message("builtin_interfaces/msg/Time"))
-    _register_message(f"{name}_Goal", goal)
-    _register_message(f"{name}_Result", result)
-    _register_message(f"{name}_Feedback", feedback)
-    _register_service(
-        f"{name}_SendGoal",
-        Structure(fields=[uuid, ("goal", _message(f"{name}_Goal"))]),
-        Structure(fields=[("accepted", (Nodetype.BASE, ("bool", 0))), stamp]),
-    )
-    _register_service(
-        f"{name}_GetResult",
-        Structure(fields=[uuid]),
-        Structure(fields=[("status", (Nodetype.BASE, ("int8", 0))), ("result", _message(f"{name}_Result"))]),
-    )
-    fields = [uuid, ("feedback", _message(f"{name}_Feedback"))]
-    _register_message(f"{name}_FeedbackMessage", Structure(fields=fields))
-    _derive(
-        name,
-        goal="_Goal",
-        result="_Result",
-        feedback="_Feedback",
-        send_goal_service="_SendGoal",
-        get_result_service="_GetResult",
-        feedback_message="_FeedbackMessage",
-    )
-
-
-_REGISTER: dict[str, Callable[..., None]] = {
-    "msg": _register_message,
-    "srv": _register_service,
-    "action": _register_action,
-}
-
-
-def _derive(name: str, **fields: str) -> None:
-    derived[name] = ([], [(field, _message(name + suffix)) for field, suffix in fields.items()])
-
-
-def _message(name: str) -> Any:
-    return Nodetype.NAME, name
 
 
 def _is_interface(name: str) -> bool:

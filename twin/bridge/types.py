@@ -67,13 +67,17 @@ def definitions(typename: str) -> Mapping[str, Any]:
     return type_store.definitions
 
 
-def add_definitions(definitions: FieldDefs) -> None:
+def add_definitions(definitions: FieldDefs, defaults: Mapping[str, dict[str, Value]]) -> None:
     """Make types known by their fields, in rosbags' form; every type that they use must be among them.
+
+    Args:
+        definitions: type name -> (constants, fields).
+        defaults: type name -> field -> default value.
 
     Raises:
         BridgeError: a type that is already known with other fields.
     """
-    type_store.add_fields(definitions)
+    type_store.add_fields(definitions, defaults)
 
 
 def text_of(typename: str) -> str | None:

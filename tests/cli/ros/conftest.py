@@ -30,7 +30,7 @@ def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
         stdout=subprocess.PIPE,
         stdin=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},  # of this checkout, wherever the package is installed
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -46,6 +46,16 @@ def twin(endpoint: str) -> Twin:
     def run(*arguments: str, timeout: float = 30.0) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "twin.cli", *arguments, "--connect", endpoint]
         return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+
+    return run
+
+
+@pytest.fixture
+def twin_here(endpoint: str, invoke: Callable[..., tuple[int, str, str]]) -> Twin:
+    """Run `twin …` in this process, connected to the graph: as `twin`, and several times as fast."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(arguments, *invoke(*arguments, "--connect", endpoint))
 
     return run
 

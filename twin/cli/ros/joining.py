@@ -14,6 +14,7 @@ import typer
 from twin.bridge.wire import Wire
 from twin.cli.ros.endings import quiet_pipe
 from twin.cli.ros.option_groups import takes
+from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -70,7 +71,9 @@ def _options(
         bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
     ] = False,
     wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    interfaces: Interfaces = None,
 ) -> Joining:
+    add_interfaces(interfaces)
     return Joining(
         connect=tuple(connect) if connect else None,
         config=config,

@@ -11,7 +11,6 @@ from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.option_groups import takes
 from twin.cli.ros.topic_options import (
-    Interfaces,
     NodeName,
     QosChoice,
     TopicName,
@@ -112,7 +111,6 @@ def echo(
     *,
     style: EchoStyle,
     choice: QosChoice,
-    interfaces: Interfaces = None,
     node_name: NodeName = None,
     joining: Joining,
 ) -> None:
@@ -122,7 +120,7 @@ def echo(
     from twin.cli.ros.topic_process import open_topics
 
     accepts = compile_filter(filter_expr) if filter_expr else None
-    with open_topics(joining, node_name=node_name, interfaces=interfaces) as process:
+    with open_topics(joining, node_name=node_name) as process:
         name = process.topic(topic)
         if message_type is None:
             endpoints = process.wait_for_topic(name, timeout)
@@ -216,14 +214,14 @@ class EchoPrinter:
         return value, None if _is_message(value) else field
 
     def _text(self, sample: RawSample, value: Any, field: Field | None) -> str:
-        from twin.bridge.message_repr import value_repr
         from twin.bridge.yaml_messages import message_to_csv, message_to_yaml, to_yaml
+        from twin.cli.ros.topic_values import value_text
 
         style = self._style
         info = self._info(sample) if style.message_info else {}
         if not _is_message(value):
             head = f"---Got new message, message info:---\n{info}\n---Message data:---\n" if info else ""
-            return f"{head}{value if field is None else value_repr(value, field)}\n---\n"
+            return f"{head}{value if field is None else value_text(value, field)}\n---\n"
         cut: Any = {"truncate_length": style.truncate_length, "no_arr": style.no_arr, "no_str": style.no_str}
         if style.csv:
             return ",".join([*map(str, info.values()), message_to_csv(value, **cut)]) + "\n"

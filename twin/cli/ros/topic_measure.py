@@ -10,7 +10,7 @@ import typer
 
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.topic_options import Interfaces, TopicName, Window
+from twin.cli.ros.topic_options import TopicName, Window
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -37,7 +37,6 @@ def hz(
     wall_time: Annotated[
         bool, typer.Option("--wall-time", help="Measure in wall time whatever --use-sim-time says.")
     ] = False,
-    interfaces: Interfaces = None,
     *,
     joining: Joining,
 ) -> None:
@@ -49,7 +48,7 @@ def hz(
     accepts = compile_filter(filter_expr) if filter_expr else None
     if wall_time:
         joining = replace(joining, use_sim_time=False)
-    with open_topics(joining, interfaces=interfaces) as process:
+    with open_topics(joining) as process:
         rates: dict[str, RateStatistics] = {}
         for topic in topics:
             name = process.topic(topic)
@@ -93,15 +92,14 @@ def bw(topic: TopicName, window: Window = 100, *, joining: Joining) -> None:
 
 @joins
 @endless
-def delay(
-    topic: TopicName, window: Window = 10_000, interfaces: Interfaces = None, *, joining: Joining
-) -> None:
+def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> None:
     """Print how old messages are by the stamps in their headers, every second."""
     from twin.bridge.msgs import ns
     from twin.bridge.topic_statistics import DelayStatistics
+    from twin.bridge.type_fields import fields_of
     from twin.cli.ros.topic_process import open_topics
 
-    with open_topics(joining, interfaces=interfaces) as process:
+    with open_topics(joining) as process:
         statistics = DelayStatistics(window)
         name = process.topic(topic)
 
@@ -110,7 +108,7 @@ def delay(
                 typer.echo("time has reset, resetting counters")
 
         cls = _listen(process, name, on_message)
-        if not hasattr(cls, "header"):
+        if "header" not in {field.name for field in fields_of(cls.__msgtype__)}:
             raise BridgeError(f"msg does not have header: {name} carries {cls.__msgtype__}")
 
         def report() -> None:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -77,19 +76,15 @@ class TopicProcess:
 
 
 @contextmanager
-def open_topics(
-    joining: Joining, *, node_name: str | None = None, interfaces: Sequence[Path] | None = None
-) -> Iterator[TopicProcess]:
+def open_topics(joining: Joining, *, node_name: str | None = None) -> Iterator[TopicProcess]:
     """Join a graph with one node, hidden unless it is named."""
-    from twin.bridge import types
     from twin.bridge.graph import Graph
+    from twin.bridge.node_options import BARE
 
-    if interfaces:
-        types.add_folders(interfaces)
     with joining.open() as live:
         # Zenoh answers at once from what it has when a watch begins: so look first, then wait for the same.
         there = set(Graph.snapshot(live.bus).endpoints)
-        node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}")
+        node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}", options=BARE)
         graph = Graph.watch(live.bus)
         live.spin(lambda: there <= set(graph.endpoints), _COMPLETE_S)
         try:

@@ -11,7 +11,7 @@ import typer
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.option_groups import takes
-from twin.cli.ros.topic_options import Interfaces, NodeName, QosChoice, TopicName, publisher_qos
+from twin.cli.ros.topic_options import NodeName, QosChoice, TopicName, publisher_qos
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -103,7 +103,6 @@ def pub(
     *,
     plan: PublishPlan,
     choice: QosChoice,
-    interfaces: Interfaces = None,
     node_name: NodeName = None,
     joining: Joining,
 ) -> None:
@@ -111,7 +110,7 @@ def pub(
     from twin.cli.ros.topic_process import open_topics
 
     given = _values(_read_stdin() if stdin else values)
-    with open_topics(joining, node_name=node_name, interfaces=interfaces) as process:
+    with open_topics(joining, node_name=node_name) as process:
         name = process.topic(topic)
         cls = _message_class(process, name, message_type)
         make = _maker(process, cls, given)
