@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from twin.cli.app import run_app
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -97,6 +99,23 @@ def start(endpoint: str) -> Iterator[Start]:
     for program in reversed(programs):
         program.interrupt()
         assert program.process.returncode == 0, program.text
+
+
+@pytest.fixture
+def command(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
+    """Run `twin …` beside the examples; return exit code, what it printed, and its errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["twin", *arguments, "--connect", endpoint])
+        with pytest.raises(SystemExit) as ended:
+            run_app()
+        captured = capsys.readouterr()
+        assert isinstance(ended.value.code, int)
+        return ended.value.code, captured.out, captured.err
+
+    return run
 
 
 def _wait_for_port(endpoint: str) -> None:

@@ -50,6 +50,16 @@ def twin(endpoint: str) -> Twin:
     return run
 
 
+@pytest.fixture
+def twin_here(endpoint: str, invoke: Callable[..., tuple[int, str, str]]) -> Twin:
+    """Run `twin …` in this process, connected to the graph: as `twin`, and several times as fast."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(arguments, *invoke(*arguments, "--connect", endpoint))
+
+    return run
+
+
 def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
     """Poll for what another process does."""
     deadline = time.monotonic() + timeout_s

@@ -9,10 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from twin.bridge import live
+from twin.bridge import live, types
 from twin.bridge.action_server import ActionServer, GoalHandle
 from twin.bridge.action_types import Fibonacci
+from twin.bridge.defaults import new
+from twin.bridge.msgs import ParameterDescriptor
 from twin.bridge.srvs import AddTwoInts, Empty, SetBool
+
+FloatingPointRange = types.get("rcl_interfaces/msg/FloatingPointRange")
 
 
 def fibonacci(handle: GoalHandle) -> Generator[None, None, Any]:
@@ -42,6 +46,24 @@ with live.join([], listen=[sys.argv[1]]) as process:
     base.create_service(Empty, "_hidden", lambda r: Empty.Response(0))
     acting = process.bus.create_node("fibonacci_action_server")
     ActionServer(acting, Fibonacci, "fibonacci", fibonacci, goal_callback=lambda goal: goal.order > 0)
+
+    settings = process.bus.create_node("settings")
+    for name, value in {
+        "robot_name": "r2d2",
+        "camera_on": True,
+        "wheels": 4,
+        "gains.p": 1.5,
+        "gains.limits": [0.5, 1.0],
+        "version": "1e-3",
+        "names": ["a", "1"],
+    }.items():
+        settings.declare_parameter(name, value)
+    limits = FloatingPointRange(0.0, 2.0, 0.0)
+    settings.declare_parameter(
+        "max_speed", 0.5, new(ParameterDescriptor, description="Of the wheels", floating_point_range=[limits])
+    )
+    settings.declare_parameter("serial", 7, new(ParameterDescriptor, read_only=True))
+    settings.declare_parameter("anything", 1, new(ParameterDescriptor, dynamic_typing=True))
 
     over = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()

@@ -20,8 +20,8 @@ def own(text: str) -> list[str]:
     return [line for line in text.splitlines() if not any(name in line for name in PARAMETERS)]
 
 
-def test_services_are_listed_with_their_types(twin: Twin) -> None:
-    done = twin("service", "list", "-t")
+def test_services_are_listed_with_their_types(twin_here: Twin) -> None:
+    done = twin_here("service", "list", "-t")
     assert done.stderr == ""
     assert own(done.stdout) == [
         "/add_two_ints [example_interfaces/srv/AddTwoInts]",
@@ -30,26 +30,26 @@ def test_services_are_listed_with_their_types(twin: Twin) -> None:
     ]
 
 
-def test_hidden_services_are_listed_if_wanted(twin: Twin) -> None:
-    shown = twin("service", "list").stdout.splitlines()
-    every = twin("service", "list", "--include-hidden-services").stdout.splitlines()
+def test_hidden_services_are_listed_if_wanted(twin_here: Twin) -> None:
+    shown = twin_here("service", "list").stdout.splitlines()
+    every = twin_here("service", "list", "--include-hidden-services").stdout.splitlines()
     assert {"/robot/_hidden", "/fibonacci/_action/send_goal"} <= set(every) - set(shown)
-    assert twin("service", "list", "-c").stdout == f"{len(shown)}\n"
+    assert twin_here("service", "list", "-c").stdout == f"{len(shown)}\n"
 
 
-def test_a_service_is_found_by_type_and_a_type_by_service(twin: Twin) -> None:
-    assert twin("service", "find", "std_srvs/srv/SetBool").stdout == "/robot/stop\n"
-    assert twin("service", "find", "-a", "-c", "std_srvs/srv/Empty").stdout == "2\n"
-    assert twin("service", "type", "/robot/stop").stdout == "std_srvs/srv/SetBool\n"
+def test_a_service_is_found_by_type_and_a_type_by_service(twin_here: Twin) -> None:
+    assert twin_here("service", "find", "std_srvs/srv/SetBool").stdout == "/robot/stop\n"
+    assert twin_here("service", "find", "-a", "-c", "std_srvs/srv/Empty").stdout == "2\n"
+    assert twin_here("service", "type", "/robot/stop").stdout == "std_srvs/srv/SetBool\n"
 
 
-def test_info_counts_clients_and_servers(twin: Twin) -> None:
-    done = twin("service", "info", "/add_two_ints")
+def test_info_counts_clients_and_servers(twin_here: Twin) -> None:
+    done = twin_here("service", "info", "/add_two_ints")
     assert done.stdout == "Type: example_interfaces/srv/AddTwoInts\nClients count: 1\nServices count: 1\n"
 
 
-def test_verbose_info_describes_each_of_them(twin: Twin) -> None:
-    lines = twin("service", "info", "-v", "/add_two_ints").stdout.split("\n\n")
+def test_verbose_info_describes_each_of_them(twin_here: Twin) -> None:
+    lines = twin_here("service", "info", "-v", "/add_two_ints").stdout.split("\n\n")
     assert lines[0].splitlines()[1] == "Clients count: 1"
     client, server = lines[1], lines[3]
     assert client.startswith("Node name: base\nNode namespace: /robot\nService type: example_interfaces/")
@@ -63,16 +63,16 @@ def test_verbose_info_describes_each_of_them(twin: Twin) -> None:
 
 
 @pytest.mark.parametrize("command", ["info", "type"])
-def test_an_unknown_service_names_the_nearest(twin: Twin, command: str) -> None:
-    done = twin("service", command, "/add_two_int")
+def test_an_unknown_service_names_the_nearest(twin_here: Twin, command: str) -> None:
+    done = twin_here("service", command, "/add_two_int")
     assert done.returncode == 2
     assert done.stderr.startswith(
         "error: Unknown service '/add_two_int'; did you mean '/add_two_ints'? Valid: "
     )
 
 
-def test_a_call_prints_request_and_response_as_ros2_does(twin: Twin) -> None:
-    done = twin("service", "call", *ADD, "{a: 2, b: 3}")
+def test_a_call_prints_request_and_response_as_ros2_does(twin_here: Twin) -> None:
+    done = twin_here("service", "call", *ADD, "{a: 2, b: 3}")
     assert done.stderr == ""
     assert done.stdout == (
         "requester: making request: example_interfaces.srv.AddTwoInts_Request(a=2, b=3)\n\n"
@@ -80,8 +80,8 @@ def test_a_call_prints_request_and_response_as_ros2_does(twin: Twin) -> None:
     )
 
 
-def test_a_call_without_values_sends_defaults_and_takes_the_short_type(twin: Twin) -> None:
-    done = twin("service", "call", "/robot/stop", "std_srvs/SetBool")
+def test_a_call_without_values_sends_defaults_and_takes_the_short_type(twin_here: Twin) -> None:
+    done = twin_here("service", "call", "/robot/stop", "std_srvs/SetBool")
     assert "std_srvs.srv.SetBool_Request(data=False)" in done.stdout
     assert "std_srvs.srv.SetBool_Response(success=False, message='goes on')" in done.stdout
 
@@ -108,17 +108,17 @@ def test_a_request_is_read_from_standard_input(endpoint: str) -> None:
     ],
 )
 def test_what_cannot_be_called_is_said_in_a_sentence(
-    twin: Twin, arguments: tuple[str, ...], message: str
+    twin_here: Twin, arguments: tuple[str, ...], message: str
 ) -> None:
-    done = twin("service", "call", *arguments)
+    done = twin_here("service", "call", *arguments)
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
     assert message in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_waiting_for_a_service_ends_with_the_time_out(twin: Twin) -> None:
-    done = twin("service", "call", "/add_two", "std_srvs/srv/Empty", "--timeout", "0.3")
+def test_waiting_for_a_service_ends_with_the_time_out(twin_here: Twin) -> None:
+    done = twin_here("service", "call", "/add_two", "std_srvs/srv/Empty", "--timeout", "0.3")
     assert done.stdout == "waiting for service to become available...\n"
     assert done.returncode == 2
     assert done.stderr.startswith("error: Unknown service '/add_two'; did you mean '/add_two_ints'?")

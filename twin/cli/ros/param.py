@@ -114,7 +114,12 @@ def get(
         typer.echo(label if value is None else f"{label} {value}")
 
 
-@app.command("set", no_args_is_help=True, epilog="Example: [bold]twin param set /talker max_speed 0.5[/bold]")
+@app.command(
+    "set",
+    no_args_is_help=True,
+    context_settings={"ignore_unknown_options": True},  # -1.0 is a value
+    epilog="Example: [bold]twin param set /talker max_speed 0.5[/bold]",
+)
 @joins
 def set_parameter(
     node: Node,
