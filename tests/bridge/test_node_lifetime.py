@@ -179,3 +179,20 @@ def test_levels_are_inherited_and_set_from_outside(bus: Bus, heard: list[Log]) -
     assert log.get_child("other").debug("heard too")
     bus.spin()
     assert [(m.name, m.msg) for m in heard] == [("r.n", "heard"), ("r.n.other", "heard too")]
+
+
+def test_a_node_sees_the_graph(bus: Bus) -> None:
+    node, other = bus.create_node("a", "r"), bus.create_node("b")
+    for owner in (node, other):
+        owner.create_publisher(String, "/x")
+    other.create_subscription(String, "/x", print)
+    assert (node.count_publishers("/x"), node.count_subscribers("/x"), node.count_publishers("x")) == (
+        2,
+        1,
+        0,
+    )
+    assert sorted(node.get_node_names_and_namespaces()) == [("a", "/r"), ("b", "/")]
+    assert node.get_topic_names_and_types() == [("/x", ["std_msgs/msg/String"])]
+    other.destroy()
+    assert node.get_node_names() == ["a"]
+    assert node.get_service_names_and_types() == []

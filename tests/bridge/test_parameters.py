@@ -27,11 +27,13 @@ from twin.bridge.srvs import (
     SetParameters,
     SetParametersAtomically,
 )
+from twin.bridge.type_description_service import GetTypeDescription
 from twin.errors import BridgeError
 
 IntegerRange = types.get("rcl_interfaces/msg/IntegerRange")
 FloatingPointRange = types.get("rcl_interfaces/msg/FloatingPointRange")
 
+BUILT_IN = ["use_sim_time", "start_type_description_service"]
 VALUES = {
     Type.BOOL: True,
     Type.INTEGER: -(2**63),
@@ -257,9 +259,9 @@ def test_the_services_answer_as_rclpys_do(bus: Bus, amcl: Node) -> None:
 @pytest.mark.parametrize(
     ("prefixes", "depth", "names", "parents"),
     [
-        ([], 0, ["use_sim_time", "frame", "laser.range", "laser.beams.max"], ["laser", "laser.beams"]),
-        ([], 1, ["use_sim_time", "frame"], []),
-        ([], 2, ["use_sim_time", "frame", "laser.range"], ["laser"]),
+        ([], 0, [*BUILT_IN, "frame", "laser.range", "laser.beams.max"], ["laser", "laser.beams"]),
+        ([], 1, [*BUILT_IN, "frame"], []),
+        ([], 2, [*BUILT_IN, "frame", "laser.range"], ["laser"]),
         (["laser"], 0, ["laser.range", "laser.beams.max"], ["laser", "laser.beams"]),
         (["laser"], 1, ["laser.range"], ["laser"]),
         (["frame", "las"], 0, ["frame"], []),
@@ -305,3 +307,18 @@ def test_an_empty_list_takes_the_declared_type(bus: Bus) -> None:
     assert node.declare_parameter("plugins", ["a"]).type_ is Type.STRING_ARRAY
     assert node.set_parameter("plugins", []).value == []
     assert value_msg(Type.DOUBLE_ARRAY, []).double_array_value.size == 0
+
+
+def test_a_node_describes_types(bus: Bus) -> None:
+    bus.create_node("n")
+    name = "geometry_msgs/msg/Twist"
+    answer = ask(bus, GetTypeDescription, "/n/get_type_description", name, types.rihs01(name), True)
+    assert answer.successful
+    assert answer.type_description.type_description.type_name == name
+    assert [t.type_name for t in answer.type_description.referenced_type_descriptions] == [
+        "geometry_msgs/msg/Vector3"
+    ]
+    assert len(answer.type_sources) == 2
+    for wrong in ((name, "RIHS01_00", False), ("no_msgs/msg/None", "RIHS01_00", False), (name, "md5", False)):
+        answer = ask(bus, GetTypeDescription, "/n/get_type_description", *wrong)
+        assert (answer.successful, bool(answer.failure_reason)) == (False, True)

@@ -13,7 +13,7 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import ExternalQueue
+from twin.bridge.external import Arrival, ExternalQueue
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_services import StandardServices
@@ -48,6 +48,8 @@ class Bus:
         self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.arrival_taps: list[Callable[[Arrival], None]] = []
+        """Called for everything from outside when it enters, before a node has it."""
         self.node_options: NodeOptions | None = None
         """Of nodes that are created without options: the program's command line."""
         self._nodes: list[Node] = []
@@ -146,6 +148,8 @@ class Bus:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
         arrivals = self.external.drain()
         for arrival in arrivals:
+            for tap in self.arrival_taps:
+                tap(arrival)
             arrival.receiver.enqueue(arrival.data, True)
         return len(arrivals)
 

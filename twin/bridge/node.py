@@ -11,6 +11,7 @@ from twin.bridge.clock import Clock
 from twin.bridge.keys import NodeToken
 from twin.bridge.logger import Logger, Rosout, logger_name
 from twin.bridge.msgs import ParameterEvent
+from twin.bridge.node_graph import NodeGraph
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_parameters import NodeParameters, start_parameters
 from twin.bridge.qos import QoS, as_qos
@@ -41,7 +42,7 @@ class OwnedEndpoint(Protocol):
 _PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
 
 
-class Node(NodeParameters):
+class Node(NodeParameters, NodeGraph):
     """Publishers, subscriptions, timers, services, parameters under one name; see `Bus.create_node`."""
 
     def __init__(

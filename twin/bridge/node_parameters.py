@@ -220,7 +220,14 @@ def start_parameters(node: Node, overrides: Mapping[str, Any]) -> Parameters:
         read_only=True,
     )
     parameters.declare("use_sim_time", node.bus.use_sim_time, described, ignore_override=True)
-    parameters.publish = node.publish_parameter_event  # not for the one before: 25 nodes would say the same
+    described = new(
+        ParameterDescriptor,
+        description="If enabled, start the ~/get_type_description service.",
+        read_only=True,
+    )
+    enabled = node.options.start_type_description_service
+    parameters.declare("start_type_description_service", enabled, described)
+    parameters.publish = node.publish_parameter_event  # not of these two: 25 nodes would say the same
     if node.options.automatically_declare_parameters_from_overrides:
         for name, value in given.items():
             if name not in parameters.names:

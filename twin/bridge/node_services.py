@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+from twin.bridge import type_description_service
 from twin.bridge.parameter_services import ParameterServices
 from twin.bridge.types import ServiceType
 
@@ -66,5 +67,7 @@ def offer(node: Node) -> None:
         offered |= ParameterServices(node.parameters).offered
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered
+    if node.get_parameter("start_type_description_service").value:
+        offered |= type_description_service.offered()
     for name, (srv_type, callback) in offered.items():
         node.create_service(srv_type, f"~/{name}", callback)

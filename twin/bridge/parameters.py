@@ -110,6 +110,21 @@ class Parameters:
             raise InvalidParameterValueException(self.node, name, value, result.reason)
         return self._declared[name]
 
+    def declare_together(self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]]) -> None:
+        """Declare many, and tell of them in one event.
+
+        Raises:
+            BridgeError: as `declare`.
+        """
+        together = new(ParameterEvent, stamp=stamp(self._now_ns()), node=self.node)
+        publish, self.publish = self.publish, lambda e: together.new_parameters.extend(e.new_parameters)
+        try:
+            for name, value, descriptor in parameters:
+                self.declare(name, value, descriptor)
+        finally:
+            self.publish = publish
+        self.publish(together)
+
     def undeclare(self, name: str) -> None:
         """Forget a parameter.
 

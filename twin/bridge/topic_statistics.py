@@ -51,7 +51,7 @@ class RateStatistics:
             self._gaps_ns.clear()
             return restarted
         if self._first_ns < 0 or now_ns < self._first_ns:
-            self._first_ns = now_ns
+            self._first_ns = self._reported_ns = now_ns
             self._gaps_ns.clear()
         else:
             self._gaps_ns.append(now_ns - self._last_ns)
@@ -62,9 +62,6 @@ class RateStatistics:
         """Return the gaps [ns]; None if nothing came so long [ns] after the last report or first message."""
         if not self._gaps_ns:
             return None
-        self._reported_ns = self._reported_ns or self._first_ns
-        if self._last_ns < self._reported_ns:
-            self._reported_ns = self._last_ns
         if self._last_ns < self._reported_ns + at_least_ns:
             return None
         self._reported_ns = self._last_ns

@@ -9,14 +9,14 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-import zenoh
-import zenoh.ext
-
 from twin.bridge import types
 from twin.bridge.graph import EndpointInfo, Graph
-from twin.bridge.keys import EndpointKind, gid, pack_attachment, topic_key
+from twin.bridge.keys import EndpointKind, gid, pack_attachment
 from twin.bridge.qos import QoS
 from twin.bridge.raw import RawSample, RawSubscription
+from twin.bridge.topic_types import hash_of, same_hash
+from twin.bridge.topics import declare_publisher
+from twin.bridge.wire_naming import Interface
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 Gate = Callable[[int, int], bool]
 """Says of a message, by the time [ns] and its size [bytes], whether it may pass."""
 
-_HEARTBEAT_S = 0.5
 _RELAY_DEPTH = 10
 
 
@@ -36,10 +35,12 @@ class Presence:
         self, node: Node, kind: EndpointKind, name: str, typename: str, type_hash: str, qos: QoS
     ) -> None:
         bus = node.bus
-        self.dds_name = types.dds_name(typename) if typename.count("/") == 2 else typename
-        token = node.token.endpoint(bus.next_id(), kind, name, self.dds_name, type_hash, qos)
+        dds_name = types.dds_name(typename) if typename.count("/") == 2 else typename
+        self.interface = Interface(name, dds_name, type_hash)
+        token = node.token.endpoint(bus.next_id(), kind, name, dds_name, bus.naming.type_hash(type_hash), qos)
         self.gid = gid(token)
-        self._token: Any = bus.session.liveliness().declare_token(token)
+        spelled = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
+        self._token: Any = None if spelled is None else bus.session.liveliness().declare_token(spelled)
         node.add_endpoint(self)
 
     def destroy(self) -> None:
@@ -60,8 +61,8 @@ class RawPublisher:
         self._bus = node.bus
         self._sequence = 0
         self._presence = Presence(node, "MP", topic, typename, type_hash, qos)
-        key = topic_key(self._bus.domain_id, topic, self._presence.dds_name, type_hash)
-        self._zenoh: Any = self._declared(key)
+        key = self._bus.naming.key(self._presence.interface)
+        self._zenoh: Any = declare_publisher(self._bus.session, key, qos)
         node.add_endpoint(self)
 
     def publish(self, payload: bytes) -> None:
@@ -76,20 +77,6 @@ class RawPublisher:
         if self._zenoh is not None:
             self._zenoh.undeclare()
             self._zenoh = None
-
-    def _declared(self, key: str) -> Any:
-        session, drop = self._bus.session, zenoh.CongestionControl.DROP
-        if self.qos.durability != "transient_local":
-            return session.declare_publisher(key, congestion_control=drop)
-        miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
-        return zenoh.ext.declare_advanced_publisher(
-            session,
-            key,
-            congestion_control=drop,
-            cache=zenoh.ext.CacheConfig(self.qos.depth),
-            sample_miss_detection=miss if self.qos.reliability == "reliable" else None,
-            publisher_detection=True,
-        )
 
 
 class Relay:
@@ -125,17 +112,17 @@ class Relay:
         if not publishers:
             self._stop()
             return
-        first, qos = publishers[0], qos_for_all(publishers)
+        typename, type_hash, qos = publishers[0].type, hash_of(publishers[0]), qos_for_all(publishers)
         now = self._publisher
-        if now is None or (now.type, now.type_hash, now.qos) != (first.type, first.type_hash, qos):
+        if now is None or (now.type, now.type_hash, now.qos) != (typename, type_hash, qos):
             self._stop()
-            self._start(first, qos)
+            self._start(typename, type_hash, qos)
 
-    def _start(self, source: EndpointInfo, qos: QoS) -> None:
+    def _start(self, typename: str, type_hash: str, qos: QoS) -> None:
         node = self._node
-        self._publisher = RawPublisher(node, self.target, source.type, source.type_hash, qos)
+        self._publisher = RawPublisher(node, self.target, typename, type_hash, qos)
         self._heard = [
-            Presence(node, "MS", self.source, source.type, source.type_hash, qos),
+            Presence(node, "MS", self.source, typename, type_hash, qos),
             RawSubscription(node, self.source, self._on_sample, QoS(depth=1000, durability=qos.durability)),
         ]
 
@@ -146,7 +133,7 @@ class Relay:
 
     def _on_sample(self, sample: RawSample) -> None:
         out = self._publisher
-        if out is None or (sample.type, sample.type_hash) != (out.type, out.type_hash):
+        if out is None or sample.type != out.type or not same_hash(sample.type_hash, out.type_hash):
             return
         if self._gate is None or self._gate(self._node.now_ns, len(sample.payload)):
             self.passed += 1

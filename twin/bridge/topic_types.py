@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge import types
+from twin.bridge.wire_naming import HUMBLE_HASH
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from twin.bridge.node import Node
 
 _TIMEOUT_S = 3.0
-UNSUPPORTED_HASH = "TypeHashNotSupported"
-"""Of Humble, which has no hashes."""
+_UNTOLD = ("", HUMBLE_HASH)
+"""What stands for a hash where a wire knows none."""
 
 
 def only_type(name: str, endpoints: Sequence[EndpointInfo]) -> str:
@@ -48,12 +49,24 @@ def message_class(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo
         _learn(process, node, endpoints)
     cls = types.get(typename)
     ours, theirs = types.rihs01(typename), endpoints[0].type_hash
-    if theirs not in (ours, UNSUPPORTED_HASH):
+    if not same_hash(ours, theirs):
         raise BridgeError(
             f"{endpoints[0].name}: {endpoints[0].node.full_name} has another definition of {typename} "
             f"({theirs}) than is known here ({ours}); give its files with --interfaces DIR"
         )
     return cls
+
+
+def hash_of(endpoint: EndpointInfo) -> str:
+    """Return the hash with which an endpoint's type is sent, also if Humble or a bridge does not tell it."""
+    if endpoint.type_hash not in _UNTOLD:
+        return endpoint.type_hash
+    return types.rihs01(endpoint.type) if _is_known(endpoint.type) else HUMBLE_HASH
+
+
+def same_hash(one: str, other: str) -> bool:
+    """Return whether two hashes may be those of one definition: who tells none may mean any."""
+    return one == other or one in _UNTOLD or other in _UNTOLD
 
 
 def _is_known(typename: str) -> bool:

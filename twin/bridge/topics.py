@@ -10,7 +10,7 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr import Codec, codec
+from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
 from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.qos import INFINITE_NS, QoS
@@ -32,17 +32,20 @@ _KEEP_ALL = 100_000
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "time_ns", "topic")
+    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
-    def __init__(self, topic: str, time_ns: int, message: M, message_codec: Codec[M]) -> None:
-        self.topic = topic
+    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        """The publisher's count, from 1."""
+        self.topic: str = publisher.name
         """Absolute name."""
-        self.msgtype = message_codec.msgtype
+        self.msgtype = publisher.codec.msgtype
         self.time_ns = time_ns
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = message_codec
+        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
@@ -61,7 +64,7 @@ class Endpoint:
         self.interface = Interface(name, types.dds_name(typename), types.rihs01(typename))
         type_hash = bus.naming.type_hash(self.interface.type_hash)
         token = node.token.endpoint(bus.next_id(), kind, name, self.interface.dds_name, type_hash, qos)
-        self.name = name
+        self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
         self.qos = qos
@@ -91,7 +94,7 @@ class Publisher(Endpoint, Generic[M]):
         self._bus = node.bus
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
-        self._zenoh: Any = _declare_publisher(node.bus.session, self.key, qos)
+        self._zenoh: Any = declare_publisher(node.bus.session, self.key, qos)
         self._declared.append(self._zenoh)
         self.announce()
 
@@ -115,7 +118,7 @@ class Publisher(Endpoint, Generic[M]):
         time_ns = self._bus.clock.now_ns
         sample = None
         if self._bus.taps:
-            sample = Sample(self.name, time_ns, message, self.codec)
+            sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
@@ -203,7 +206,7 @@ class Subscription(Endpoint, Generic[M]):
             bus.external.push(Arrival(source, self, (payload, source), len(payload)))
 
 
-def _declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
     """Return a publisher with rmw_zenoh's settings (rmw_publisher_data.cpp)."""
     reliable = qos.reliability == "reliable"
     waits = reliable and qos.history == "keep_all"

@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import action, interface, node, param, router, service, tf, topic
+from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -43,6 +43,7 @@ _GROUPS = (
     ("param", param.app),
     ("tf", tf.app),
     ("interface", interface.app),
+    ("bag", bag.app),
 )
 
 _NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")

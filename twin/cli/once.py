@@ -34,6 +34,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 record=options.record,
                 pace=options.pace,
                 network=options.network,
+                bag=folder / "bag" if options.bag else None,
                 save_model=options.save_model,
                 progress=progress,
             )

@@ -28,6 +28,8 @@ class RunOptions:
     zenoh_config: Path | None = None
     domain_id: int = 0
     record: bool = True
+    bag: bool = False
+    """Whether a bag is written into the folder of the results."""
     save_model: Path | None = None
 
     @property
@@ -57,6 +59,7 @@ class RunOptions:
             words += ["--wire", self.wire, "--domain", str(self.domain_id)]
         words += [] if self.zenoh_config is None else ["--zenoh-config", str(self.zenoh_config)]
         words += [] if self.record else ["--no-record"]
+        words += ["--bag"] if self.bag else []
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 
 

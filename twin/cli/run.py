@@ -43,6 +43,9 @@ def run(
         Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no Rerun recording.")] = False,
+    bag: Annotated[
+        bool, typer.Option("--bag", help="Also write a ROS 2 bag of every message: <out>/bag.")
+    ] = False,
     save_model: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
     ] = None,
@@ -62,6 +65,7 @@ def run(
         wire=wire,
         domain_id=domain,
         record=not no_record,
+        bag=bag,
         save_model=save_model,
     )
     if repeat == 1 and not expect_one_hash:

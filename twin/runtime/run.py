@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from twin.bridge.bags.tap import BagTap
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.errors import RecordingError, ScenarioError
@@ -150,6 +151,7 @@ def run(
     pace: float | None = None,
     listen: Sequence[str] = (),
     network: SessionConfig | None = None,
+    bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
@@ -163,6 +165,7 @@ def run(
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`; they make the run
             non-deterministic, and the verdict says so.
         network: How else the bus takes part in a network, instead of `listen`.
+        bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
 
@@ -172,8 +175,12 @@ def run(
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
     taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
-    parts = build(scenario, taps=taps, listen=listen, network=network, crash_folder=out)
+    bag_tap = None if bag is None else BagTap(bag)
+    bag_taps = [] if bag_tap is None else [bag_tap.on_sample]
+    parts = build(scenario, taps=[*taps, *bag_taps], listen=listen, network=network, crash_folder=out)
     try:
+        if bag_tap is not None:
+            parts.bus.arrival_taps.append(bag_tap.on_arrival)
         if save_model is not None:
             _save_model(parts, save_model)
         simulation = Run(scenario, parts, sink)
@@ -188,6 +195,8 @@ def run(
     finally:
         if sink is not None:
             sink.close()
+        if bag_tap is not None:
+            bag_tap.close()
         parts.bus.close()
 
 

@@ -30,7 +30,7 @@ def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
         stdout=subprocess.PIPE,
         stdin=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},  # of this checkout, wherever the package is installed
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"

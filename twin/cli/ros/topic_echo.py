@@ -214,14 +214,14 @@ class EchoPrinter:
         return value, None if _is_message(value) else field
 
     def _text(self, sample: RawSample, value: Any, field: Field | None) -> str:
-        from twin.bridge.message_repr import value_repr
         from twin.bridge.yaml_messages import message_to_csv, message_to_yaml, to_yaml
+        from twin.cli.ros.topic_values import value_text
 
         style = self._style
         info = self._info(sample) if style.message_info else {}
         if not _is_message(value):
             head = f"---Got new message, message info:---\n{info}\n---Message data:---\n" if info else ""
-            return f"{head}{value if field is None else value_repr(value, field)}\n---\n"
+            return f"{head}{value if field is None else value_text(value, field)}\n---\n"
         cut: Any = {"truncate_length": style.truncate_length, "no_arr": style.no_arr, "no_str": style.no_str}
         if style.csv:
             return ",".join([*map(str, info.values()), message_to_csv(value, **cut)]) + "\n"

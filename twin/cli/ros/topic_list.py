@@ -142,11 +142,17 @@ def _described(endpoint: EndpointInfo) -> str:
             f"GID: {'.'.join(f'{byte:02x}' for byte in endpoint.gid)}",
             "QoS profile:",
             f"  Reliability: {qos.reliability.upper()}",
-            f"  History (Depth): KEEP_LAST ({qos.depth})",
+            f"  History (Depth): {f'KEEP_LAST ({qos.depth})' if qos.history == 'keep_last' else 'KEEP_ALL'}",
             f"  Durability: {qos.durability.upper()}",
-            "  Lifespan: Infinite",
-            "  Deadline: Infinite",
-            "  Liveliness: AUTOMATIC",
-            "  Liveliness lease duration: Infinite",
+            f"  Lifespan: {_duration(qos.lifespan_ns)}",
+            f"  Deadline: {_duration(qos.deadline_ns)}",
+            f"  Liveliness: {qos.liveliness.upper()}",
+            f"  Liveliness lease duration: {_duration(qos.lease_ns)}",
         )
     )
+
+
+def _duration(nanoseconds: int) -> str:
+    from twin.bridge.qos import INFINITE_NS
+
+    return "Infinite" if nanoseconds == INFINITE_NS else f"{nanoseconds} nanoseconds"

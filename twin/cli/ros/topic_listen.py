@@ -40,7 +40,9 @@ class Listener:
         cls, process: TopicProcess, name: str, endpoints: Sequence[EndpointInfo], message: type[Any] | None
     ) -> Listener:
         """Listen to a topic that exists; without a class only to its bytes."""
-        return cls(process, name, endpoints[0].type, endpoints[0].type_hash, message)
+        from twin.bridge.topic_types import hash_of
+
+        return cls(process, name, endpoints[0].type, hash_of(endpoints[0]), message)
 
     @classmethod
     def of_type(cls, process: TopicProcess, name: str, typename: str) -> Listener:
@@ -86,7 +88,9 @@ class Listener:
             return None
 
     def _is_ours(self, sample: RawSample) -> bool:
-        if (sample.type, sample.type_hash) == (self._type, self._type_hash):
+        from twin.bridge.topic_types import same_hash
+
+        if sample.type == self._type and same_hash(sample.type_hash, self._type_hash):
             return True
         if sample.type != self._type:
             self._tell(sample.type, f"somebody publishes {sample.type} on {self.name}, not {self._type}")

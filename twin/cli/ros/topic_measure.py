@@ -96,6 +96,7 @@ def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> Non
     """Print how old messages are by the stamps in their headers, every second."""
     from twin.bridge.msgs import ns
     from twin.bridge.topic_statistics import DelayStatistics
+    from twin.bridge.type_fields import fields_of
     from twin.cli.ros.topic_process import open_topics
 
     with open_topics(joining) as process:
@@ -107,7 +108,7 @@ def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> Non
                 typer.echo("time has reset, resetting counters")
 
         cls = _listen(process, name, on_message)
-        if not hasattr(cls, "header"):
+        if "header" not in {field.name for field in fields_of(cls.__msgtype__)}:
             raise BridgeError(f"msg does not have header: {name} carries {cls.__msgtype__}")
 
         def report() -> None:

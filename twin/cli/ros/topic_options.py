@@ -18,9 +18,6 @@ NodeName = Annotated[
 ]
 Window = Annotated[int, typer.Option("--window", "-w", min=1, metavar="N", help="Messages to average over.")]
 
-KEEP_ALL_DEPTH = 10_000
-"""What keep_all keeps."""
-
 
 class Profile(StrEnum):
     """rclpy's presets."""
@@ -77,24 +74,24 @@ class QosChoice:
 
     def qos(self) -> QoS:
         """Return the profile with what overrides it."""
-        from twin.bridge.qos import RMW_DEFAULT_DEPTH, SENSOR_DATA, QoS
+        from twin.bridge.qos import SENSOR_DATA, SYSTEM_DEFAULT, QoS
 
         presets = {
-            Profile.SYSTEM_DEFAULT: QoS(depth=RMW_DEFAULT_DEPTH),
+            Profile.SYSTEM_DEFAULT: SYSTEM_DEFAULT,
             Profile.SENSOR_DATA: SENSOR_DATA,
             Profile.PARAMETERS: QoS(depth=1000),
             Profile.PARAMETER_EVENTS: QoS(depth=1000),
             Profile.ACTION_STATUS_DEFAULT: QoS(depth=1, durability="transient_local"),
         }
         preset = presets.get(self.profile, QoS())
-        depth = KEEP_ALL_DEPTH if self.history is History.KEEP_ALL else self.depth or preset.depth
         best_effort, latched = preset.reliability == "best_effort", preset.durability == "transient_local"
         if self.reliability is not None:
             best_effort = self.reliability is Reliability.BEST_EFFORT
         if self.durability is not None:
             latched = self.durability is Durability.TRANSIENT_LOCAL
         return QoS(
-            depth=depth,
+            depth=self.depth or preset.depth,
+            history="keep_all" if self.history is History.KEEP_ALL else "keep_last",
             reliability="best_effort" if best_effort else "reliable",
             durability="transient_local" if latched else "volatile",
         )
@@ -104,7 +101,7 @@ _Depth = Annotated[
     int | None, typer.Option(min=0, metavar="N", help="Samples kept.", show_default="the profile's")
 ]
 _History = Annotated[
-    History | None, typer.Option(help="keep_all: 10 000 samples.", show_default="the profile's")
+    History | None, typer.Option(help="Keep all samples, or so many.", show_default="the profile's")
 ]
 
 

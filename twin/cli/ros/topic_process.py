@@ -79,11 +79,12 @@ class TopicProcess:
 def open_topics(joining: Joining, *, node_name: str | None = None) -> Iterator[TopicProcess]:
     """Join a graph with one node, hidden unless it is named."""
     from twin.bridge.graph import Graph
+    from twin.bridge.node_options import BARE
 
     with joining.open() as live:
         # Zenoh answers at once from what it has when a watch begins: so look first, then wait for the same.
         there = set(Graph.snapshot(live.bus).endpoints)
-        node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}")
+        node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}", options=BARE)
         graph = Graph.watch(live.bus)
         live.spin(lambda: there <= set(graph.endpoints), _COMPLETE_S)
         try:
