@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -173,7 +173,8 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
             process.bus.node_options = NodeOptions(arguments=ros)
             steps = make(process.bus, **own)
             if isinstance(steps, Generator):
-                process.spin(lambda: bool(received) or next(steps, received) is received)
+                with closing(steps):
+                    process.spin(lambda: bool(received) or next(steps, received) is received)
             else:
                 process.spin(lambda: bool(received))
     except TwinError as fault:
