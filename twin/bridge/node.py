@@ -106,6 +106,11 @@ class Node:
         return f"{self.namespace.rstrip('/')}/{self.name}"
 
     @property
+    def endpoints(self) -> tuple[OwnedEndpoint, ...]:
+        """Publishers, subscriptions, services and clients in the order of their creation."""
+        return tuple(self._endpoints)
+
+    @property
     def now_ns(self) -> int:
         """Simulated time [ns]."""
         return self.bus.clock.now_ns

@@ -19,13 +19,20 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     from twin.scenario.verdict import Verdict
 
     show_warnings()
-    name, seed, folder = options.scenario.stem, 0, None
+    name, seed, folder, clock = options.scenario.stem, 0, None, "inproc"
     try:
         folder = None if out is None else make_folder(out)
         scenario = schema.load(options.scenario, options.overrides)
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
 
+        outside = runtime.Outside(
+            nodes=options.nodes,
+            wait_for=options.wait_for,
+            wait_timeout_s=options.wait_timeout,
+            free=options.free,
+        )
+        clock = outside.clock(options.listen)
         folder = folder or run_folder(name)
         with run_progress(name) as progress:
             verdict = runtime.run(
@@ -34,12 +41,13 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 record=options.record,
                 pace=options.pace,
                 listen=options.listen,
+                outside=outside,
                 save_model=options.save_model,
                 progress=progress,
             )
     except TwinError as fault:
         print_error(fault)
-        verdict = Verdict(scenario=name, seed=seed, error=str(fault))
+        verdict = Verdict(scenario=name, seed=seed, error=str(fault), clock=clock)
         if folder is not None:
             verdict.write(folder)
         if as_json:

@@ -18,6 +18,11 @@ class RunOptions:
     pace: float | None = None
     """Simulated seconds per second; None: as fast as possible."""
     listen: tuple[str, ...] = ()
+    nodes: tuple[str, ...] = ()
+    wait_for: tuple[str, ...] = ()
+    wait_timeout: float = 10.0
+    """[s] of wall time."""
+    free: bool = False
     record: bool = True
     save_model: Path | None = None
 
@@ -27,6 +32,9 @@ class RunOptions:
         words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
         words += [] if self.pace is None else ["--pace", repr(self.pace)]
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
+        words += [word for place in self.nodes for word in ("--node", place)]
+        words += [word for name in self.wait_for for word in ("--wait-for", name)]
+        words += ["--wait-timeout", repr(self.wait_timeout)] + ["--free"] * self.free
         words += [] if self.record else ["--no-record"]
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 
@@ -40,8 +48,13 @@ def parse_overrides(sets: Sequence[str], seed: int | None) -> dict[str, str]:
     return overrides if seed is None else {**overrides, "seed": str(seed)}
 
 
-def parse_pace(text: str) -> float | None:
-    """Return simulated seconds per second, None for `max`; raises ScenarioError."""
+def parse_pace(text: str | None, *, free: bool = False) -> float | None:
+    """Return simulated seconds per second, None for `max`; raises ScenarioError.
+
+    Who does not say it wants `max`, or real time if others live by their own clocks.
+    """
+    if text is None:
+        return 1.0 if free else None
     if text == "max":
         return None
     try:

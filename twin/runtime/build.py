@@ -10,6 +10,7 @@ from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.factory import create_nodes
 from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
@@ -19,6 +20,7 @@ from twin.models.shapes import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
+from twin.runtime.outside import Outside
 from twin.runtime.robot_stack import RobotStack, StackContext
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.navigation import AmclLocalisation
@@ -56,6 +58,7 @@ def build(
     *,
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
     listen: Sequence[str] = (),
+    outside: Outside = Outside(),
     crash_folder: Path | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
@@ -64,6 +67,7 @@ def build(
         scenario: What to build.
         taps: Called for every sample, from the first one on that a node publishes while it is made.
         listen: Endpoints for other processes.
+        outside: The user's own nodes, and how the run keeps time with other processes.
         crash_folder: Where the last states go if the physics diverges.
 
     Raises:
@@ -85,7 +89,7 @@ def build(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
     )
     clock = Clock()
-    bus = Bus.open(clock, listen=listen)
+    bus = Bus.open(clock, listen=listen, session=outside.session)
     for tap in taps:
         bus.tap(tap)
     try:
@@ -110,6 +114,8 @@ def build(
             for robot in scenario.robots
         }
         mission = build_mission(bus, scenario.mission, stacks, arena, namespaces)
+        for place in outside.nodes:
+            create_nodes(bus, place)
     except BaseException:
         bus.close()
         raise
