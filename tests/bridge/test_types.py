@@ -78,8 +78,9 @@ def test_a_registered_type_keeps_its_definition() -> None:
 
 
 def test_an_unparsable_definition_is_an_error_of_the_user() -> None:
-    types.register("test_msgs/msg/Broken", "this is = no definition [")
-    with pytest.raises(BridgeError, match="test_msgs/msg/Broken"):
+    with pytest.raises(BridgeError, match="test_msgs/msg/Broken, line 1"):
+        types.register("test_msgs/msg/Broken", "this is = no definition [")
+    with pytest.raises(BridgeError, match="not known"):
         types.get("test_msgs/msg/Broken")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
@@ -11,11 +10,10 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
+from twin.bridge.interface_values import Value
+from twin.bridge.type_bounds import STRINGS
 
 M = TypeVar("M")
-
-_STRINGS = ("string", "wstring")
-_BYTES = ("char", "byte", "octet")
 
 
 def new(cls: type[M], **fields: Any) -> M:
@@ -34,36 +32,32 @@ def new(cls: type[M], **fields: Any) -> M:
 
 
 @cache
+@cache
 def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
     """Return what makes each field's default."""
-    literals = types.defaults(msgtype)
+    values = types.defaults(msgtype)
     fields = types.store.get_msgdef(msgtype).fields
-    return {name: _maker(description, literals.get(name)) for name, description in fields}
+    return {name: _maker(description, values.get(name)) for name, description in fields}
 
 
-def _maker(description: Any, literal: str | None) -> Callable[[], Any]:
+def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
     node, value = description
     if node == Nodetype.NAME:
         cls = types.get(value)
         return lambda: new(cls)
     if node == Nodetype.BASE:
-        constant = _scalar(value[0], literal)
+        constant = _ZEROS.get(value[0], 0) if default is None else default
         return lambda: constant
     (inner, element), length = value
     count = length if node == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:
         cls = types.get(element)
         return lambda: [new(cls) for _ in range(count)]
-    if element[0] in _STRINGS:
-        return lambda: [""] * count
-    dtype = np.dtype("uint8" if element[0] in _BYTES else element[0])
-    return lambda: np.zeros(count, dtype)
+    if element[0] in STRINGS:
+        texts = [""] * count if default is None else default
+        return lambda: list(texts)  # type: ignore[arg-type]
+    numbers = np.array([0] * count if default is None else default, types.dtype_of(element[0]))
+    return lambda: numbers.copy()
 
 
-def _scalar(base: str, literal: str | None) -> Any:
-    if base in _STRINGS:
-        return "" if literal is None else literal.strip("'\"")
-    if base == "bool":
-        return literal is not None and literal.lower() in ("true", "1")
-    kind = float if base.startswith("float") else int
-    return kind(0) if literal is None else kind(ast.literal_eval(literal))
+_ZEROS: dict[str, Value] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}

@@ -22,20 +22,30 @@ _IDS = {
     "uint64": 9, "float32": 10, "float64": 11, "bool": 15, "byte": 16, "octet": 16,
     "string": 17, "wstring": 18,
 }  # fmt: skip
+BASE_NAMES = {
+    2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64", 9: "uint64",
+    10: "float32", 11: "float64", 13: "char", 15: "bool", 16: "byte", 17: "string", 18: "wstring",
+}  # fmt: skip
+"""Id of a single value -> base type."""
 _NESTED, _BOUNDED_STRING, _BOUNDED_WSTRING = 1, 21, 22
 _ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 48, 96, 144
 
 
 def rihs01_of(typename: str, definitions: Mapping[str, Any]) -> str:
     """Return 'RIHS01_<64 hex>' of a type whose definition and those of all it uses are in `definitions`."""
+    description = description_of(typename, definitions)
+    return "RIHS01_" + hashlib.sha256(json.dumps(description).encode()).hexdigest()
+
+
+def description_of(typename: str, definitions: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a type and all it uses as a type description, without default values: what is hashed."""
     structs: dict[str, dict[str, Any]] = {}
     _describe(typename, definitions, structs)
     own = structs.pop(typename)
-    description = {
+    return {
         "type_description": own,
         "referenced_type_descriptions": [structs[name] for name in sorted(structs)],
     }
-    return "RIHS01_" + hashlib.sha256(json.dumps(description).encode()).hexdigest()
 
 
 def _describe(typename: str, definitions: Mapping[str, Any], structs: dict[str, dict[str, Any]]) -> None:
