@@ -1,4 +1,4 @@
-"""Nodes in a process of their own that run in lock-step with a simulation: `twin run … --wait-for /controller`."""
+"""Nodes in a process of their own, in lock-step with a simulation: `twin run … --wait-for /controller`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run in lock-step lets in from processes that take no part in it: questions, nothing that changes it."""
+"""What a run in lock-step lets in from those who take no part: questions, nothing that changes it."""
 
 from __future__ import annotations
 

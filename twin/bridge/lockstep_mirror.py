@@ -1,7 +1,7 @@
 """The nodes of another process on the bus of a run, as if they had been created there.
 
-Their endpoints are declared on the run's session in the order in which the process declared its own, so whatever
-depends on order (history, inboxes, digest) is as in one process.
+Their endpoints are declared on the run's session in the order in which the process declared its own. So
+whatever depends on order (history, inboxes, digest) is as in one process.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class MirroredSample(Sample[Any]):
         self._decoded: Any = None
 
     @property
-    def message(self) -> Any:  # type: ignore[override]
+    def message(self) -> Any:
         """The message.
 
         Raises:
@@ -79,9 +79,11 @@ class Mirror:
         self.nodes: list[str] = []
         """Full names, in order of creation."""
         tokens = f"@ros2_lv/{bus.domain_id}/{bus.session_id}/*/*/SS/**"
-        self._offers = bus.session.liveliness().declare_subscriber(
-            tokens, direct(self._on_service), history=True
-        )
+        liveliness = bus.session.liveliness()
+        self._offers: Any = liveliness.declare_subscriber(tokens, direct(self._on_service))
+        for reply in liveliness.get(tokens):  # history=True would call back in another thread
+            if reply.ok is not None:
+                self._add_service(str(reply.ok.key_expr))
 
     def take(self) -> list[Any]:
         """Return what the process was sent since the last call, in order."""
@@ -231,7 +233,10 @@ class Mirror:
             key = self._services.pop(token, None)
             if key is not None and key not in self._services.values():
                 self._waiting.append(entry(Entry.UNDECLARE, 0, key))
-            return
+        else:
+            self._add_service(token)
+
+    def _add_service(self, token: str) -> None:
         info = parse_token(token)
         if isinstance(info, EndpointInfo) and gid(token) not in self._gids:
             key = topic_key(self._bus.domain_id, info.name, types.dds_name(info.type), info.type_hash)

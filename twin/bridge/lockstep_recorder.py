@@ -1,7 +1,7 @@
 """What the nodes of one process do, as entries in order, and what the run does to them.
 
-The nodes live on a bus of their own, which no other process can reach: the same one, with the same ids, that a
-run in one process has. There Zenoh calls back at once, so listening to everything gives one order of all.
+The nodes live on a bus that no other process can reach. There Zenoh calls back at once, so listening to
+everything gives one order of all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from twin.errors import BridgeError
 
 
 class Recorder:
-    """The border between the nodes of a process and the run; nodes of one process reach each other directly."""
+    """The border between the run and the nodes of a process, which reach each other without it."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus

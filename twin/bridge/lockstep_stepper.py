@@ -42,7 +42,7 @@ class Attendance:
         self.departures: dict[str, queue.SimpleQueue[Any]] = {}
         """Session -> where to say that it has gone."""
         liveliness, domain_id = bus.session.liveliness(), bus.domain_id
-        self._declared = [
+        self._declared: list[Any] = [
             liveliness.declare_token(run_token(domain_id)),
             liveliness.declare_subscriber(
                 node_token(domain_id, "*", "*"), direct(self._on_change), history=True
@@ -132,22 +132,22 @@ class Stepper:
         self._mirror.close()
 
     def _wait(self, sequence: int, tick: int) -> bytes:
-        where = (
-            "joining"
-            if tick == STEP.Request.JOIN
-            else f"tick {tick} (t = {self._bus.clock.now_ns * 1e-9:.3f} s)"
-        )
+        seconds = self._bus.clock.now_ns * 1e-9
+        joining = tick == STEP.Request.JOIN
+        what = "the request to join" if joining else f"tick {tick} (t = {seconds:.3f} s)"
         end = time.monotonic() + self._timeout_s
         while True:
             try:
                 answer = self._answers.get(timeout=max(0.0, end - time.monotonic()))
             except queue.Empty:
                 raise BridgeError(
-                    f"the node {self.node} did not answer {where} within {self._timeout_s:g} s; is its process "
+                    f"the node {self.node} did not answer {what} within {self._timeout_s:g} s; is its process "
                     "stopped or busy? --wait-timeout gives it more time"
                 ) from None
             if answer is None or answer == (sequence, None):
-                raise BridgeError(f"the node {self.node} has left the run in {where}: its process has ended")
+                raise BridgeError(
+                    f"the node {self.node} left the run without an answer to {what}: its process has ended"
+                )
             if answer[0] == sequence:
                 return answer[1]
 

@@ -1,4 +1,4 @@
-"""Lock-step with a process that knows nothing of it: one sample of a topic for every sample that it is sent."""
+"""Lock-step with a process that knows nothing of it: one sample for every sample that it is sent."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class AnswerConfig:
 
 
 class AnswerTopic:
-    """Waits for what another process answers, and publishes it as if a node of the run had, at that moment."""
+    """Waits for what another process answers, and publishes it as if a node of the run did."""
 
     def __init__(self, bus: Bus, config: AnswerConfig) -> None:
         """Hear what the process publishes, and count what it answers.
@@ -56,10 +56,12 @@ class AnswerTopic:
         talker = self._own("MP", config.stimulus)
         self._type = listener.type
         base = f"{bus.domain_id}{config.topic}/{types.dds_name(listener.type)}/{listener.type_hash}"
-        self._publisher = bus.session.declare_publisher(base, congestion_control=zenoh.CongestionControl.DROP)
-        self._subscriber = bus.session.declare_subscriber(base, direct(self._on_sample))
+        self._publisher: Any = bus.session.declare_publisher(
+            base, congestion_control=zenoh.CongestionControl.DROP
+        )
+        self._subscriber: Any = bus.session.declare_subscriber(base, direct(self._on_sample))
         stimulus = f"{bus.domain_id}{config.stimulus}/{types.dds_name(talker.type)}/{talker.type_hash}"
-        self._probe = bus.session.declare_publisher(
+        self._probe: Any = bus.session.declare_publisher(
             stimulus,
             allowed_destination=zenoh.Locality.REMOTE,
             congestion_control=zenoh.CongestionControl.DROP,

@@ -1,6 +1,6 @@
-"""What a run and a process in lock-step with it say to each other: `twin_msgs/srv/Step` and two kinds of tokens.
+"""What a run and a process in lock-step say to each other: `twin_msgs/srv/Step` and two kinds of tokens.
 
-The service travels as any other of rmw_zenoh. The tokens tell who takes part; they are no part of the ROS graph.
+The service travels as any other of rmw_zenoh. The tokens tell who takes part; the ROS graph has others.
 """
 
 from __future__ import annotations

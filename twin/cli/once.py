@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
 from twin.cli.folders import make_folder, run_folder
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
+
+if TYPE_CHECKING:
+    from twin.runtime.outside import ClockMode
 
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
@@ -19,7 +23,8 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     from twin.scenario.verdict import Verdict
 
     show_warnings()
-    name, seed, folder, clock = options.scenario.stem, 0, None, "inproc"
+    name, seed, folder = options.scenario.stem, 0, None
+    clock: ClockMode = "inproc"
     try:
         folder = None if out is None else make_folder(out)
         scenario = schema.load(options.scenario, options.overrides)

@@ -20,7 +20,7 @@ from twin.models.shapes import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
-from twin.runtime.outside import Outside
+from twin.runtime.outside import ALONE, Outside
 from twin.runtime.robot_stack import RobotStack, StackContext
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.navigation import AmclLocalisation
@@ -58,7 +58,7 @@ def build(
     *,
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
     listen: Sequence[str] = (),
-    outside: Outside = Outside(),
+    outside: Outside = ALONE,
     crash_folder: Path | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.

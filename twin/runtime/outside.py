@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -16,6 +17,9 @@ from twin.errors import ScenarioError
 
 ClockMode = Literal["inproc", "lockstep", "free"]
 """Whose time counts: the run's alone, the run's with others that it waits for, everybody's own."""
+
+
+_NAME = re.compile(r"(/\w+)+(@(/\w+)+)?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +39,7 @@ class Outside:
         """Refuse two clocks at once.
 
         Raises:
-            ScenarioError: both free and waiting; a name that is not absolute; a time-out that is not positive.
+            ScenarioError: free and waiting, a name that is not absolute, a time-out that is not positive.
         """
         if self.free and self.wait_for:
             raise ScenarioError("--free and --wait-for: a run waits for others or does not; leave one out")
@@ -64,6 +68,10 @@ class Outside:
     def session(self) -> str:
         """What the bus's ids depend on: in lock-step the same as in one process."""
         return "twin" if self.wait_for else ""
+
+
+ALONE = Outside()
+"""Nobody takes part."""
 
 
 class Lockstep:

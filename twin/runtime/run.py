@@ -18,7 +18,7 @@ from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
-from twin.runtime.outside import ClockMode, Lockstep, Outside
+from twin.runtime.outside import ALONE, ClockMode, Lockstep, Outside
 from twin.scenario.checks import Check
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -51,7 +51,7 @@ class Run:
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
 
     def __init__(
-        self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = Outside()
+        self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
     ) -> None:
         self.scenario = scenario
         self.parts = parts
@@ -103,7 +103,7 @@ class Run:
             self.lockstep.admit()
 
     def nodes(self) -> None:
-        """2. Nodes run: inboxes, timers due, actions; in the order of their creation, then those waited for."""
+        """2. Nodes run: inboxes, timers due, actions; in order of creation, then those waited for."""
         self.bus.spin()
         if self.lockstep is not None:
             self.lockstep.step()
@@ -156,7 +156,7 @@ def run(
     record: bool = True,
     pace: float | None = None,
     listen: Sequence[str] = (),
-    outside: Outside = Outside(),
+    outside: Outside = ALONE,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
