@@ -125,3 +125,15 @@ def broken(bus: Bus) -> Node:
 def faulty(bus: Bus) -> Node:
     """Fail at once."""
     raise KeyError("gain")
+
+
+def answering(bus: Bus) -> Node:
+    """The law of answering_peer.py."""
+    node = bus.create_node("answering")
+    commands = node.create_publisher(Twist, "cmd_vel")
+    node.create_subscription(
+        Odometry,
+        "odom",
+        lambda m: commands.publish(twist_from_planar(0.3 - 0.1 * m.pose.pose.position.x, 0.2)),
+    )
+    return node

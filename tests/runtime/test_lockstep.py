@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
+import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from twin import runtime
+from twin.errors import BridgeError
 from twin.runtime import Outside
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -56,7 +60,25 @@ def start(endpoint: str) -> Iterator[Start]:
     yield begin
     for child in children:
         child.kill()
-        sys.stderr.write(child.communicate()[1])
+        child.wait()
+        if child.stderr is not None and not child.stderr.closed:
+            sys.stderr.write(child.communicate()[1])
+
+
+@pytest.fixture
+def answer(endpoint: str) -> Iterator[Callable[..., None]]:
+    """Return a function that starts a program of Zenoh and struct alone; it is ended."""
+    children: list[subprocess.Popen[bytes]] = []
+
+    def begin(*, sleep_s: float = 0.0, silent_after: int = 0) -> None:
+        peer = Path(__file__).with_name("answering_peer.py")
+        words = [sys.executable, str(peer), endpoint, str(sleep_s), str(silent_after)]
+        children.append(subprocess.Popen(words))
+
+    yield begin
+    for child in children:
+        child.kill()
+        child.wait()
 
 
 def stepped(scenario: Scenario, endpoint: str, *names: str, timeout_s: float = 30.0) -> Verdict:
@@ -104,3 +126,98 @@ def test_the_names_of_two_nodes_of_one_process_step_it_once(
     start("server")
     start("client")
     assert stepped(what, endpoint, "/listener", "/server", "/client").digest == expected.digest
+
+
+def test_a_program_that_answers_on_a_topic_gives_the_digest_of_a_node(
+    scenario: Callable[[str], Scenario], endpoint: str, answer: Callable[..., None]
+) -> None:
+    what = scenario(DRIVE)
+    expected = in_process(what, "answering")
+    for name in ("/cmd_vel", "/cmd_vel@/odom"):
+        answer(sleep_s=0.004)
+        verdict = stepped(what, endpoint, name)
+        assert verdict.digest == expected.digest
+        assert (verdict.clock, verdict.deterministic) == ("lockstep", True)
+
+
+def test_a_topic_without_an_answer_is_named(
+    scenario: Callable[[str], Scenario], endpoint: str, answer: Callable[..., None]
+) -> None:
+    answer(silent_after=10)
+    with pytest.raises(BridgeError, match=r"/cmd_vel had no answer to /odom in tick \d+ .*within 1 s"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel", timeout_s=1.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGINT])
+def test_a_node_that_fails_ends_the_run_with_its_name(
+    number: signal.Signals, scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    child = start("controller", sleep_s=0.02)
+    ticks = []
+
+    def fail_later(progress: runtime.Progress) -> None:
+        ticks.append(progress.time_s)
+        child.send_signal(number)
+
+    began = time.monotonic()
+    problem = "did not answer tick" if number == signal.SIGSTOP else "left the run without an answer to tick"
+    with pytest.raises(BridgeError, match=rf"the node /controller {problem} \d+ \(t = .* s\)"):
+        runtime.run(
+            scenario(DRIVE),
+            record=False,
+            listen=[endpoint],
+            outside=Outside(wait_for=("/controller",), wait_timeout_s=4.0),
+            progress=fail_later,
+        )
+    assert ticks, "the run had begun"
+    assert time.monotonic() - began < 25.0
+    if number == signal.SIGINT:
+        assert (child.wait(10), child.communicate()[1]) == (130, "")
+
+
+def test_an_exception_in_the_node_is_seen_on_both_sides(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    child = start("broken")
+    with pytest.raises(BridgeError, match="/controller left the run without an answer to tick 25"):
+        stepped(scenario(DRIVE), endpoint, "/controller")
+    assert "ZeroDivisionError" in child.communicate()[1]
+    assert child.returncode == 1
+
+
+def test_nobody_comes(scenario: Callable[[str], Scenario], endpoint: str) -> None:
+    with pytest.raises(BridgeError, match=r"no node /controller has joined within 0\.2 s"):
+        stepped(scenario(DRIVE), endpoint, "/controller", timeout_s=0.2)
+    with pytest.raises(BridgeError, match=r"nobody has joined who hears /odom and publishes /cmd_vel"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel", timeout_s=0.2)
+    with pytest.raises(BridgeError, match=r"no node of the run publishes /nothing"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel@/nothing", timeout_s=0.2)
+
+
+def test_who_only_watches_changes_nothing(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    """A stranger listens, asks, commands the robot and sets parameters: it only gets answers."""
+    what = scenario(DRIVE)
+    expected = in_process(what, "controller")
+    child = start("controller", sleep_s=0.02)
+    stranger = subprocess.Popen(
+        [sys.executable, str(Path(__file__).with_name("stranger.py")), endpoint],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    try:
+        verdict = stepped(what, endpoint, "/controller")
+        heard = json.loads(stranger.communicate(timeout=20)[0])
+    finally:
+        stranger.kill()
+        stranger.wait()
+    assert verdict.digest == expected.digest
+    assert verdict.deterministic
+    assert heard["odom"] > 0
+    assert heard["commands"] > 0, "also what the process in lock-step publishes"
+    assert heard["nodes"].count("/controller") == 1
+    assert heard["parameters"] is not False
+    assert heard["set"] is False
+    assert child.wait(20) == 0
