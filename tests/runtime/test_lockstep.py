@@ -11,11 +11,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from twin import runtime
-from twin.errors import BridgeError
+from twin.errors import BridgeError, ScenarioError
 from twin.runtime import Outside
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -28,6 +29,18 @@ seed: 3
 duration: 2 s
 robots: [{model: diff_bot}]
 checks: [{driven_distance: {min: 0.05 m}}]
+"""
+NAVIGATE = """
+name: navigated
+seed: 3
+duration: 8 s
+world: {arena: warehouse}
+robots:
+  - model: warehouse_bot
+    start: start
+    localisation: {type: amcl, map: warehouse}
+    navigation: {}
+checks: [{driven_distance: {min: 0.3 m}}]
 """
 Start = Callable[..., subprocess.Popen[str]]
 
@@ -104,6 +117,19 @@ def test_a_node_gives_the_same_digest_in_another_process(
         assert (verdict.verdict, verdict.clock, verdict.deterministic) == ("pass", "lockstep", True)
         assert child.wait(20) == 0, "the end of the run ends the process"
     assert runtime.run(what, record=False).digest != expected.digest, "the node makes a difference"
+
+
+@pytest.mark.slow
+def test_twenty_of_twenty_runs_with_a_slow_controller_have_one_digest(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(DRIVE.replace("2 s", "0.5 s").replace("0.05 m", "0.01 m"))
+    expected = in_process(what, "controller").digest
+    digests = []
+    for _ in range(20):
+        start("controller", sleep_s=0.2)
+        digests.append(stepped(what, endpoint, "/controller").digest)
+    assert digests == [expected] * 20
 
 
 def test_services_and_actions_between_two_processes(
@@ -221,3 +247,49 @@ def test_who_only_watches_changes_nothing(
     assert heard["parameters"] is not False
     assert heard["set"] is False
     assert child.wait(20) == 0
+
+
+@pytest.mark.slow
+def test_a_navigation_goal_from_another_process(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(NAVIGATE)
+    expected = in_process(what, "navigator")
+    start("navigator")
+    verdict = stepped(what, endpoint, "/navigator")
+    assert verdict.verdict == "pass", "the robot has driven"
+    assert verdict.digest == expected.digest
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ("nowhere.py:make", r"nowhere\.py: there is no such file; valid: FILE\.py:FUNCTION"),
+        (
+            f"{NODES}:contoller",
+            r"lockstep_nodes\.py: there is no function contoller; did you mean 'contr",
+        ),
+        (f"{NODES}:faulty", r"lockstep_nodes\.py:\d+: KeyError: 'gain'"),
+        (f"{NODES}:delay", r"lockstep_nodes\.py:?\d*: TypeError: delay\(\) takes 0 positional arguments"),
+        ("controller", r"controller names no nodes; valid: FILE\.py:FUNCTION"),
+    ],
+)
+def test_what_is_wrong_with_the_users_nodes(
+    place: str, message: str, scenario: Callable[[str], Scenario]
+) -> None:
+    with pytest.raises(BridgeError, match=message):
+        runtime.run(scenario(DRIVE), record=False, outside=Outside(nodes=(place,)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"free": True, "wait_for": ("/a",)}, "a run waits for others or does not"),
+        ({"wait_for": ("controller",)}, r"--wait-for controller: must be a node such as /controller"),
+        ({"wait_for": ("/cmd_vel@scan",)}, r"--wait-for /cmd_vel@scan: must be"),
+        ({"wait_for": ("/a",), "wait_timeout_s": 0.0}, "must be more than 0 s"),
+    ],
+)
+def test_options_that_contradict(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        Outside(**options)

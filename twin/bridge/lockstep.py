@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import time
@@ -26,6 +27,8 @@ _FIRST_ID = 1_000_000
 """Entity ids of this process begin beyond those of the run, of which its nodes seem to be a part."""
 _IDS = 10_000
 _RETRY_S = 0.2
+_PATIENCE_S = 5.0
+_log = logging.getLogger("twin.lockstep")
 
 
 class LockstepProcess:
@@ -39,6 +42,7 @@ class LockstepProcess:
         self._recorder = Recorder(bus)
         self._steps: queue.SimpleQueue[zenoh.Query | None] = queue.SimpleQueue()
         self._declared: list[Any] = []
+        self._stepped = False
 
     def spin(self) -> None:
         """Run the nodes once in every tick of the run, until it is over.
@@ -57,7 +61,7 @@ class LockstepProcess:
         """
         if not self._declared:
             self._offer()
-        query = self._steps.get()
+        query = self._next()
         if query is None:
             return False
         with query:
@@ -76,6 +80,17 @@ class LockstepProcess:
             attachment = pack_attachment(source.sequence, self._clock.now_ns, source.gid)
             query.reply(query.key_expr, response, attachment=attachment)
         return True
+
+    def _next(self) -> zenoh.Query | None:
+        """Wait for a step; who has waited long for the first one is told why."""
+        if not self._stepped:
+            self._stepped = True
+            try:
+                return self._steps.get(timeout=_PATIENCE_S)
+            except queue.Empty:
+                name = self.bus.nodes[0].fully_qualified_name
+                _log.warning("no run steps %s yet; it is for: twin run SCENARIO --wait-for %s", name, name)
+        return self._steps.get()
 
     def _offer(self) -> None:
         """Tell the run which nodes there are, and whether the run still is."""

@@ -30,6 +30,8 @@ _log = logging.getLogger("twin.run")
 _PATIENCE_S = 1.0
 """After so long, people are told what the run waits for."""
 _POLL_S = 0.2
+_MARGIN_S = 10.0
+"""Zenoh gives up so much later than we do."""
 
 
 class Attendance:
@@ -89,7 +91,12 @@ class Stepper:
         self._attendance = attendance
         self._timeout_s = timeout_s
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._key = step_key(bus.domain_id, node)
+        self._querier: Any = bus.session.declare_querier(
+            step_key(bus.domain_id, node),
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s + _MARGIN_S,
+        )
         self._sequence = 0
         self._mirror = Mirror(bus)
         attendance.departures[session] = self._answers
@@ -114,14 +121,10 @@ class Stepper:
             if reply.ok is not None:
                 answers.put((sequence, reply.ok.payload.to_bytes()))
 
-        bus.session.get(
-            self._key,
+        self._querier.get(
             direct(on_reply, lambda: answers.put((sequence, None))),
-            target=zenoh.QueryTarget.ALL_COMPLETE,
-            consolidation=zenoh.ConsolidationMode.NONE,
             payload=requests.encode(STEP.Request(tick, stamp(now_ns), self._mirror.take())),
             attachment=pack_attachment(sequence, now_ns, bytes(16)),
-            timeout=self._timeout_s + 10.0,
         )
         response = responses.decode(self._wait(sequence, tick))
         self._mirror.replay(response.sent)
@@ -130,6 +133,7 @@ class Stepper:
         """Take the nodes of the process off the bus."""
         self._attendance.departures.pop(self.session, None)
         self._mirror.close()
+        self._querier.undeclare()
 
     def _wait(self, sequence: int, tick: int) -> bytes:
         seconds = self._bus.clock.now_ns * 1e-9
@@ -141,8 +145,8 @@ class Stepper:
                 answer = self._answers.get(timeout=max(0.0, end - time.monotonic()))
             except queue.Empty:
                 raise BridgeError(
-                    f"the node {self.node} did not answer {what} within {self._timeout_s:g} s; is its process "
-                    "stopped or busy? --wait-timeout gives it more time"
+                    f"the node {self.node} did not answer {what} within {self._timeout_s:g} s; is its "
+                    "process stopped or busy? --wait-timeout gives it more time"
                 ) from None
             if answer is None or answer == (sequence, None):
                 raise BridgeError(

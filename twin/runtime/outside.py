@@ -44,7 +44,7 @@ class Outside:
         if self.free and self.wait_for:
             raise ScenarioError("--free and --wait-for: a run waits for others or does not; leave one out")
         wrong = [
-            name for name in self.wait_for if not name.startswith("/") or "@" in name and "@/" not in name
+            name for name in self.wait_for if not name.startswith("/") or ("@" in name and "@/" not in name)
         ]
         if wrong:
             raise ScenarioError(
