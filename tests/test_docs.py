@@ -30,7 +30,7 @@ from twin.scenario.verdict import Verdict
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
-    page.relative_to(ROOT).as_posix(): page for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+    page.relative_to(ROOT).as_posix(): page for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
 }
 ALL_TEXT = "\n".join(page.read_text("utf-8") for page in PAGES.values())
 

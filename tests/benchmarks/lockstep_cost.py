@@ -20,7 +20,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.factory import create_nodes
 from twin.bridge.msgs import Odometry, Twist, new
-from twin.runtime.outside import Lockstep, Outside
+from twin.runtime.outside import Lockstep
+from twin.scenario.outside import Outside
 
 ROOT = Path(__file__).parents[2]
 NODE = f"{ROOT / 'tests' / 'runtime' / 'lockstep_nodes.py'}:answering"

@@ -17,7 +17,7 @@ import pytest
 
 from twin import runtime
 from twin.errors import BridgeError, ScenarioError
-from twin.runtime import Outside
+from twin.scenario.outside import Outside
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 

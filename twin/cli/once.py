@@ -13,13 +13,14 @@ from twin.cli.progress import run_progress
 from twin.errors import TwinError
 
 if TYPE_CHECKING:
-    from twin.runtime.outside import ClockMode
+    from twin.scenario.outside import ClockMode
 
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
     from twin.cli.log import show_warnings
     from twin.scenario import schema
+    from twin.scenario.outside import Outside
     from twin.scenario.verdict import Verdict
 
     show_warnings()
@@ -27,17 +28,17 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     clock: ClockMode = "inproc"
     try:
         folder = None if out is None else make_folder(out)
-        scenario = schema.load(options.scenario, options.overrides)
-        name, seed = scenario.name, scenario.seed
-        from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
-
-        outside = runtime.Outside(
+        outside = Outside(
             nodes=options.nodes,
             wait_for=options.wait_for,
             wait_timeout_s=options.wait_timeout,
             free=options.free,
         )
         clock = outside.clock(options.listen)
+        scenario = schema.load(options.scenario, options.overrides)
+        name, seed = scenario.name, scenario.seed
+        from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
+
         folder = folder or run_folder(name)
         with run_progress(name) as progress:
             verdict = runtime.run(

@@ -34,7 +34,8 @@ class RunOptions:
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
         words += [word for place in self.nodes for word in ("--node", place)]
         words += [word for name in self.wait_for for word in ("--wait-for", name)]
-        words += ["--wait-timeout", repr(self.wait_timeout)] + ["--free"] * self.free
+        words += ["--wait-timeout", repr(self.wait_timeout)] if self.wait_for else []
+        words += ["--free"] * self.free
         words += [] if self.record else ["--no-record"]
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 

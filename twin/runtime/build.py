@@ -20,11 +20,11 @@ from twin.models.shapes import Box
 from twin.navigation.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
-from twin.runtime.outside import ALONE, Outside
 from twin.runtime.robot_stack import RobotStack, StackContext
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.navigation import AmclLocalisation
 from twin.scenario.observation import CheckContext, Zone
+from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
 from twin.scenario.world import GoodOverride, Obstacle

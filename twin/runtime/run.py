@@ -18,8 +18,9 @@ from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
-from twin.runtime.outside import ALONE, ClockMode, Lockstep, Outside
+from twin.runtime.outside import Lockstep
 from twin.scenario.checks import Check
+from twin.scenario.outside import ALONE, ClockMode, Outside
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
