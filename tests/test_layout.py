@@ -37,6 +37,8 @@ WALL_CLOCK = {
     "twin/bridge/lockstep.py": {"monotonic", "sleep"},  # the run may start later
     "twin/bridge/lockstep_stepper.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/lockstep_topic.py": {"monotonic", "sleep"},  # time-outs of other processes
+    "twin/bridge/bags/recorder.py": {"time_ns", "monotonic"},  # when a message was received
+    "twin/bridge/bags/player.py": {"monotonic_ns"},  # when a message is due
     "twin/cli/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""

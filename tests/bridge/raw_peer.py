@@ -60,7 +60,8 @@ def garbage(session: zenoh.Session) -> None:
     session.put(TWIST, b"\0\1\0\0nonsense", attachment=attachment(1))
     session.put(TWIST, b"", attachment=attachment(2))
     session.put(STRING, b"\0\1\0\0\xff\xff\xff\xff", attachment=attachment(1))
-    session.put(TWIST.rpartition("/")[0] + "/TypeHashNotSupported", twist(1.0), attachment=attachment(3))
+    session.put(TWIST.rpartition("/")[0] + "/RIHS01_dead", twist(1.0), attachment=attachment(3))
+    session.put(TWIST.replace("::Twist_", "::Accel_"), twist(1.0), attachment=attachment(1))
     session.put(TWIST, twist(7.0), attachment=attachment(4))
 
 

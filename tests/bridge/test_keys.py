@@ -14,11 +14,10 @@ from twin.bridge.keys import (
     gid,
     pack_attachment,
     parse_attachment,
-    qos_string,
     topic_key,
 )
 from twin.bridge.msgs import Twist, new
-from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
+from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS, qos_string
 from twin.bridge.session import direct
 from twin.bridge.srvs import Trigger
 

@@ -70,17 +70,18 @@ def test_garbage_from_outside_is_counted_and_reported(
     def step() -> bool:
         open_bus.admit()
         open_bus.spin()
-        return got == [7.0] and sum(open_bus.refused.values()) == 6
+        return got == [7.0] and sum(open_bus.refused.values()) == 7
 
     with _peer(endpoint, "garbage") as peer:
         assert peer.wait(20) == 0
         _wait(step)
     open_bus.admit()
-    assert dict(open_bus.refused) == {"attachment": 2, "payload": 3, "type hash": 1}
+    assert dict(open_bus.refused) == {"attachment": 2, "payload": 3, "type hash": 1, "type": 1}
     assert got == [7.0]
     reports = [r.message for r in caplog.records if "from outside was dropped" in r.message]
-    assert len(reports) == 4  # each reason once per topic
-    assert any("TypeHashNotSupported instead of RIHS01_9c45" in report for report in reports)
+    assert len(reports) == 5  # each reason once per topic
+    assert any("RIHS01_dead instead of RIHS01_9c45" in report for report in reports)
+    assert any("geometry_msgs::msg::dds_::Accel_ instead of" in report for report in reports)
 
 
 def test_another_process_calls_a_service(open_bus: Bus, endpoint: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
@@ -12,10 +13,15 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import ExternalQueue
+from twin.bridge.external import Arrival, ExternalQueue
 from twin.bridge.node import Node
+from twin.bridge.node_options import NodeOptions
+from twin.bridge.node_services import StandardServices
 from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
+from twin.bridge.wire import Wire
+from twin.bridge.wire_naming import Naming
+from twin.bridge.wire_ros2dds import bridge_token
 from twin.errors import BridgeError
 
 _EXTERNAL_DEPTH = 10_000
@@ -29,19 +35,30 @@ class Bus:
     Callbacks run only in `spin`; what other processes send waits until `admit`. Use it as a context manager.
     """
 
-    def __init__(self, session: zenoh.Session, clock: Clock, domain_id: int, networked: bool) -> None:
+    def __init__(self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool) -> None:
         self.session = session
         self.clock = clock
-        self.domain_id = domain_id
+        self.naming = naming
+        self.domain_id = naming.domain_id
         self.session_id = str(session.zid())
         self.networked = networked
         """Whether other processes may take part."""
+        self.use_sim_time = True
+        """What the parameter of that name says in every node."""
+        self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.arrival_taps: list[Callable[[Arrival], None]] = []
+        """Called for everything from outside when it enters, before a node has it."""
+        self.node_options: NodeOptions | None = None
+        """Of nodes that are created without options: the program's command line."""
         self._nodes: list[Node] = []
         self._ids = 0
         self._thread = threading.get_ident()
         self._closed = False
+        self._process = os.getpid()
+        if networked and naming.wire == "ros2dds":
+            self._bridge = session.liveliness().declare_token(bridge_token(self.session_id))
         atexit.register(self.close)
 
     @classmethod
@@ -53,6 +70,7 @@ class Bus:
         connect: Sequence[str] = (),
         domain_id: int = 0,
         session: str = "",
+        wire: Wire = "rmw_zenoh",
     ) -> Self:
         """Open a bus.
 
@@ -63,22 +81,24 @@ class Bus:
             domain_id: ROS_DOMAIN_ID.
             session: What the session's id, and with it every gid, depends on. Processes that meet need
                 different ones; empty: constant without listen and connect, else random.
+            wire: How keys and tokens are spelled; what comes in may be spelled in every way.
 
         Raises:
             BridgeError: an endpoint cannot be used.
         """
         name = session or ("" if listen or connect else "twin")
-        config = SessionConfig(listen=tuple(listen), connect=tuple(connect), name=name)
+        config = SessionConfig(listen=tuple(listen), connect=tuple(connect), name=name, wire=wire)
         return cls.of(config, clock, domain_id=domain_id)
 
     @classmethod
-    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int = 0) -> Self:
+    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int | None = None) -> Self:
         """Open a bus on a session of any configuration.
 
         Raises:
             BridgeError: an endpoint or the configuration's file cannot be used.
         """
-        return cls(open_session(config), clock, domain_id, config.networked)
+        naming = Naming(config.wire, config.domain_id if domain_id is None else domain_id)
+        return cls(open_session(config), clock, naming, config.networked)
 
     def create_node(
         self,
@@ -86,6 +106,7 @@ class Bus:
         namespace: str = "",
         parameters: Mapping[str, Any] | None = None,
         remappings: Mapping[str, str] | None = None,
+        options: NodeOptions | None = None,
     ) -> Node:
         """Add a node; nodes spin in the order of their creation.
 
@@ -94,14 +115,18 @@ class Bus:
             namespace: '' or '/' for the root.
             parameters: Values that go before the defaults that the node declares.
             remappings: Topic, service and action names of the node -> names to use instead.
+            options: What the command line says, and what is rarely needed.
 
         Raises:
             BridgeError: an invalid name, or one that is taken.
         """
+        options = options or self.node_options
+        rules = options.arguments.remappings if options else ()
+        name, namespace = names.renamed(name, namespace, rules)
         full_name = names.expand(names.node_name(name), names.namespace(namespace), name)
         if any(node.fully_qualified_name == full_name for node in self._nodes):
             raise BridgeError(f"there is a node {full_name} already; node names are unique")
-        node = Node(self, name, namespace, parameters or {}, remappings or {})
+        node = Node(self, name, namespace, parameters or {}, remappings or {}, options)
         self._nodes.append(node)
         return node
 
@@ -112,13 +137,19 @@ class Bus:
 
     @property
     def refused(self) -> Mapping[str, int]:
-        """How much from outside was not delivered, by reason: overflow, attachment, payload, type hash."""
+        """How much from outside was not delivered, by reason.
+
+        'overflow': more than the queue holds; 'attachment': no known source; 'payload': not the type's bytes;
+        'type', 'type hash': another type or definition; 'token': an unreadable liveliness token.
+        """
         return self.external.refused
 
     def admit(self) -> int:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
         arrivals = self.external.drain()
         for arrival in arrivals:
+            for tap in self.arrival_taps:
+                tap(arrival)
             arrival.receiver.enqueue(arrival.data, True)
         return len(arrivals)
 
@@ -137,8 +168,11 @@ class Bus:
             return
         self._closed = True
         atexit.unregister(self.close)
+        if os.getpid() != self._process:
+            return  # a fork has none of Zenoh's threads: closing would wait for them for ever
         for node in reversed(self.nodes):
             node.destroy()
+        self.external.report()
         self.session.close()  # type: ignore[no-untyped-call]
 
     def in_own_thread(self) -> bool:

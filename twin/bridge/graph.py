@@ -1,24 +1,28 @@
-"""Who is there: the nodes and endpoints of a ROS graph, from rmw_zenoh's liveliness tokens."""
+"""Who is there: the nodes and endpoints of a ROS graph, from the liveliness tokens of every wire."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Self, cast, get_args
 
-from twin.bridge import types
+import zenoh
+
+from twin.bridge import types, wire_ros2dds
 from twin.bridge.keys import EndpointKind, demangle, gid
 from twin.bridge.qos import QoS, parse_qos
 from twin.bridge.session import direct
 
 if TYPE_CHECKING:
-    import zenoh
-
     from twin.bridge.bus import Bus
 
 _TIMEOUT_S = 2.0
 _ACTION = "/_action/"
+_LONGEST_TOKEN = 4096
+"""More is no ROS name, but an attempt to fill the memory."""
+_MOST_TOKENS = 100_000
 
 
 @dataclass(frozen=True, order=True)
@@ -62,12 +66,12 @@ def is_hidden(name: str) -> bool:
 
 
 def parse_token(token: str) -> NodeInfo | EndpointInfo | None:
-    """Return what a token declares, None if it is of another form; more fields, as in Lyrical, are ignored.
+    """Return what a token of rmw_zenoh declares, None if it is of another form.
 
-    Source: rmw_zenoh liveliness_utils.cpp.
+    More fields than known, as in Lyrical, are ignored. Source: rmw_zenoh liveliness_utils.cpp.
     """
     parts = token.split("/")
-    if len(parts) < 9 or parts[0] != "@ros2_lv":
+    if len(parts) < 9 or parts[0] != "@ros2_lv" or "" in parts or len(token) > _LONGEST_TOKEN:
         return None
     _, _, session_id, node_id, _, kind, _, namespace, name = parts[:9]
     node = NodeInfo(demangle(namespace), name, session_id, node_id)
@@ -76,15 +80,55 @@ def parse_token(token: str) -> NodeInfo | EndpointInfo | None:
     if kind not in get_args(EndpointKind) or len(parts) < 13:
         return None
     topic, dds_name, type_hash, qos = parts[9:13]
-    return EndpointInfo(
-        node,
-        cast(EndpointKind, kind),
-        demangle(topic),
-        types.from_dds_name(dds_name) or dds_name,
-        type_hash,
-        parse_qos(qos),
-        gid(token),
+    try:
+        return EndpointInfo(
+            node,
+            cast(EndpointKind, kind),
+            demangle(topic),
+            types.from_dds_name(dds_name) or dds_name,
+            type_hash,
+            parse_qos(qos),
+            gid(token),
+        )
+    except ValueError:
+        return None
+
+
+def parse_tokens(token: str) -> tuple[NodeInfo | EndpointInfo, ...]:
+    """Return all that a token of any wire declares; nothing if it is of no known form.
+
+    A bridge's tokens name no nodes: what it announces is the bridge's own. Its action is shown as its parts.
+    """
+    if not token.startswith("@/"):
+        item = parse_token(token)
+        return () if item is None else (item,)
+    try:
+        announced = wire_ros2dds.parse_token(token) if len(token) <= _LONGEST_TOKEN else None
+    except ValueError:
+        return ()
+    if announced is None:
+        return ()
+    node = NodeInfo("/", wire_ros2dds.BRIDGE_NODE, announced.session_id, "0")
+    return tuple(
+        EndpointInfo(node, kind, name, typename, announced.type_hash, announced.qos, gid(token))
+        for kind, name, typename in _announced_parts(announced)
     )
+
+
+def _announced_parts(announced: wire_ros2dds.Announced) -> list[tuple[EndpointKind, str, str]]:
+    name, typename = announced.name, announced.type
+    if announced.kind not in ("AS", "AC"):
+        return [(cast(EndpointKind, announced.kind), name, typename)]
+    services: EndpointKind = "SS" if announced.kind == "AS" else "SC"
+    topics: EndpointKind = "MP" if announced.kind == "AS" else "MS"
+    base = f"{name}{_ACTION}"
+    return [
+        (services, f"{base}send_goal", f"{typename}_SendGoal"),
+        (services, f"{base}cancel_goal", "action_msgs/srv/CancelGoal"),
+        (services, f"{base}get_result", f"{typename}_GetResult"),
+        (topics, f"{base}feedback", f"{typename}_FeedbackMessage"),
+        (topics, f"{base}status", "action_msgs/msg/GoalStatusArray"),
+    ]
 
 
 class Graph:
@@ -92,8 +136,8 @@ class Graph:
 
     def __init__(self, tokens: Iterable[str] = ()) -> None:
         self._lock = threading.Lock()
-        self._known: dict[str, NodeInfo | EndpointInfo] = {}
-        self._subscriber: Any = None
+        self._known: dict[str, tuple[NodeInfo | EndpointInfo, ...]] = {}
+        self._subscribers: list[Any] = []
         self.changes = 0
         """How often something came or went."""
         for token in tokens:
@@ -102,8 +146,9 @@ class Graph:
     @classmethod
     def snapshot(cls, bus: Bus) -> Self:
         """Return the graph as it is now, the bus's own nodes included."""
-        replies = bus.session.liveliness().get(f"@ros2_lv/{bus.domain_id}/**", timeout=_TIMEOUT_S)
-        return cls(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+        liveliness = bus.session.liveliness()
+        queries = [liveliness.get(key, timeout=_TIMEOUT_S) for key in _tokens(bus)]
+        return cls(str(reply.ok.key_expr) for replies in queries for reply in replies if reply.ok is not None)
 
     @classmethod
     def watch(cls, bus: Bus) -> Self:
@@ -111,19 +156,24 @@ class Graph:
         graph = cls()
 
         def on_change(sample: zenoh.Sample) -> None:
-            (graph._add if str(sample.kind).endswith("PUT") else graph._remove)(str(sample.key_expr))
+            token = str(sample.key_expr)
+            if sample.kind == zenoh.SampleKind.DELETE:
+                graph._remove(token)
+            elif not graph._add(token):
+                bus.external.refuse("token", token[:80], "a liveliness token that cannot be read")
             bus.external.wake()
 
-        graph._subscriber = bus.session.liveliness().declare_subscriber(
-            f"@ros2_lv/{bus.domain_id}/**", direct(on_change), history=True
-        )
+        liveliness = bus.session.liveliness()
+        graph._subscribers += [
+            liveliness.declare_subscriber(key, direct(on_change), history=True) for key in _tokens(bus)
+        ]
         return graph
 
     def close(self) -> None:
         """Watch no more. Harmless when repeated."""
-        if self._subscriber is not None:
-            self._subscriber.undeclare()
-            self._subscriber = None
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
+        self._subscribers.clear()
 
     @property
     def nodes(self) -> tuple[NodeInfo, ...]:
@@ -174,7 +224,7 @@ class Graph:
 
     def _all(self) -> list[NodeInfo | EndpointInfo]:
         with self._lock:
-            return list(self._known.values())
+            return list(chain.from_iterable(self._known.values()))
 
     def _of(self, kind: EndpointKind, name: str) -> tuple[EndpointInfo, ...]:
         return tuple(e for e in self.endpoints if e.kind == kind and e.name == name)
@@ -186,13 +236,21 @@ class Graph:
                 found.setdefault(endpoint.name, set()).add(endpoint.type)
         return {name: tuple(sorted(types_)) for name, types_ in found.items()}
 
-    def _add(self, token: str) -> None:
-        item = parse_token(token)
-        if item is not None:
-            with self._lock:
-                self._known[token] = item
-                self.changes += 1
+    def _add(self, token: str) -> bool:
+        """Add what a token declares; return whether it declares something."""
+        items = parse_tokens(token)
+        with self._lock:
+            if not items or len(self._known) >= _MOST_TOKENS:
+                return False
+            self._known[token] = items
+            self.changes += 1
+        return True
 
     def _remove(self, token: str) -> None:
         with self._lock:
             self.changes += self._known.pop(token, None) is not None
+
+
+def _tokens(bus: Bus) -> tuple[str, str]:
+    """Return the expressions of rmw_zenoh's tokens and of zenoh-bridge-ros2dds's, which know no domains."""
+    return f"@ros2_lv/{bus.domain_id}/**", "@/*/@ros2_lv/*/**"

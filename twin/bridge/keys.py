@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import xxhash
 
-from twin.bridge.qos import RMW_DEFAULT_DEPTH, QoS
+from twin.bridge.qos import QoS, qos_string
 
 EndpointKind = Literal["MP", "MS", "SS", "SC"]
 """Message publisher, message subscription, service server, service client."""
@@ -46,14 +46,6 @@ def parse_attachment(data: bytes | None) -> Attachment | None:
 def topic_key(domain_id: int, name: str, dds_name: str, type_hash: str) -> str:
     """Return the key of a topic or service, as 0/cmd_vel/geometry_msgs::msg::dds_::Twist_/RIHS01_9c45."""
     return f"{domain_id}/{name.strip('/')}/{dds_name}/{type_hash}"
-
-
-def qos_string(qos: QoS) -> str:
-    """Return a QoS as tokens spell it; what equals the default (reliable, volatile, depth 42) is empty."""
-    reliability = "2" if qos.reliability == "best_effort" else ""
-    durability = "1" if qos.durability == "transient_local" else ""
-    depth = "" if qos.depth == RMW_DEFAULT_DEPTH else str(qos.depth)
-    return f"{reliability}:{durability}:,{depth}:,:,:,,"
 
 
 def gid(token: str) -> bytes:

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
-from twin.bridge import types
+from twin.bridge import ros_args, types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
-from twin.bridge.keys import topic_key
+from twin.bridge.console_log import show_log
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
-from twin.bridge.session import SessionConfig, direct
-from twin.errors import BridgeError
+from twin.bridge.node_options import NodeOptions
+from twin.bridge.program_arguments import parser_of, split
+from twin.bridge.session import SessionConfig, direct, endpoints
+from twin.bridge.wire import Wire
+from twin.bridge.wire_entrance import Entrance
+from twin.bridge.wire_naming import Interface
+from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 """Where rmw_zenoh expects a router."""
@@ -31,6 +39,7 @@ class LiveBus:
 
     def __init__(self, bus: Bus, clock: Clock, *, use_sim_time: bool) -> None:
         self.bus = bus
+        bus.use_sim_time = use_sim_time
         self._clock = clock
         self._sim_time: SimTime | None = SimTime(bus) if use_sim_time else None
         self._advance()
@@ -72,8 +81,11 @@ class SimTime:
         self._lock = threading.Lock()
         self._now_ns = 0
         name = self._codec.msgtype
-        key = topic_key(bus.domain_id, "/clock", types.dds_name(name), types.rihs01(name))
-        self._subscriber = bus.session.declare_subscriber(key, direct(self._on_sample))
+        clock = Interface("/clock", types.dds_name(name), types.rihs01(name))
+        self._entrance = Entrance(bus.external, clock)
+        self._subscribers = [
+            bus.session.declare_subscriber(key, direct(self._on_sample)) for key in bus.naming.heard(clock)
+        ]
 
     @property
     def now_ns(self) -> int:
@@ -82,6 +94,9 @@ class SimTime:
             return self._now_ns
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        attachment = sample.attachment.to_bytes() if sample.attachment else None
+        if self._entrance.source(str(sample.key_expr), attachment) is None:
+            return
         try:
             now_ns = ns(self._codec.decode(sample.payload.to_bytes()).clock)
         except Exception as error:  # whatever the bytes were, they are not our bug
@@ -101,6 +116,7 @@ def join(
     domain_id: int | None = None,
     use_sim_time: bool = False,
     timeout_s: float = 3.0,
+    wire: Wire = "rmw_zenoh",
 ) -> Iterator[LiveBus]:
     """Join a ROS graph, as a Zenoh client that opens no listener, and leave it at the end.
 
@@ -111,23 +127,76 @@ def join(
         domain_id: Default: ROS_DOMAIN_ID, or 0.
         use_sim_time: Whether the clock follows `/clock` instead of the wall clock.
         timeout_s: How long to try to connect [s].
+        wire: How keys and tokens are spelled; what comes in may be spelled in every way.
 
     Raises:
         BridgeError: nobody answers, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
     """
     file = config or _path(os.environ.get("ZENOH_SESSION_CONFIG_URI"))
     if connect is None:
-        connect = () if listen or file else (DEFAULT_ENDPOINT,)
+        connect = (
+            ()
+            if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
+            else (DEFAULT_ENDPOINT,)
+        )
     session = SessionConfig(
         mode="peer" if listen else "client",
+        wire=wire,
         listen=tuple(listen),
         connect=tuple(connect),
         file=file,
         timeout_s=timeout_s,
     )
     clock = Clock()
-    with Bus.of(session, clock, domain_id=domain_id_of(domain_id)) as bus:
+    with Bus.of(session, clock) as bus:
         yield LiveBus(bus, clock, use_sim_time=use_sim_time)
+
+
+def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> None:
+    """Be a program: join a graph, create nodes with `make(bus)`, run them until Ctrl-C; log on stderr.
+
+    If `make` is a generator function, it is a task: each `yield` waits for what comes next, and the program
+    is over when it returns. What `make` takes after the bus are the program's arguments, see `parser_of`;
+    after --ros-args come those of ROS (`-p name:=value`, `-r from:=to`). A user's mistake is one line on
+    stderr and exit code 2.
+
+    Args:
+        make: Factory of the nodes.
+        arguments: Of the command line; None: those of the process.
+    """
+    show_log()
+    parser = parser_of(make)
+    try:
+        ros = ros_args.parse(sys.argv[1:] if arguments is None else arguments)
+        joining, own = split(parser.parse_args(ros.rest))
+        with join(**joining) as process, noted_signals() as received:
+            process.bus.node_options = NodeOptions(arguments=ros)
+            steps = make(process.bus, **own)
+            if isinstance(steps, Generator):
+                process.spin(lambda: bool(received) or next(steps, received) is received)
+            else:
+                process.spin(lambda: bool(received))
+    except TwinError as fault:
+        parser.exit(2, f"error: {fault}\n")
+    except KeyboardInterrupt:
+        parser.exit(130)
+
+
+@contextmanager
+def noted_signals() -> Iterator[list[int]]:
+    """Note SIGINT and SIGTERM, so that a program can end between two spins; a second one ends it at once."""
+    received: list[int] = []
+
+    def note(number: int, frame: object) -> None:
+        received.append(number)
+        signal.signal(number, before[signal.Signals(number)])
+
+    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _path(text: str | None) -> Path | None:

@@ -20,6 +20,7 @@ from twin.bridge.live import DEFAULT_ENDPOINT, domain_id_of
 from twin.bridge.lockstep_recorder import Recorder
 from twin.bridge.lockstep_wire import STEP, node_token, requests, responses, run_token, step_key
 from twin.bridge.msgs import ns
+from twin.bridge.node_services import StandardServices
 from twin.bridge.session import SessionConfig, direct, open_session
 from twin.errors import BridgeError
 
@@ -141,6 +142,7 @@ def join(
     try:
         clock = Clock()
         with Bus.open(clock, domain_id=domain) as bus:
+            bus.standard_services = StandardServices(at_once=True)  # others may want to ask
             bus.skip_ids(_FIRST_ID + _IDS * os.getpid())
             yield LockstepProcess(bus, clock, network)
     finally:

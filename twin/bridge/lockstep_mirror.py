@@ -7,23 +7,43 @@ whatever depends on order (history, inboxes, digest) is as in one process.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import zenoh
-import zenoh.ext
 
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr import Codec, codec
 from twin.bridge.external import Arrival
 from twin.bridge.graph import EndpointInfo, NodeInfo, parse_token
-from twin.bridge.keys import Attachment, gid, parse_attachment, topic_key
+from twin.bridge.keys import Attachment, NodeToken, gid, parse_attachment, topic_key
 from twin.bridge.lockstep_wire import Entry, entry
+from twin.bridge.qos import QoS
 from twin.bridge.session import direct
-from twin.bridge.topics import Sample
+from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
 from twin.errors import BridgeError
 
-_HEARTBEAT_S = 0.5  # rmw_zenoh's period
+
+@dataclass(frozen=True)
+class MirroredNode:
+    """A node of another process, as taps see it."""
+
+    bus: Bus
+    token: NodeToken
+    fully_qualified_name: str
+
+
+@dataclass(frozen=True)
+class MirroredPublisher:
+    """A publisher of another process, as taps see it."""
+
+    node: MirroredNode
+    name: str
+    """Absolute name of the topic."""
+    msgtype: str
+    qos: QoS
+    gid: bytes
 
 
 class MirroredSample(Sample[Any]):
@@ -31,9 +51,11 @@ class MirroredSample(Sample[Any]):
 
     __slots__ = ("_decoded",)
 
-    def __init__(self, topic: str, msgtype: str, time_ns: int, payload: bytes) -> None:
-        self.topic = topic
-        self.msgtype = msgtype
+    def __init__(self, publisher: MirroredPublisher, sequence: int, time_ns: int, payload: bytes) -> None:
+        self.publisher: Any = publisher
+        self.sequence = sequence
+        self.topic = publisher.name
+        self.msgtype = publisher.msgtype
         self.time_ns = time_ns
         self._payload = payload
         self._decoded: Any = None
@@ -49,6 +71,15 @@ class MirroredSample(Sample[Any]):
             decoder: Codec[Any] = codec(types.get(self.msgtype))
             self._decoded = decoder.decode(self._payload or b"")
         return self._decoded
+
+
+def mirrored_publisher(bus: Bus, info: EndpointInfo) -> MirroredPublisher:
+    """Return what taps are told of a publisher of the graph."""
+    node = info.node
+    number = int(node.node_id) if node.node_id.isdecimal() else -1
+    token = NodeToken(bus.domain_id, node.session_id, number, node.namespace, node.name)
+    owner = MirroredNode(bus, token, node.full_name)
+    return MirroredPublisher(owner, info.name, info.type, info.qos, info.gid)
 
 
 class _MirroredService:
@@ -71,7 +102,7 @@ class Mirror:
         self._bus = bus
         self._waiting: list[Any] = []
         self._declared: dict[int, list[Any]] = {}
-        self._publishers: dict[int, tuple[EndpointInfo, Any]] = {}
+        self._publishers: dict[int, tuple[MirroredPublisher, Any]] = {}
         self._gids: set[bytes] = set()
         self._queries: dict[int, zenoh.Query] = {}
         self._requests = 0
@@ -132,9 +163,11 @@ class Mirror:
             self._offers = None
 
     def _publish(self, number: int, attachment: bytes, payload: bytes) -> None:
-        info, publisher = self._publishers[number]
+        mirrored, publisher = self._publishers[number]
+        source = parse_attachment(attachment)
+        sequence = source.sequence if source else 0
         if self._bus.taps:
-            sample = MirroredSample(info.name, info.type, self._bus.clock.now_ns, payload)
+            sample = MirroredSample(mirrored, sequence, self._bus.clock.now_ns, payload)
             for tap in self._bus.taps:
                 tap(sample)
         publisher.put(payload, attachment=attachment)
@@ -176,32 +209,16 @@ class Mirror:
             declared.append(self._endpoint(number, info, key))
 
     def _endpoint(self, number: int, info: EndpointInfo, key: str) -> Any:
-        session, latched = self._bus.session, info.qos.durability == "transient_local"
+        session = self._bus.session
         if info.kind == "SS":
-            handler = direct(lambda query: self._on_query(query, _MirroredService(self, info, key)))
+            service = _MirroredService(self, info, key)
+            handler = direct(lambda query: self._on_query(query, service))
             return session.declare_queryable(key, handler, complete=True)
         if info.kind == "MP":
-            publisher: Any = (
-                zenoh.ext.declare_advanced_publisher(
-                    session,
-                    key,
-                    congestion_control=zenoh.CongestionControl.DROP,
-                    cache=zenoh.ext.CacheConfig(info.qos.depth),
-                    sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                        heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S
-                    ),
-                    publisher_detection=True,
-                )
-                if latched
-                else session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
-            )
-            self._publishers[number] = (info, publisher)
+            publisher = declare_publisher(session, key, info.qos)
+            self._publishers[number] = (mirrored_publisher(self._bus, info), publisher)
             return publisher
-        handler = direct(lambda sample: self._on_sample(number, sample))
-        if not latched:
-            return session.declare_subscriber(key, handler)
-        history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=info.qos.depth)
-        return zenoh.ext.declare_advanced_subscriber(session, key, handler, history=history)
+        return declare_subscriber(session, key, lambda sample: self._on_sample(number, sample), info.qos)
 
     def _undeclare(self, number: int) -> None:
         for entity in reversed(self._declared.pop(number, [])):
@@ -209,12 +226,13 @@ class Mirror:
         self._publishers.pop(number, None)
 
     def _on_sample(self, number: int, sample: zenoh.Sample) -> None:
-        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
+        attachment = sample.attachment.to_bytes() if sample.attachment else b""
+        source = parse_attachment(attachment)
         if source is None or source.gid in self._gids:
             return  # nodes of one process reach each other without us
         if not self._bus.in_own_thread():
             return  # not from the run
-        self._waiting.append(entry(Entry.SAMPLE, number, "", b"", sample.payload.to_bytes()))
+        self._waiting.append(entry(Entry.SAMPLE, number, "", attachment, sample.payload.to_bytes()))
 
     def _on_query(self, query: zenoh.Query, service: _MirroredService) -> None:
         source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)

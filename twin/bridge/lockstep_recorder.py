@@ -53,7 +53,8 @@ class Recorder:
         for item in entries:
             number = item.number
             if item.kind == Entry.SAMPLE:
-                self._subscription(number).enqueue(item.payload.tobytes(), False)
+                source = parse_attachment(item.attachment.tobytes())
+                self._subscription(number).enqueue((item.payload.tobytes(), source), False)
             elif item.kind == Entry.REQUEST:
                 self._ask(item)
             elif item.kind == Entry.REPLY and number in self._asked:

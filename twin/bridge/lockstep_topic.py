@@ -5,16 +5,16 @@ from __future__ import annotations
 import logging
 import queue
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import zenoh
 
 from twin.bridge import types
 from twin.bridge.bus import Bus
-from twin.bridge.graph import EndpointInfo, Graph
+from twin.bridge.graph import EndpointInfo, Graph, NodeInfo
 from twin.bridge.keys import parse_attachment
-from twin.bridge.lockstep_mirror import MirroredSample
+from twin.bridge.lockstep_mirror import MirroredSample, mirrored_publisher
 from twin.bridge.session import direct
 from twin.bridge.topics import Sample
 from twin.errors import BridgeError
@@ -22,6 +22,7 @@ from twin.errors import BridgeError
 _log = logging.getLogger("twin.run")
 _PATIENCE_S = 1.0
 _POLL_S = 0.02
+_NAMELESS = NodeInfo("/", "", "", "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,9 +53,8 @@ class AnswerTopic:
         self.surplus = 0
         """Samples that nobody waited for: with them, which one answers what depends on the wall clock."""
         self._graph = Graph.watch(bus)
-        listener = self._own("MS", config.topic)
+        listener = self._listener = self._own("MS", config.topic)
         talker = self._own("MP", config.stimulus)
-        self._type = listener.type
         base = f"{bus.domain_id}{config.topic}/{types.dds_name(listener.type)}/{listener.type_hash}"
         self._publisher: Any = bus.session.declare_publisher(
             base, congestion_control=zenoh.CongestionControl.DROP
@@ -102,8 +102,9 @@ class AnswerTopic:
                 payload, attachment = self._arrived.get(timeout=max(0.0, end - time.monotonic()))
             except queue.Empty:
                 raise BridgeError(self._late(tick)) from None
+            sample = self._sample(payload, attachment)
             for tap in self._bus.taps:
-                tap(MirroredSample(self.config.topic, self._type, self._bus.clock.now_ns, payload))
+                tap(sample)
             self._publisher.put(payload, attachment=attachment)
         self._due = 0
 
@@ -114,6 +115,15 @@ class AnswerTopic:
         self._graph.close()
         for entity in (self._subscriber, self._publisher, self._probe):
             entity.undeclare()
+
+    def _sample(self, payload: bytes, attachment: bytes) -> MirroredSample:
+        source = parse_attachment(attachment)
+        assert source is not None
+        known = [e for e in self._graph.publishers(self.config.topic) if e.gid == source.gid]
+        # Who declares no tokens is told as a nameless node.
+        info = known[0] if known else replace(self._listener, node=_NAMELESS, gid=source.gid)
+        mirrored = mirrored_publisher(self._bus, info)
+        return MirroredSample(mirrored, source.sequence, self._bus.clock.now_ns, payload)
 
     def _late(self, tick: int) -> str:
         config = self.config

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import zenoh
-import zenoh.ext
 
-from twin.bridge import types
+from twin.bridge import types, wire_ros2dds
 from twin.bridge.external import Arrival
 from twin.bridge.keys import Attachment, parse_attachment
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
+from twin.bridge.topics import declare_subscriber
+from twin.bridge.wire_entrance import nameless_source
+from twin.bridge.wire_naming import parse_key
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
     from twin.bridge.node import Node
 
 
@@ -27,6 +31,7 @@ class RawSample(NamedTuple):
     type: str
     """'geometry_msgs/msg/Twist'; as on the wire if it is no ROS 2 name."""
     type_hash: str
+    """As on the wire: 'TypeHashNotSupported' from Humble, '' if a bridge does not tell."""
     payload: bytes
     """CDR, with its encapsulation header."""
     source: Attachment
@@ -36,7 +41,8 @@ class RawSample(NamedTuple):
 class RawSubscription:
     """Calls back, in its node's spin, for every message of any type on a topic; `**` is every topic.
 
-    It declares no endpoint in the graph: what it hears is not its node's business.
+    It declares no endpoint in the graph: what it hears is not its node's business. `**` hears what
+    zenoh-bridge-ros2dds sends only on a bus of that wire: its keys are any name at all.
     """
 
     def __init__(
@@ -49,19 +55,24 @@ class RawSubscription:
         """Messages that gave way to newer ones because the depth was reached."""
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
-        session, handler = node.bus.session, direct(self._on_sample)
-        key = zenoh.KeyExpr.autocanonize(f"{node.bus.domain_id}/{topic.strip('/')}/*/*")
-        if self.qos.durability == "transient_local":
-            self._zenoh: Any = zenoh.ext.declare_advanced_subscriber(
-                session,
-                key,
-                handler,
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=self.qos.depth),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-            )
-        else:
-            self._zenoh = session.declare_subscriber(key, handler)
+        self._nameless = count(1)
+        bus = node.bus
+        self._announced = AnnouncedTypes(bus) if bus.networked else None
+        self._zenoh = [
+            declare_subscriber(bus.session, zenoh.KeyExpr.autocanonize(key), self._on_sample, self.qos)
+            for key in self._keys(bus)
+        ]
         node.add_endpoint(self)
+
+    def _keys(self, bus: Bus) -> tuple[str, ...]:
+        """Return expressions of which no two match the same key."""
+        name = self.name.strip("/")
+        typed = f"{bus.domain_id}/{name}/*/*"
+        if not bus.networked:
+            return (typed,)
+        if "*" not in name:
+            return typed, wire_ros2dds.key(name)
+        return (name,) if bus.naming.wire == "ros2dds" else (typed,)
 
     def enqueue(self, data: RawSample, external: bool) -> None:
         """Put a sample into the node's inbox; the oldest one gives way when `depth` wait already."""
@@ -79,24 +90,74 @@ class RawSubscription:
 
     def destroy(self) -> None:
         """Hear nothing any more. Harmless when repeated."""
-        if self._zenoh is not None:
-            self._zenoh.undeclare()
-            self._zenoh = None
+        for subscriber in self._zenoh:
+            subscriber.undeclare()
+        self._zenoh.clear()
+        if self._announced is not None:
+            self._announced.close()
+            self._announced = None
         for entry in self._pending:
             entry[0] = None
         self._pending.clear()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        data = self._read(self.node.bus, str(sample.key_expr), sample)
+        if data is not None:
+            self._take(data)
+
+    def _take(self, data: RawSample) -> None:
+        """Keep what came for the node's turn; called in any thread."""
         bus = self.node.bus
-        name, dds_name, type_hash = str(sample.key_expr).partition("/")[2].rsplit("/", 2)
-        topic = f"/{name}"
-        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
-        if source is None:
-            bus.external.refuse("attachment", topic, "no rmw_zenoh attachment of 33 bytes")
-            return
-        typename = types.from_dds_name(dds_name) or dds_name
-        data = RawSample(topic, typename, type_hash, sample.payload.to_bytes(), source)
         if bus.in_own_thread():
             self.enqueue(data, False)
         else:
-            bus.external.push(Arrival(source, self, data))
+            bus.external.push(Arrival(data.source, self, data, len(data.payload)))
+
+    def _read(self, bus: Bus, key: str, sample: zenoh.Sample) -> RawSample | None:
+        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
+        typed = parse_key(key)
+        if typed is None:
+            topic, announced = f"/{key}", self._announced
+            typename, type_hash = announced.of(topic) if announced is not None else ("", "")
+            if not typename:
+                bus.external.refuse("type", topic, "no type, and no bridge announces the topic")
+                return None
+            source = source or nameless_source(key, next(self._nameless))
+        elif typed.domain != str(bus.domain_id):
+            return None
+        else:
+            topic, type_hash = typed.name, typed.type_hash
+            typename = types.from_dds_name(typed.dds_name) or typed.dds_name
+        if source is None:
+            bus.external.refuse("attachment", topic, "no rmw_zenoh attachment of 33 bytes")
+            return None
+        return RawSample(topic, typename, type_hash, sample.payload.to_bytes(), source)
+
+
+class AnnouncedTypes:
+    """The types that bridges announce, for topics whose keys tell none; read in any thread."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._types: dict[str, tuple[str, str]] = {}
+        self._subscriber: Any = bus.session.liveliness().declare_subscriber(
+            "@/*/@ros2_lv/*/**", direct(self._on_token), history=True
+        )
+
+    def of(self, topic: str) -> tuple[str, str]:
+        """Return (type, hash); empty if nobody announces the topic."""
+        return self._types.get(topic, ("", ""))
+
+    def close(self) -> None:
+        """Hear no more."""
+        self._subscriber.undeclare()
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        try:
+            announced = wire_ros2dds.parse_token(str(sample.key_expr))
+        except ValueError:
+            return
+        if announced is not None and announced.kind in ("MP", "MS") and len(self._types) < _MOST_TYPES:
+            self._types[announced.name] = (announced.type, announced.type_hash)
+
+
+_MOST_TYPES = 10_000

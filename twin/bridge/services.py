@@ -1,19 +1,22 @@
-"""Services and their clients, over Zenoh queryables with rmw_zenoh's keys."""
+"""Services and their clients, over Zenoh queryables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
 import zenoh
 
 from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, pack_attachment, parse_attachment
+from twin.bridge.keys import Attachment, pack_attachment
 from twin.bridge.qos import QoS
 from twin.bridge.session import direct
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
+from twin.bridge.wire_entrance import Entrance
+from twin.bridge.wire_naming import parse_key
+from twin.bridge.wire_ros2dds import pack_request_id
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -27,7 +30,10 @@ Respond = Callable[[Any], None]
 
 
 class Future:
-    """A response that may not have come yet; done in a spin of the client's node."""
+    """A response that may not have come yet; done in a spin of the client's node.
+
+    In executions and tasks: `response = yield from future`.
+    """
 
     def __init__(self, service: str) -> None:
         self.done = False
@@ -61,6 +67,20 @@ class Future:
         else:
             self._callbacks.append(callback)
 
+    def __iter__(self) -> Generator[None, None, Any]:
+        """Wait in an execution; the value is the response.
+
+        Raises:
+            BridgeError: nobody answered.
+        """
+        while not self.done:
+            yield
+        return self.result
+
+    def cancel(self) -> None:
+        """Wait no more; a response that comes later is ignored."""
+        self.finish(None, f"the request to {self._service} was cancelled")
+
     def finish(self, response: Any, error: str | None = None) -> None:
         """Set the response, or why there is none; what comes later is ignored."""
         if self.done:
@@ -79,12 +99,27 @@ class Service(Endpoint):
         super().__init__(node, "SS", name, srv_type.name, _QOS)
         self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
         self._callback = callback
-        session = node.bus.session
-        self._declared.append(session.declare_queryable(self.key, direct(self._on_query), complete=True))
+        self._open: set[zenoh.Query] = set()
+        bus = node.bus
+        self._entrance = Entrance(bus.external, self.interface)
+        for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
+            queryable = bus.session.declare_queryable(key, direct(self._on_query), complete=True)
+            self._declared.append(queryable)
+        self.announce()
 
     def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
         """Put a request into the node's inbox."""
         self.node.inbox.append([self, data, external])
+
+    def destroy(self) -> None:
+        """Leave the graph; who still waits for a response learns that there will be none."""
+        super().destroy()
+        for entry in self.node.inbox:
+            if entry[0] is self:
+                entry[0] = None
+                self._open.add(entry[1][0])
+        while self._open:
+            self._open.pop().drop()  # type: ignore[no-untyped-call]
 
     def handle(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
         """Decode and call back."""
@@ -100,22 +135,34 @@ class Service(Endpoint):
             return
 
         def respond(response: Any) -> None:
-            attachment = pack_attachment(source.sequence, self.node.bus.clock.now_ns, source.gid)
+            if type(response) is not self._responses.cls:
+                what = type(response).__name__
+                raise TypeError(f"{self.name} answers with {self._responses.msgtype}, not {what}")
+            if query not in self._open:
+                if not self._declared:
+                    return  # destroyed meanwhile: the client knows
+                raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
+            self._open.discard(query)
+            now_ns = self.node.bus.clock.now_ns
+            typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
+            attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
             with query:
-                query.reply(self.key, self._responses.encode(response), attachment=attachment)
+                query.reply(query.key_expr, self._responses.encode(response), attachment=attachment)
 
+        self._open.add(query)
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
         bus = self.node.bus
-        source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)
+        key, attachment = str(query.key_expr), query.attachment
+        source = self._entrance.source(key, attachment.to_bytes() if attachment else None)
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
-            bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
         elif bus.in_own_thread():
             self.enqueue((query, source), False)
         else:
-            bus.external.push(Arrival(source, self, (query, source)))
+            size = len(query.payload) if query.payload else 0
+            bus.external.push(Arrival(source, self, (query, source), size))
 
 
 class Client(Endpoint):
@@ -125,29 +172,62 @@ class Client(Endpoint):
         super().__init__(node, "SC", name, srv_type.name, _QOS)
         self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
         self._sequence = 0
+        self._pending: dict[Future, None] = {}
+        node.bus.standard_services.want(name, node.bus.nodes)
+        self._bridged = node.bus.naming.wire == "ros2dds"
         self._querier = node.bus.session.declare_querier(
             self.key,
-            target=zenoh.QueryTarget.ALL_COMPLETE,
+            # The bridge's queryables do not say that they are complete.
+            target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=_FOREVER_S,
         )
         self._declared.append(self._querier)
+        self.announce()
 
     @property
     def service_is_ready(self) -> bool:
         """Whether somebody offers the service now."""
         return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
 
+    def wait_for_service(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
+        """Wait in an execution: `ready = yield from client.wait_for_service()`.
+
+        Args:
+            timeout_ns: Of the bus's clock [ns]; then the value is False. None waits for ever.
+        """
+        start_ns = self.node.now_ns
+        while not self.service_is_ready:
+            if timeout_ns is not None and self.node.now_ns - start_ns >= timeout_ns:
+                return False
+            yield
+        return True
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Forget a request: its future stays undone, and a response that comes later is ignored."""
+        self._pending.pop(future, None)
+
+    def destroy(self) -> None:
+        """Leave the graph; futures that are not done end with an error."""
+        super().destroy()
+        for future in tuple(self._pending):
+            future.finish(None, f"the client of {self.name} was destroyed before an answer came")
+        self._pending.clear()
+
     def call_async(self, request: Any) -> Future:
         """Send a request.
 
         Raises:
             TypeError: a request of another type.
+            BridgeError: the client is destroyed.
         """
+        if not self._declared:
+            raise BridgeError(f"the client of {self.name} is destroyed")
         if type(request) is not self._requests.cls:
             raise TypeError(f"{self.name} takes {self._requests.msgtype}, not {type(request).__name__}")
         self._sequence += 1
         bus, future = self.node.bus, Future(self.name)
+        self._pending[future] = None
         source = Attachment(self._sequence, bus.clock.now_ns, self.gid)
 
         def deliver(data: Any) -> None:
@@ -156,26 +236,36 @@ class Client(Endpoint):
             else:
                 bus.external.push(Arrival(source, self, data))
 
+        answered: list[bool] = []
+
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
+                answered.append(True)
                 deliver((future, reply.ok.payload.to_bytes()))
 
+        def on_end() -> None:
+            # May run in any thread, the bus's own too: it must not overtake a reply that waits outside.
+            if not answered:
+                deliver((future, None))
+
         self._querier.get(
-            direct(on_reply, lambda: deliver((future, None))),
+            direct(on_reply, on_end),
             payload=self._requests.encode(request),
-            attachment=pack_attachment(*source),
+            attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
         )
         return future
 
     def enqueue(self, data: tuple[Future, bytes | None], external: bool) -> None:
         """Put a response, or the end of the query, into the node's inbox."""
-        self.node.inbox.append([self, data, external])
+        if self._declared:
+            self.node.inbox.append([self, data, external])
 
     def handle(self, data: tuple[Future, bytes | None], external: bool) -> None:
         """Decode and finish the future; the end of a query matters only if no response came before."""
         future, payload = data
-        if future.done:
+        if future not in self._pending:  # done, removed, or the client destroyed
             return
+        del self._pending[future]
         if payload is None:
             future.finish(None, f"nobody answered on the service {self.name}; is its node running?")
             return

@@ -10,11 +10,14 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr import Codec, codec
+from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import EndpointKind, gid, pack_attachment, parse_attachment, topic_key
-from twin.bridge.qos import QoS
+from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
+from twin.bridge.qos import INFINITE_NS, QoS
 from twin.bridge.session import direct
+from twin.bridge.wire_entrance import Entrance
+from twin.bridge.wire_naming import Interface
+from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
@@ -22,22 +25,27 @@ if TYPE_CHECKING:
 M = TypeVar("M")
 
 _HEARTBEAT_S = 0.5  # rmw_zenoh's period
+_KEEP_ALL = 100_000
+"""What keep_all keeps at most: no unbounded memory."""
 
 
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "time_ns", "topic")
+    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
-    def __init__(self, topic: str, time_ns: int, message: M, message_codec: Codec[M]) -> None:
-        self.topic = topic
+    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        """The publisher's count, from 1."""
+        self.topic: str = publisher.name
         """Absolute name."""
-        self.msgtype = message_codec.msgtype
+        self.msgtype = publisher.codec.msgtype
         self.time_ns = time_ns
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = message_codec
+        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
@@ -53,15 +61,22 @@ class Endpoint:
 
     def __init__(self, node: Node, kind: EndpointKind, name: str, typename: str, qos: QoS) -> None:
         bus = node.bus
-        dds_name, type_hash = types.dds_name(typename), types.rihs01(typename)
-        token = node.token.endpoint(bus.next_id(), kind, name, dds_name, type_hash, qos)
-        self.name = name
+        self.interface = Interface(name, types.dds_name(typename), types.rihs01(typename))
+        type_hash = bus.naming.type_hash(self.interface.type_hash)
+        token = node.token.endpoint(bus.next_id(), kind, name, self.interface.dds_name, type_hash, qos)
+        self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
         self.qos = qos
-        self.key = topic_key(bus.domain_id, name, dds_name, type_hash)
+        self.key = bus.naming.key(self.interface)
         self.gid = gid(token)
-        self._declared: list[Any] = [bus.session.liveliness().declare_token(token)]
+        self._token = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
+        self._declared: list[Any] = []
+
+    def announce(self) -> None:
+        """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
+        if self._token is not None:
+            self._declared.append(self.node.bus.session.liveliness().declare_token(self._token))
 
     def destroy(self) -> None:
         """Leave the graph; nothing arrives any more. Harmless when repeated."""
@@ -78,22 +93,10 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._sequence = 0
-        session = node.bus.session
         self._latched = qos.durability == "transient_local"
-        if self._latched:
-            reliable = qos.reliability == "reliable"
-            miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
-            self._zenoh: Any = zenoh.ext.declare_advanced_publisher(
-                session,
-                self.key,
-                congestion_control=zenoh.CongestionControl.DROP,
-                cache=zenoh.ext.CacheConfig(qos.depth),
-                sample_miss_detection=miss if reliable else None,
-                publisher_detection=True,
-            )
-        else:
-            self._zenoh = session.declare_publisher(self.key, congestion_control=zenoh.CongestionControl.DROP)
+        self._zenoh: Any = declare_publisher(node.bus.session, self.key, qos)
         self._declared.append(self._zenoh)
+        self.announce()
 
     @property
     def has_subscribers(self) -> bool:
@@ -105,14 +108,17 @@ class Publisher(Endpoint, Generic[M]):
 
         Raises:
             TypeError: a message of another type.
+            BridgeError: the publisher is destroyed.
         """
         if type(message) is not self.codec.cls:
             raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
+        if not self._declared:
+            raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         time_ns = self._bus.clock.now_ns
         sample = None
         if self._bus.taps:
-            sample = Sample(self.name, time_ns, message, self.codec)
+            sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
@@ -128,36 +134,46 @@ class Subscription(Endpoint, Generic[M]):
         self.codec = codec(cls)
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
-        """Messages that gave way to newer ones because the depth was reached."""
+        """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
+        self._origin: zenoh.Sample | Attachment | None = None
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
-        # From outside the hash may differ (other definition, Humble): hear it to be able to say so.
-        key = f"{self.key.rpartition('/')[0]}/*" if node.bus.networked else self.key
-        session, handler = node.bus.session, direct(self._on_sample)
-        if qos.durability == "transient_local":
-            subscriber: Any = zenoh.ext.declare_advanced_subscriber(
-                session,
-                key,
-                handler,
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-            )
-        else:
-            subscriber = session.declare_subscriber(key, handler)
-        self._declared.append(subscriber)
+        self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
+        bus = node.bus
+        self._networked = bus.networked
+        # ros2dds's keys tell no type: what comes even from here may be another one's.
+        self._untyped = bus.networked and bus.naming.wire == "ros2dds"
+        self._entrance = Entrance(bus.external, self.interface)
+        for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
+            self._declared.append(declare_subscriber(bus.session, key, self._on_sample, qos))
+        self.announce()
 
-    def enqueue(self, data: bytes, external: bool) -> None:
+    @property
+    def source(self) -> Attachment | None:
+        """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if not isinstance(self._origin, zenoh.Sample):
+            return self._origin
+        attachment = self._origin.attachment  # read only if asked for: few want to know
+        return parse_attachment(attachment.to_bytes() if attachment else None)
+
+    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
-        if len(self._pending) >= self.qos.depth:
+        if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
             self.dropped += 1
         entry: list[Any] = [self, data, external]
+        if self.qos.lifespan_ns != INFINITE_NS:
+            entry.append(self.node.now_ns + self.qos.lifespan_ns)
         self._pending.append(entry)
         self.node.inbox.append(entry)
 
-    def handle(self, payload: bytes, external: bool) -> None:
+    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Decode and call back."""
-        self._pending.popleft()
+        entry = self._pending.popleft()
+        if len(entry) > 3 and self.node.now_ns > entry[3]:
+            self.dropped += 1
+            return
+        payload, self._origin = data
         if external:
             try:
                 message = self.codec.decode(payload)
@@ -167,6 +183,7 @@ class Subscription(Endpoint, Generic[M]):
         else:
             message = self.codec.decode(payload)
         self._callback(message)
+        self._origin = None
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
@@ -178,14 +195,50 @@ class Subscription(Endpoint, Generic[M]):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         bus = self.node.bus
         if bus.in_own_thread():
-            self.enqueue(sample.payload.to_bytes(), False)
+            # The wide expressions of a networked bus match this process's topics of other types too.
+            if not self._networked or str(sample.key_expr) == self.key:
+                self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
-        if str(sample.key_expr) != self.key:
-            theirs = str(sample.key_expr).rpartition("/")[2]
-            bus.external.refuse("type hash", self.name, f"{theirs} instead of {self.key.rpartition('/')[2]}")
-            return
-        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
-        if source is None:
-            bus.external.refuse("attachment", self.name, "no rmw_zenoh attachment of 33 bytes")
-            return
-        bus.external.push(Arrival(source, self, sample.payload.to_bytes()))
+        attachment = sample.attachment.to_bytes() if sample.attachment else None
+        source = self._entrance.source(str(sample.key_expr), attachment)
+        if source is not None:
+            payload = sample.payload.to_bytes()
+            bus.external.push(Arrival(source, self, (payload, source), len(payload)))
+
+
+def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+    """Return a publisher with rmw_zenoh's settings (rmw_publisher_data.cpp)."""
+    reliable = qos.reliability == "reliable"
+    waits = reliable and qos.history == "keep_all"
+    settings: dict[str, Any] = {
+        "congestion_control": zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP,
+        "reliability": zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT,
+    }
+    if qos.durability == "volatile":
+        return session.declare_publisher(key, **settings)
+    miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
+    return zenoh.ext.declare_advanced_publisher(
+        session,
+        key,
+        **settings,
+        cache=zenoh.ext.CacheConfig(qos.depth),
+        sample_miss_detection=miss if reliable else None,
+        publisher_detection=True,
+    )
+
+
+def declare_subscriber(
+    session: zenoh.Session, key: str | zenoh.KeyExpr, callback: Callable[[zenoh.Sample], None], qos: QoS
+) -> Any:
+    """Return a subscriber with rmw_zenoh's settings (rmw_subscription_data.cpp)."""
+    if qos.durability == "volatile":
+        return session.declare_subscriber(key, direct(callback))
+    reliable = qos.reliability == "reliable"
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        direct(callback),
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True) if reliable else None,
+        subscriber_detection=True,
+    )

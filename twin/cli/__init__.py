@@ -5,6 +5,11 @@ from __future__ import annotations
 
 def main() -> None:
     """Run `twin`; a user's mistake ends as one sentence on stderr and exit code 2."""
-    from twin.cli.app import run_app
+    import sys
 
-    run_app()
+    try:
+        from twin.cli.app import run_app
+
+        run_app()
+    except KeyboardInterrupt:  # while something is imported, or an error is printed
+        sys.exit(130)

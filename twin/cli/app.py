@@ -8,7 +8,7 @@ import typer
 
 from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
-from twin.cli.ros import topic
+from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
 app = typer.Typer(
@@ -33,9 +33,19 @@ _COMMANDS = (
     ("view", view.view, "twin view my_robot.urdf --joint lift_joint=0.5"),
     ("schema", schema.schema, "twin schema -o scenario.schema.json"),
     ("robots", robots.robots, "twin robots"),
+    ("router", router.router, "twin router --listen tcp/127.0.0.1:7447"),
 )
 
-_GROUPS = (("topic", topic.app),)
+_GROUPS = (
+    ("topic", topic.app),
+    ("node", node.app),
+    ("service", service.app),
+    ("action", action.app),
+    ("param", param.app),
+    ("tf", tf.app),
+    ("interface", interface.app),
+    ("bag", bag.app),
+)
 
 _NEED_ARGUMENTS = ("run", "exec", "play", "check", "tree", "graph", "convert", "view")
 

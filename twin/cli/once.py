@@ -34,7 +34,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
             wait_timeout_s=options.wait_timeout,
             free=options.free,
         )
-        clock = outside.clock(options.listen)
+        clock = outside.clock(options.network is not None)
         scenario = schema.load(options.scenario, options.overrides)
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
@@ -46,8 +46,9 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 out=folder,
                 record=options.record,
                 pace=options.pace,
-                listen=options.listen,
+                network=options.network,
                 outside=outside,
+                bag=folder / "bag" if options.bag else None,
                 save_model=options.save_model,
                 progress=progress,
             )

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from twin.bridge.wire import Wire
 from twin.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from twin.bridge.session import SessionConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +28,30 @@ class RunOptions:
     wait_timeout: float = 10.0
     """[s] of wall time."""
     free: bool = False
+    connect: tuple[str, ...] = ()
+    wire: Wire = "rmw_zenoh"
+    zenoh_config: Path | None = None
+    domain_id: int = 0
     record: bool = True
+    bag: bool = False
+    """Whether a bag is written into the folder of the results."""
     save_model: Path | None = None
+
+    @property
+    def network(self) -> SessionConfig | None:
+        """How the bus takes part in a network, None if it does not."""
+        if not (self.listen or self.connect or self.zenoh_config):
+            return None
+        from twin.bridge.session import SessionConfig
+
+        return SessionConfig(
+            mode="client" if self.connect and not self.listen else "peer",
+            listen=self.listen,
+            connect=self.connect,
+            file=self.zenoh_config,
+            wire=self.wire,
+            domain_id=self.domain_id,
+        )
 
     def arguments(self, out: Path) -> list[str]:
         """Return the arguments of a `twin` that does the same and prints JSON."""
@@ -36,7 +63,12 @@ class RunOptions:
         words += [word for name in self.wait_for for word in ("--wait-for", name)]
         words += ["--wait-timeout", repr(self.wait_timeout)] if self.wait_for else []
         words += ["--free"] * self.free
+        words += [word for endpoint in self.connect for word in ("--connect", endpoint)]
+        if self.network is not None:
+            words += ["--wire", self.wire, "--domain", str(self.domain_id)]
+        words += [] if self.zenoh_config is None else ["--zenoh-config", str(self.zenoh_config)]
         words += [] if self.record else ["--no-record"]
+        words += ["--bag"] if self.bag else []
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from twin.bridge.wire import Wire
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 
 
@@ -45,10 +46,25 @@ def run(
     free: Annotated[
         bool, typer.Option("--free", help="Let others take part at their own pace; not deterministic.")
     ] = False,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),
+    ] = None,
+    zenoh_config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", exists=True, dir_okay=False, help="Join as a Zenoh configuration says."),
+    ] = None,
+    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    domain: Annotated[
+        int, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain, if others may join.")
+    ] = 0,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no Rerun recording.")] = False,
+    bag: Annotated[
+        bool, typer.Option("--bag", help="Also write a ROS 2 bag of every message: <out>/bag.")
+    ] = False,
     save_model: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
     ] = None,
@@ -67,7 +83,12 @@ def run(
         wait_for=tuple(wait_for or ()),
         wait_timeout=wait_timeout,
         free=free,
+        connect=tuple(connect or ()),
+        zenoh_config=zenoh_config,
+        wire=wire,
+        domain_id=domain,
         record=not no_record,
+        bag=bag,
         save_model=save_model,
     )
     if repeat == 1 and not expect_one_hash:

@@ -11,6 +11,7 @@ from typing import Any
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.factory import create_nodes
+from twin.bridge.session import SessionConfig
 from twin.bridge.topics import Sample
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
@@ -59,6 +60,7 @@ def build(
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
     listen: Sequence[str] = (),
     outside: Outside = ALONE,
+    network: SessionConfig | None = None,
     crash_folder: Path | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
@@ -68,6 +70,7 @@ def build(
         taps: Called for every sample, from the first one on that a node publishes while it is made.
         listen: Endpoints for other processes.
         outside: The user's own nodes, and how the run keeps time with other processes.
+        network: How else the bus takes part in a network, instead of `listen`.
         crash_folder: Where the last states go if the physics diverges.
 
     Raises:
@@ -89,7 +92,9 @@ def build(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
     )
     clock = Clock()
-    bus = Bus.open(clock, listen=listen, session=outside.session)
+    network = network or SessionConfig(listen=tuple(listen))
+    name = outside.session if network.networked else "twin"
+    bus = Bus.of(replace(network, name=name), clock)
     for tap in taps:
         bus.tap(tap)
     try:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from twin.bridge.bags.tap import BagTap
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.errors import RecordingError, ScenarioError
@@ -26,6 +27,8 @@ from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
+    from twin.bridge.session import SessionConfig
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
@@ -157,7 +160,9 @@ def run(
     record: bool = True,
     pace: float | None = None,
     listen: Sequence[str] = (),
+    network: SessionConfig | None = None,
     outside: Outside = ALONE,
+    bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
@@ -170,20 +175,34 @@ def run(
         pace: Simulated seconds per second; None is as fast as possible. Changes no result.
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`. Unless the run waits for
             them, they make it non-deterministic, and the verdict says so.
+        network: How else the bus takes part in a network, instead of `listen`.
         outside: Who takes part from other processes, and how the run keeps time with them.
+        bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
 
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
     """
-    listen = outside.endpoints(listen)
+    if network is None:
+        listen = outside.endpoints(listen)
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
     taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
+    bag_tap = None if bag is None else BagTap(bag)
+    bag_taps = [] if bag_tap is None else [bag_tap.on_sample]
     simulation = None
-    parts = build(scenario, taps=taps, listen=listen, outside=outside, crash_folder=out)
+    parts = build(
+        scenario,
+        taps=[*taps, *bag_taps],
+        listen=listen,
+        network=network,
+        outside=outside,
+        crash_folder=out,
+    )
     try:
+        if bag_tap is not None:
+            parts.bus.arrival_taps.append(bag_tap.on_arrival)
         if save_model is not None:
             _save_model(parts, save_model)
         simulation = Run(scenario, parts, sink, outside)
@@ -191,7 +210,7 @@ def run(
             sink.declare(parts.world)
         warm_up()
         wall, cpu = _loop(simulation, pace, progress)
-        verdict = _verdict(simulation, digest, wall, cpu, outside.clock(listen))
+        verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
@@ -200,6 +219,8 @@ def run(
             sink.close()
         if simulation is not None and simulation.lockstep is not None:
             simulation.lockstep.close()
+        if bag_tap is not None:
+            bag_tap.close()
         parts.bus.close()
 
 
@@ -252,6 +273,11 @@ def _loop(
     return elapsed
 
 
+def _refused(bus: Bus) -> dict[str, float]:
+    """Return how much from outside was not delivered, by reason; nothing without a network."""
+    return {f"refused_{reason.replace(' ', '_')}": float(n) for reason, n in sorted(bus.refused.items())}
+
+
 def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock: ClockMode) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
@@ -267,6 +293,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock:
             "cpu_time_s": cpu,
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
+            **_refused(simulation.bus),
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=clock != "free" and not (simulation.lockstep and simulation.lockstep.surplus),

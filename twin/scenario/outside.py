@@ -48,11 +48,11 @@ class Outside:
         if not self.wait_timeout_s > 0.0:
             raise ScenarioError(f"--wait-timeout {self.wait_timeout_s:g}: must be more than 0 s")
 
-    def clock(self, listen: Sequence[str]) -> ClockMode:
-        """Return how a run that listens there keeps time with others."""
+    def clock(self, networked: bool) -> ClockMode:
+        """Return how a run keeps time with others, whom a network may bring."""
         if self.wait_for:
             return "lockstep"
-        return "free" if self.free or listen else "inproc"
+        return "free" if self.free or networked else "inproc"
 
     def endpoints(self, listen: Sequence[str]) -> tuple[str, ...]:
         """Return where to listen: where asked to, else where rmw_zenoh looks if others are to come."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from twin.bridge.wire import Wire
+from twin.cli.ros.endings import quiet_pipe
+from twin.cli.ros.option_groups import takes
+from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -24,6 +28,7 @@ class Joining:
     config: Path | None
     domain_id: int | None
     use_sim_time: bool
+    wire: Wire
 
     @contextmanager
     def open(self) -> Iterator[LiveBus]:
@@ -31,7 +36,11 @@ class Joining:
         from twin.bridge import live
 
         with live.join(
-            self.connect, config=self.config, domain_id=self.domain_id, use_sim_time=self.use_sim_time
+            self.connect,
+            config=self.config,
+            domain_id=self.domain_id,
+            use_sim_time=self.use_sim_time,
+            wire=self.wire,
         ) as process:
             yield process
 
@@ -61,26 +70,26 @@ def _options(
     use_sim_time: Annotated[
         bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
     ] = False,
+    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    interfaces: Interfaces = None,
 ) -> Joining:
+    add_interfaces(interfaces)
     return Joining(
         connect=tuple(connect) if connect else None,
         config=config,
         domain_id=domain,
         use_sim_time=use_sim_time,
+        wire=wire,
     )
 
 
 def joins(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
-    shared = inspect.signature(_options, eval_str=True).parameters
-    own = inspect.signature(command, eval_str=True)
+    joined = takes("joining", _options)(command)
 
-    @functools.wraps(command)
+    @functools.wraps(joined)
     def wrapper(**given: Any) -> None:
-        joining = _options(**{name: given.pop(name) for name in shared})
-        command(**given, joining=joining)
+        with quiet_pipe():
+            joined(**given)
 
-    parameters = [*(own.parameters[name] for name in own.parameters if name != "joining"), *shared.values()]
-    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapper

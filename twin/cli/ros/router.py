@@ -1,0 +1,45 @@
+"""`twin router`: where ROS 2 nodes over Zenoh meet."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def router(
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Where to listen.", show_default="tcp/127.0.0.1:7447, this computer only"
+        ),
+    ] = None,
+    connect: Annotated[
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Another router to join.")
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            envvar="ZENOH_ROUTER_CONFIG_URI",
+            exists=True,
+            dir_okay=False,
+            help="Zenoh configuration: TLS, access control, anything.",
+        ),
+    ] = None,
+) -> None:
+    """Run a Zenoh router, as rmw_zenohd, until Ctrl-C."""
+    from twin.bridge.router import RouterConfig, run_router
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    settings = RouterConfig(listen=tuple(listen or ()), connect=tuple(connect or ()), file=config)
+    with run_router(settings) as running:
+        typer.echo(
+            f"Started Zenoh router with id {running.session_id}, listening on {', '.join(running.listen)}"
+        )
+        stop.wait()
