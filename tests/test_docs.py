@@ -6,6 +6,7 @@ import importlib
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -82,12 +83,14 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        shutil.copytree(ROOT / "scenarios", folder / "scenarios")
+        for name in ("scenarios", "examples"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = str(probe.getsockname()[1])
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        self.environment = {**os.environ, "PATH": path, "COLUMNS": "200"}
+        here = {"PATH": path, "COLUMNS": "200", "TWIN_CONNECT": f"tcp/127.0.0.1:{self.port}"}
+        self.environment = {**os.environ, **here}
         self.background: list[tuple[subprocess.Popen[str], list[str]]] = []
 
     def save(self, block: Block) -> None:
@@ -102,6 +105,8 @@ class Reader:
 
     def finish(self) -> None:
         for process, output in self.background:
+            if "examples/" in str(process.args):  # runs until it is stopped
+                process.send_signal(signal.SIGINT)
             self._judge("--listen", process, output)
 
     def _start(self, command: str) -> subprocess.Popen[str]:

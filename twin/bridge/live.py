@@ -121,7 +121,8 @@ def join(
     """Join a ROS graph, as a Zenoh client that opens no listener, and leave it at the end.
 
     Args:
-        connect: Endpoints of a run, a router or any rmw_zenoh peer; None: where rmw_zenoh expects a router.
+        connect: Endpoints of a run, a router or any rmw_zenoh peer; None: TWIN_CONNECT, or where rmw_zenoh
+            expects a router.
         listen: Endpoints where others may connect; then the process is a peer that needs nobody.
         config: Zenoh configuration file, as rmw_zenoh's ZENOH_SESSION_CONFIG_URI, which is the default.
         domain_id: Default: ROS_DOMAIN_ID, or 0.
@@ -137,7 +138,7 @@ def join(
         connect = (
             ()
             if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
-            else (DEFAULT_ENDPOINT,)
+            else (os.environ.get("TWIN_CONNECT") or DEFAULT_ENDPOINT,)
         )
     session = SessionConfig(
         mode="peer" if listen else "client",
