@@ -22,7 +22,9 @@ class Lockstep:
             ScenarioError: a wire other than rmw_zenoh's.
         """
         if bus.naming.wire != "rmw_zenoh":
-            raise ScenarioError(f"--wire {bus.naming.wire}: lock-step speaks rmw_zenoh only; leave --wire out")
+            raise ScenarioError(
+                f"--wire {bus.naming.wire}: lock-step speaks rmw_zenoh only; leave --wire out"
+            )
         self._bus = bus
         self._tick = 0
         self._attendance = Attendance(bus)
