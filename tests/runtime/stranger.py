@@ -42,7 +42,7 @@ def watch(process: live.LiveBus, end: float) -> dict[str, object]:
     names = [info.full_name for info in graph.nodes]
     base = names[0]
     client = node.create_client(ListParameters, f"{base}/list_parameters")
-    offered = client.service_is_ready
+    process.spin(lambda: client.service_is_ready, timeout_s=5.0)
     asked: Future = client.call_async(new(ListParameters.Request))
     value = new(ParameterValue)
     value.type, value.double_value = ParameterType.PARAMETER_DOUBLE, 0.01
@@ -60,7 +60,7 @@ def watch(process: live.LiveBus, end: float) -> dict[str, object]:
         "odom": len(odometry),
         "commands": len(others),
         "nodes": names,
-        "parameters": (asked.done and asked.error is None) if offered else None,
+        "parameters": asked.done and asked.error is None,
         "set": changed.done and changed.error is None,
     }
 

@@ -7,6 +7,7 @@ from twin.bridge.graph import Graph
 from twin.bridge.lockstep_admission import admit_questions
 from twin.bridge.lockstep_stepper import Attendance, Stepper, await_node
 from twin.bridge.lockstep_topic import AnswerConfig, AnswerTopic
+from twin.errors import ScenarioError
 from twin.scenario.outside import Outside
 
 
@@ -18,7 +19,12 @@ class Lockstep:
 
         Raises:
             BridgeError: somebody does not come in time, or a topic that the run does not have.
+            ScenarioError: a wire other than rmw_zenoh's.
         """
+        if bus.naming.wire != "rmw_zenoh":
+            raise ScenarioError(
+                f"--wire {bus.naming.wire}: lock-step speaks rmw_zenoh only; leave --wire out"
+            )
         self._bus = bus
         self._tick = 0
         self._attendance = Attendance(bus)
