@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import Any
 
 import pytest
 
 from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
 from twin.bridge.services import Respond
 from twin.bridge.srvs import AddTwoInts, Trigger
 from twin.errors import BridgeError
@@ -76,3 +78,80 @@ def test_an_exception_in_a_service_is_not_swallowed(bus: Bus) -> None:
     bus.create_node("client").create_client(Trigger, "go").call_async(Trigger.Request())
     with pytest.raises(ZeroDivisionError):
         bus.spin()
+
+
+def test_a_service_answers_once_and_with_its_type(bus: Bus) -> None:
+    kept: list[Respond] = []
+    bus.create_node("server").create_deferred_service(
+        Trigger, "go", lambda request, respond: kept.append(respond)
+    )
+    future = bus.create_node("client").create_client(Trigger, "go").call_async(Trigger.Request())
+    bus.spin()
+    with pytest.raises(TypeError, match="go answers with std_srvs/srv/Trigger_Response"):
+        kept[0](AddTwoInts.Response(1))
+    kept[0](Trigger.Response(True, ""))
+    with pytest.raises(BridgeError, match="answered twice"):
+        kept[0](Trigger.Response(True, ""))
+    bus.spin()
+    assert future.result.success
+
+
+@pytest.mark.parametrize("handled", [True, False])
+def test_a_service_destroyed_meanwhile_leaves_nobody_waiting(bus: Bus, handled: bool) -> None:
+    kept: list[Respond] = []
+    server = bus.create_node("server")
+    service = server.create_deferred_service(Trigger, "go", lambda request, respond: kept.append(respond))
+    future = bus.create_node("client").create_client(Trigger, "go").call_async(Trigger.Request())
+    if handled:
+        server.spin()
+    assert server.destroy_service(service)
+    assert not server.destroy_service(service)
+    if handled:
+        kept[0](Trigger.Response(True, ""))  # too late, and no harm
+    bus.spin()
+    assert future.error == "nobody answered on the service /go; is its node running?"
+
+
+def test_a_client_destroyed_meanwhile_ends_its_futures(bus: Bus) -> None:
+    bus.create_node("server").create_service(Trigger, "go", lambda request: Trigger.Response(True, ""))
+    node = bus.create_node("client")
+    client = node.create_client(Trigger, "go")
+    future = client.call_async(Trigger.Request())
+    node.destroy_client(client)
+    bus.spin()
+    assert future.error == "the client of /go was destroyed before an answer came"
+    with pytest.raises(BridgeError, match="is destroyed"):
+        client.call_async(Trigger.Request())
+
+
+def test_a_request_may_be_forgotten_or_cancelled(bus: Bus) -> None:
+    bus.create_node("server").create_service(Trigger, "go", lambda request: Trigger.Response(True, ""))
+    client = bus.create_node("client").create_client(Trigger, "go")
+    forgotten, cancelled = client.call_async(Trigger.Request()), client.call_async(Trigger.Request())
+    client.remove_pending_request(forgotten)
+    cancelled.cancel()
+    bus.spin()
+    assert not forgotten.done
+    assert cancelled.error == "the request to /go was cancelled"
+
+
+def test_a_task_waits_for_a_service_and_its_answer(bus: Bus, clock: Clock) -> None:
+    node = bus.create_node("client")
+    client = node.create_client(AddTwoInts, "add")
+
+    def ask() -> Generator[None, None, Any]:
+        early = yield from client.wait_for_service(timeout_ns=10)
+        ready = yield from client.wait_for_service()
+        response = yield from client.call_async(AddTwoInts.Request(1, 2))
+        return early, ready, response.sum
+
+    task = node.create_task(ask())
+    for _ in range(30):
+        bus.spin()
+        clock.now_ns += 1
+    assert not task.done
+    bus.create_node("server").create_service(AddTwoInts, "add", lambda r: AddTwoInts.Response(r.a + r.b))
+    for _ in range(4):
+        bus.spin()
+    assert task.done
+    assert task.result == (False, True, 3)

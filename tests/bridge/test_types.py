@@ -33,6 +33,17 @@ def test_hashes_equal_those_in_files_that_ros_generated() -> None:
     }
 
 
+OTHER = json.loads((Path(__file__).parent / "data" / "rihs01_other.json").read_text("utf-8"))
+TEST_MSGS = Path(__file__).parent / "data" / "test_msgs"
+
+
+@pytest.mark.parametrize("source", [source for source in OTHER if source != "note"])
+def test_hashes_equal_those_that_rosidl_wrote_elsewhere(source: str) -> None:
+    types.add_folder(TEST_MSGS)  # every feature of .msg files: rosidl's own test package
+    wrong = [name for name, value in OTHER[source].items() if types.rihs01(name) != f"RIHS01_{value}"]
+    assert wrong == []
+
+
 def test_hashes_in_use_on_every_action() -> None:
     # facts/wire.md, from the ROS files
     assert types.rihs01("action_msgs/srv/CancelGoal").startswith("RIHS01_573d8b0a")

@@ -1,15 +1,27 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from twin.bridge import types
 from twin.bridge.cdr import general_codec
+from twin.bridge.defaults import new
 from twin.bridge.type_description import TypeDescription, describe, learn, sources
 from twin.errors import BridgeError
 
-ACTION = "geometry_msgs/PoseStamped target\nstring<=5[<=3] names\n---\nbyte[4] raw\n---\nfloat32 part\n"
+ACTION = """geometry_msgs/PoseStamped target
+string<=5[<=3] names
+---
+byte[4] raw
+int8[2] pair [1, -2]
+string[] words ["a, b", "c"]
+bool on true
+string say 'hi'
+---
+float32 part
+"""
 
 
 @pytest.mark.parametrize(
@@ -44,6 +56,8 @@ def test_an_unknown_type_is_learned_with_all_that_it_uses() -> None:
     assert learn(description) == "learned_msgs/action/Reach"
     goal = types.get("learned_msgs/action/Reach_Goal")
     assert list(goal.__annotations__)[:2] == ["target", "names"]
+    result = new(types.get("learned_msgs/action/Reach_Result"))
+    assert (result.pair.tolist(), result.words, result.on, result.say) == ([1, -2], ["a, b", "c"], True, "hi")
     wanted = renamed(describe("other_msgs/action/Reach"), "other_msgs", "learned_msgs")
     assert describe("learned_msgs/action/Reach") == wanted
     learn(describe("learned_msgs/action/Reach"), types.rihs01("learned_msgs/action/Reach"))
@@ -64,7 +78,10 @@ def test_other_fields_under_a_known_name_are_refused() -> None:
         learn(description)
 
 
-@pytest.mark.parametrize("fault", ["missing", "number", "name", "no fields", "field name", "loop", "huge"])
+FAULTS = ["missing", "number", "name", "no fields", "field name", "loop", "huge", "default"]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
 def test_nonsense_is_refused_and_leaves_nothing(fault: str) -> None:
     description = renamed(describe("geometry_msgs/msg/Pose"), "geometry_msgs", "nonsense_msgs")
     own = description.type_description
@@ -81,11 +98,28 @@ def test_nonsense_is_refused_and_leaves_nothing(fault: str) -> None:
             own.fields[0].name = "x: int\n    y"
         case "loop":
             own.fields[0].type.nested_type_name = own.type_name
+        case "default":
+            own.fields[0].default_value = "__import__('os')"
         case "huge":
             own.fields[0].type.type_id, own.fields[0].type.capacity = 51, 2**60
     with pytest.raises(BridgeError):
         learn(description)
     assert not any("nonsense_msgs" in name for name in types.names())
+
+
+def test_defaults_are_written_as_rosidl_writes_them() -> None:
+    types.add_folder(Path(__file__).parent / "data" / "test_msgs")
+    fields = {
+        field.name: field.default_value for field in describe("test_msgs/msg/Arrays").type_description.fields
+    }
+    assert fields["bool_values_default"] == "(False, True, False)"
+    assert fields["byte_values_default"] == "(0, 1, 255)"
+    assert fields["string_values_default"] == "('', 'max value', 'min value')"
+    assert fields["bool_values"] == ""
+    (w,) = [
+        field for field in describe("geometry_msgs/Quaternion").type_description.fields if field.name == "w"
+    ]
+    assert w.default_value == "1.0"
 
 
 def test_sources_hold_the_texts() -> None:

@@ -13,9 +13,11 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import ExternalQueue
+from twin.bridge.external import Arrival, ExternalQueue
 from twin.bridge.interrupts import guard
 from twin.bridge.node import Node
+from twin.bridge.node_options import NodeOptions
+from twin.bridge.node_services import StandardServices
 from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
 from twin.bridge.wire import Wire
@@ -42,8 +44,15 @@ class Bus:
         self.session_id = str(session.zid())
         self.networked = networked
         """Whether other processes may take part."""
+        self.use_sim_time = True
+        """What the parameter of that name says in every node."""
+        self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.arrival_taps: list[Callable[[Arrival], None]] = []
+        """Called for everything from outside when it enters, before a node has it."""
+        self.node_options: NodeOptions | None = None
+        """Of nodes that are created without options: the program's command line."""
         self._nodes: list[Node] = []
         self._ids = 0
         self._thread = threading.get_ident()
@@ -99,6 +108,7 @@ class Bus:
         namespace: str = "",
         parameters: Mapping[str, Any] | None = None,
         remappings: Mapping[str, str] | None = None,
+        options: NodeOptions | None = None,
     ) -> Node:
         """Add a node; nodes spin in the order of their creation.
 
@@ -107,14 +117,18 @@ class Bus:
             namespace: '' or '/' for the root.
             parameters: Values that go before the defaults that the node declares.
             remappings: Topic, service and action names of the node -> names to use instead.
+            options: What the command line says, and what is rarely needed.
 
         Raises:
             BridgeError: an invalid name, or one that is taken.
         """
+        options = options or self.node_options
+        rules = options.arguments.remappings if options else ()
+        name, namespace = names.renamed(name, namespace, rules)
         full_name = names.expand(names.node_name(name), names.namespace(namespace), name)
         if any(node.fully_qualified_name == full_name for node in self._nodes):
             raise BridgeError(f"there is a node {full_name} already; node names are unique")
-        node = Node(self, name, namespace, parameters or {}, remappings or {})
+        node = Node(self, name, namespace, parameters or {}, remappings or {}, options)
         self._nodes.append(node)
         return node
 
@@ -138,6 +152,8 @@ class Bus:
             guard.deliver()
         arrivals = self.external.drain()
         for arrival in arrivals:
+            for tap in self.arrival_taps:
+                tap(arrival)
             arrival.receiver.enqueue(arrival.data, True)
         return len(arrivals)
 
@@ -178,6 +194,10 @@ class Bus:
         """Return a number for a node or endpoint, unique in the session."""
         self._ids += 1
         return self._ids - 1
+
+    def skip_ids(self, count: int) -> None:
+        """Leave ids to another process whose session seems to be this one."""
+        self._ids += count
 
     def forget(self, node: Node) -> None:
         """Spin a node no more."""

@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from twin.bridge import types
 from twin.bridge.cdr_packed import (
+    check_end,
     decode_imu,
     decode_joint_state,
     decode_odometry,
@@ -23,6 +24,8 @@ from twin.bridge.cdr_packed import (
     read_text,
 )
 from twin.bridge.cdr_path import decode_path, encode_path
+from twin.bridge.cdr_wide import decode_wide, encode_wide, is_wide
+from twin.bridge.message_values import checked
 from twin.bridge.msgs import (
     Clock,
     Header,
@@ -41,6 +44,7 @@ from twin.bridge.msgs import (
     Twist,
     Vector3,
 )
+from twin.bridge.type_fields import array_types
 
 M = TypeVar("M")
 
@@ -62,32 +66,61 @@ class Codec(Generic[M]):
     """package/msg/Name."""
     cls: type[M]
     encode: Callable[[M], bytes]
-    """Raises rosbags' or struct's error if a field has a value of the wrong type: a bug in the publisher."""
+    """Raises BridgeError, naming the field, if one has a value that it cannot hold."""
     decode: Callable[[bytes], M]
-    """Raises on bytes that are not such a message; which exception is not specified."""
+    """Raises on bytes that are not such a message; which exception is not specified. Takes no more memory
+    than some times the payload, whatever lengths the payload tells."""
 
 
 def codec(cls: type[M]) -> Codec[M]:
     """Return the codec of a message class; rosbags generates its code now, not in the loop."""
-    msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
-    types.store.get_msgdef(msgtype)
-    encode, decode = _FAST.get(msgtype, (None, None))
     general = general_codec(cls)
-    return Codec(msgtype, cls, encode or general.encode, decode or general.decode)
+    fast = _FAST.get(general.msgtype)
+    if fast is None:
+        return general
+    encode, decode = fast
+
+    def explained(message: M) -> bytes:
+        try:
+            return encode(message)
+        except Exception:
+            return general.encode(checked(message))
+
+    return Codec(general.msgtype, cls, explained, decode)
 
 
 def general_codec(cls: type[M]) -> Codec[M]:
     """Return rosbags' codec of a message class."""
     msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
+    if is_wide(msgtype):
+        return Codec(msgtype, cls, _explained(encode_wide), lambda payload: decode_wide(payload, msgtype))
+    types.store.get_msgdef(msgtype)
     serialize, deserialize = types.store.serialize_cdr, types.store.deserialize_cdr
+    arrays = array_types(msgtype)
 
     def encode(message: M) -> bytes:
+        for read, dtype in arrays:  # rosbags would send the bytes of another type of numbers as they are
+            if read(message).dtype != dtype:
+                message = checked(message)
+                break
         return bytes(serialize(message, msgtype, little_endian=True))
 
     def decode(payload: bytes) -> Any:
         return deserialize(payload, msgtype)
 
-    return Codec(msgtype, cls, encode, decode)
+    return Codec(msgtype, cls, _explained(encode), decode)
+
+
+def _explained(encode: Callable[[M], bytes]) -> Callable[[M], bytes]:
+    """Return `encode` that repairs what it can, such as a list of numbers, and names the field otherwise."""
+
+    def explained(message: M) -> bytes:
+        try:
+            return encode(message)
+        except Exception:
+            return encode(checked(message))
+
+    return explained
 
 
 def _encode_twist(message: Twist) -> bytes:
@@ -169,6 +202,7 @@ def _decode_tf(payload: bytes) -> TFMessage:
         at += _POSE.size
         transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
         transforms.append(TransformStamped(Header(Time(sec, nanosec), frame), child, transform))
+    check_end(payload, at)
     return TFMessage(transforms)
 
 
@@ -195,6 +229,7 @@ def _decode_poses(payload: bytes) -> PoseArray:
         at += (4 - at) % 8
     if n * _POSE.size > len(payload) - at:
         raise ValueError(f"{n} poses do not fit")
+    check_end(payload, at + n * _POSE.size)
     values = unpack_from(f"<{7 * n}d", payload, at)
     poses = [
         Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))

@@ -67,6 +67,7 @@ def decode_odometry(payload: bytes) -> Odometry:
     x, y, z, qx, qy, qz, qw, pose_covariance, *twist, twist_covariance = _ODOMETRY_NUMBERS.unpack_from(
         payload, at
     )
+    check_end(payload, at + _ODOMETRY_NUMBERS.size)
     vx, vy, vz, wx, wy, wz = twist
     return Odometry(
         Header(stamp, frame),
@@ -103,6 +104,7 @@ def decode_imu(payload: bytes) -> Imu:
     """Return an Imu from little-endian CDR."""
     stamp, (frame,), at = _read_head(payload, 1)
     qx, qy, qz, qw, co, wx, wy, wz, cw, ax, ay, az, ca = _IMU_NUMBERS.unpack_from(payload, at)
+    check_end(payload, at + _IMU_NUMBERS.size)
     return Imu(
         Header(stamp, frame),
         Quaternion(qx, qy, qz, qw),
@@ -146,10 +148,13 @@ def decode_joint_state(payload: bytes) -> JointState:
         prefix, frame, names = known
         return JointState(Header(stamp, frame), list(names), *_read_arrays(payload, 12 + len(prefix)))
     frame, names, at = _read_names(payload)
+    if len(_joint_names) >= _MOST_LENGTHS:  # no robot's: somebody sends all kinds of things
+        _joint_names.clear()
     _joint_names[len(payload)] = (payload[12:at], frame, names)
     return JointState(Header(stamp, frame), names, *_read_arrays(payload, at))
 
 
+_MOST_LENGTHS = 64
 _joint_names: dict[int, tuple[bytes, str, list[str]]] = {}
 """By length of the payload: its bytes from frame to names, and what they mean."""
 
@@ -180,6 +185,7 @@ def _read_arrays(payload: bytes, at: int) -> list[NDArray[np.float64]]:
             raise ValueError(f"{count} values do not fit")
         arrays.append(np.frombuffer(payload, np.float64, count, at))
         at += 8 * count
+    check_end(payload, at)
     return arrays
 
 
@@ -195,9 +201,15 @@ def read_text(payload: bytes, at: int) -> tuple[str, int]:
     at += -at % 4
     (length,) = _U32.unpack_from(payload, at)
     end = at + 4 + length
-    if length == 0 or end > len(payload):
-        raise ValueError(f"a string of {length} bytes does not fit")
+    if length == 0 or end > len(payload) or payload[end - 1]:
+        raise ValueError(f"a string of {length} bytes does not fit, or has no end")
     return payload[at + 4 : end - 1].decode(), end
+
+
+def check_end(payload: bytes, at: int) -> None:
+    """Refuse bytes after the message; up to three may fill the last word."""
+    if len(payload) - at > 3:
+        raise ValueError(f"{len(payload) - at} bytes after the message")
 
 
 def _read_head(payload: bytes, texts: int) -> tuple[Time, list[str], int]:

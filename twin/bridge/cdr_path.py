@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from struct import Struct
 
-from twin.bridge.cdr_packed import read_text
+from twin.bridge.cdr_packed import check_end, read_text
 from twin.bridge.msgs import Header, Path, Point, Pose, PoseStamped, Quaternion, Time
 
 _MAGIC = b"\x00\x01\x00\x00"
@@ -57,4 +57,5 @@ def decode_path(payload: bytes) -> Path:
         at += _POSE.size
         pose = Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
         poses.append(PoseStamped(Header(time, pose_frame), pose))
+    check_end(payload, at)
     return Path(Header(stamp, frame), poses)

@@ -3,6 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, order=True)
+class Instant:
+    """A point in time, in the shape of rclpy's Time."""
+
+    nanoseconds: int
+
+    def to_msg(self) -> Any:
+        """Return it as builtin_interfaces/msg/Time."""
+        from twin.bridge.msgs import stamp
+
+        return stamp(self.nanoseconds)
 
 
 @dataclass(slots=True)
@@ -11,3 +25,7 @@ class Clock:
 
     now_ns: int = 0
     """[ns] since the start of the run."""
+
+    def now(self) -> Instant:
+        """Return the present time; `clock.now().to_msg()` is a stamp."""
+        return Instant(self.now_ns)

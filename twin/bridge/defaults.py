@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
 from twin.bridge.interface_values import Value
@@ -36,8 +37,8 @@ def new(cls: type[M], **fields: Any) -> M:
 def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
     """Return what makes each field's default."""
     values = types.defaults(msgtype)
-    fields = types.store.get_msgdef(msgtype).fields
-    return {name: _maker(description, values.get(name)) for name, description in fields}
+    fields = types.store.fielddefs[msgtype][1]
+    return {normalize_fieldname(name): _maker(description, values.get(name)) for name, description in fields}
 
 
 def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
@@ -46,7 +47,7 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
         cls = types.get(value)
         return lambda: new(cls)
     if node == Nodetype.BASE:
-        constant = _ZEROS.get(value[0], 0) if default is None else default
+        constant = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
         return lambda: constant
     (inner, element), length = value
     count = length if node == Nodetype.ARRAY else 0
@@ -56,8 +57,16 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
     if element[0] in STRINGS:
         texts = [""] * count if default is None else default
         return lambda: list(texts)  # type: ignore[arg-type]
-    numbers = np.array([0] * count if default is None else default, types.dtype_of(element[0]))
+    dtype = types.dtype_of(element[0])
+    numbers = np.zeros(count, dtype) if default is None else np.array(_signed(element[0], default), dtype)
     return lambda: numbers.copy()
+
+
+def _signed(base: str, value: Any) -> Any:
+    """Return a value as rosbags has it, for which a byte is a signed number."""
+    if base != "byte":
+        return value
+    return [_signed(base, item) for item in value] if isinstance(value, list) else (value + 128) % 256 - 128
 
 
 _ZEROS: dict[str, Value] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}

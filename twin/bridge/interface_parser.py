@@ -66,13 +66,20 @@ class Definition:
             return Problem(message, self.file, line)
         return Problem(f"the definition of {self.typename}, line {line}: {message}")
 
+    def read(self) -> tuple[tuple[Structure, ...], list[Problem]]:
+        """Return the sections, as far as they can be read, and every fault of the text."""
+        return _Parser(self).parse()
+
     def parse(self) -> tuple[Structure, ...]:
         """Return the sections.
 
         Raises:
             BridgeError: every fault of the text, with its line.
         """
-        return _Parser(self).parse()
+        sections, problems = self.read()
+        if problems:
+            raise BridgeError(problems)
+        return sections
 
 
 class _Parser:
@@ -83,7 +90,7 @@ class _Parser:
         self._sections = [Structure()]
         self._line = 0
 
-    def parse(self) -> tuple[Structure, ...]:
+    def parse(self) -> tuple[tuple[Structure, ...], list[Problem]]:
         for number, raw in enumerate(self._definition.text.splitlines(), start=1):
             self._line = number
             if _SEPARATOR.fullmatch(raw.rstrip()) and self._kind != "msg":
@@ -96,9 +103,7 @@ class _Parser:
                 except ValueError as fault:
                     self._problems.append(self._definition.problem(str(fault), self._line))
         self._count_sections()
-        if self._problems:
-            raise BridgeError(self._problems)
-        return tuple(self._sections)
+        return tuple(self._sections), self._problems
 
     def _count_sections(self) -> None:
         found, valid = len(self._sections), SECTIONS[self._kind]

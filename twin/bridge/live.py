@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
-from twin.bridge import types
+from twin.bridge import ros_args, types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr import codec
 from twin.bridge.clock import Clock
+from twin.bridge.console_log import show_log
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
+from twin.bridge.node_options import NodeOptions
+from twin.bridge.program_arguments import parser_of, split
 from twin.bridge.session import SessionConfig, direct, endpoints
 from twin.bridge.wire import Wire
 from twin.bridge.wire_entrance import Entrance
 from twin.bridge.wire_naming import Interface
-from twin.errors import BridgeError
+from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 """Where rmw_zenoh expects a router."""
@@ -33,6 +39,7 @@ class LiveBus:
 
     def __init__(self, bus: Bus, clock: Clock, *, use_sim_time: bool) -> None:
         self.bus = bus
+        bus.use_sim_time = use_sim_time
         self._clock = clock
         self._sim_time: SimTime | None = SimTime(bus) if use_sim_time else None
         self._advance()
@@ -141,15 +148,70 @@ def join(
         timeout_s=timeout_s,
     )
     clock = Clock()
-    with Bus.of(session, clock, domain_id=_domain_id() if domain_id is None else domain_id) as bus:
+    with Bus.of(session, clock) as bus:
         yield LiveBus(bus, clock, use_sim_time=use_sim_time)
+
+
+def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> None:
+    """Be a program: join a graph, create nodes with `make(bus)`, run them until Ctrl-C; log on stderr.
+
+    If `make` is a generator function, it is a task: each `yield` waits for what comes next, and the program
+    is over when it returns. What `make` takes after the bus are the program's arguments, see `parser_of`;
+    after --ros-args come those of ROS (`-p name:=value`, `-r from:=to`). A user's mistake is one line on
+    stderr and exit code 2.
+
+    Args:
+        make: Factory of the nodes.
+        arguments: Of the command line; None: those of the process.
+    """
+    show_log()
+    parser = parser_of(make)
+    try:
+        ros = ros_args.parse(sys.argv[1:] if arguments is None else arguments)
+        joining, own = split(parser.parse_args(ros.rest))
+        with join(**joining) as process, noted_signals() as received:
+            process.bus.node_options = NodeOptions(arguments=ros)
+            steps = make(process.bus, **own)
+            if isinstance(steps, Generator):
+                with closing(steps):
+                    process.spin(lambda: bool(received) or next(steps, received) is received)
+            else:
+                process.spin(lambda: bool(received))
+    except TwinError as fault:
+        parser.exit(2, f"error: {fault}\n")
+    except KeyboardInterrupt:
+        parser.exit(130)
+
+
+@contextmanager
+def noted_signals() -> Iterator[list[int]]:
+    """Note SIGINT and SIGTERM, so that a program can end between two spins; a second one ends it at once."""
+    received: list[int] = []
+
+    def note(number: int, frame: object) -> None:
+        received.append(number)
+        signal.signal(number, before[signal.Signals(number)])
+
+    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _path(text: str | None) -> Path | None:
     return Path(text) if text else None
 
 
-def _domain_id() -> int:
+def domain_id_of(given: int | None) -> int:
+    """Return the domain that was given, else ROS_DOMAIN_ID.
+
+    Raises:
+        BridgeError: ROS_DOMAIN_ID is no number from 0 to 232.
+    """
+    if given is not None:
+        return given
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not text.isdecimal() or int(text) > 232:
         raise BridgeError(f"ROS_DOMAIN_ID is {text!r}; valid is a number from 0 to 232")

@@ -39,10 +39,31 @@ def message_from_dict(cls: type[M], values: Mapping[str, Any] | None, *, now_ns:
     return _message(cls, {} if values is None else values, "", now_ns)
 
 
-def _message(cls: type[M], values: Any, path: str, now_ns: int | None) -> M:
+def checked(message: M) -> M:
+    """Return a copy of a message whose fields have the types that they are encoded from.
+
+    A list where an array of numbers belongs becomes an array; every number is compared with its range.
+
+    Raises:
+        BridgeError: a value that its field cannot hold; names the field.
+    """
+    try:
+        return _message(type(message), _shallow(message), "", None, deep=True)
+    except BridgeError as fault:
+        raise BridgeError(f"a {message.__msgtype__} cannot be encoded: {fault}") from fault  # type: ignore[attr-defined]
+
+
+def _shallow(message: Any) -> dict[str, Any]:
+    fields = fields_of(message.__msgtype__)
+    return {field.name: getattr(message, field.attribute, None) for field in fields}
+
+
+def _message(cls: type[M], values: Any, path: str, now_ns: int | None, *, deep: bool = False) -> M:
     msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
     if isinstance(values, cls):
-        return values
+        if not deep:
+            return values
+        values = _shallow(values)
     if now_ns is not None and (msgtype, values) in ((_HEADER, "auto"), (_TIME, "now")):
         time = types.get(_TIME)(now_ns // _NS, now_ns % _NS)
         return time if msgtype == _TIME else new(cls, stamp=time)
@@ -54,53 +75,58 @@ def _message(cls: type[M], values: Any, path: str, now_ns: int | None) -> M:
         inner = f"{path}.{name}" if path else str(name)
         if name not in fields:
             raise BridgeError(f"{msgtype} has no field {inner!r}; {nearest(str(name), fields)}")
-        given[fields[name].attribute] = _value(fields[name], value, inner, now_ns)
+        given[fields[name].attribute] = _value(fields[name], value, inner, now_ns, deep)
     return new(cls, **given)
 
 
-def _value(field: Field, value: Any, path: str, now_ns: int | None) -> Any:
+def _value(field: Field, value: Any, path: str, now_ns: int | None, deep: bool) -> Any:
     if not field.many:
-        return _item(field, value, path, now_ns)
+        return _item(field, value, path, now_ns, deep)
     if isinstance(value, (str, Mapping)) or not hasattr(value, "__len__"):
         raise _wrong(path, field.typename, value, "a list")
     if field.many == "array" and len(value) != field.size:
         raise BridgeError(f"{path} has {len(value)} elements; valid: exactly {field.size}")
     if field.many == "bounded" and len(value) > field.size:
         raise BridgeError(f"{path} has {len(value)} elements; valid: at most {field.size}")
-    items = [_item(field, item, f"{path}[{i}]", now_ns) for i, item in enumerate(value)]
+    if isinstance(value, np.ndarray) and not field.message and value.dtype == types.dtype_of(field.base):
+        return np.ascontiguousarray(value)
+    items = [_item(field, item, f"{path}[{i}]", now_ns, deep) for i, item in enumerate(value)]
     if field.message or field.base in STRINGS:
         return items
-    return np.array(items, dtype=types.dtype_of(field.base))
+    return np.array(items, types.dtype_of(field.base))
 
 
-def _item(field: Field, value: Any, path: str, now_ns: int | None) -> Any:
+def _item(field: Field, value: Any, path: str, now_ns: int | None, deep: bool) -> Any:
     if field.message:
-        return _message(types.get(field.message), value, path, now_ns)
+        return _message(types.get(field.message), value, path, now_ns, deep=deep)
     if isinstance(value, np.generic):
         value = value.item()
     if field.base in STRINGS:
-        return _text(field, value, path)
+        # As set_message does: a YAML reader takes `data: 5` for a number.
+        return _text(field, value if deep or not isinstance(value, (int, float)) else str(value), path)
     if field.base == "bool":
         if isinstance(value, bool) or (isinstance(value, int) and value in (0, 1)):
             return bool(value)
         raise _wrong(path, field.base, value, "true or false")
     if field.base in INTEGERS:
-        return _integer(field.base, value, path)
+        number = _integer(field.base, value, path)
+        # rosbags has a byte as a signed number, though ROS's is not.
+        return number - 256 if field.base == "byte" and number > 127 else number
     return _float(field.base, value, path)
 
 
 def _text(field: Field, value: Any, path: str) -> str:
-    if isinstance(value, (int, float)):
-        value = str(value)  # as set_message does: a YAML reader takes `data: 5` for a number
     if not isinstance(value, str):
         raise _wrong(path, field.base, value, "a text")
+    if any("\ud800" <= character <= "\udfff" for character in value):
+        raise _wrong(path, field.base, value, "a text without halves of surrogate pairs")
     if field.string_bound and len(value) > field.string_bound:
         raise BridgeError(f"{path} has {len(value)} characters; valid: at most {field.string_bound}")
     return value
 
 
 def _integer(base: str, value: Any, path: str) -> int:
-    low, high = INTEGERS[base]
+    low, high = (-128, 255) if base == "byte" else INTEGERS[base]
     valid = f"a whole number from {low} to {high}"
     if base in ("byte", "octet") and isinstance(value, (str, bytes)) and len(value) == 1:
         value = ord(value)

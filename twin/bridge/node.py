@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from twin.bridge import names
+from twin.bridge.clock import Clock
 from twin.bridge.keys import NodeToken
-from twin.bridge.logger import Logger
-from twin.bridge.parameters import Parameter, Parameters
+from twin.bridge.logger import Logger, Rosout, logger_name
+from twin.bridge.msgs import ParameterEvent
+from twin.bridge.node_graph import NodeGraph
+from twin.bridge.node_options import NodeOptions
+from twin.bridge.node_parameters import NodeParameters, start_parameters
 from twin.bridge.qos import QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
+from twin.bridge.tasks import Execution, Task
+from twin.bridge.timers import Rate, Timer
 from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
@@ -33,48 +39,10 @@ class OwnedEndpoint(Protocol):
         """Leave the graph. Harmless when repeated."""
 
 
-class Execution(Protocol):
-    """Something that a node advances once in every spin: an action server."""
-
-    def step(self) -> None:
-        """Go on to the next yield."""
-
-    def close(self) -> None:
-        """End where it waits; the bus still works."""
+_PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
 
 
-class Timer:
-    """Calls back at multiples of a period of simulated time; several missed ones are one call."""
-
-    def __init__(self, period_ns: int, callback: Callable[[], Any], now_ns: int) -> None:
-        if period_ns <= 0:
-            raise BridgeError(f"a timer period of {period_ns} ns; valid is more than zero")
-        self.period_ns = period_ns
-        self._callback = callback
-        self.reset(now_ns)
-
-    def reset(self, now_ns: int) -> None:
-        """Fire next at the first multiple of the period after `now_ns`."""
-        self.next_ns = (now_ns // self.period_ns + 1) * self.period_ns
-        self._cancelled = False
-
-    def cancel(self) -> None:
-        """Fire no more, until reset."""
-        self._cancelled = True
-
-    @property
-    def is_cancelled(self) -> bool:
-        """Whether it fires no more."""
-        return self._cancelled
-
-    def run(self, now_ns: int) -> None:
-        """Call back if due."""
-        if now_ns >= self.next_ns and not self._cancelled:
-            self.reset(now_ns)
-            self._callback()
-
-
-class Node:
+class Node(NodeParameters, NodeGraph):
     """Publishers, subscriptions, timers, services, parameters under one name; see `Bus.create_node`."""
 
     def __init__(
@@ -84,21 +52,29 @@ class Node:
         namespace: str,
         parameters: Mapping[str, Any],
         remappings: Mapping[str, str],
+        options: NodeOptions | None = None,
     ) -> None:
         self.bus = bus
+        self.options = options or NodeOptions()
         self.name = names.node_name(name)
         self.namespace = names.namespace(namespace)
         """'/' or '/robot'."""
         self.inbox: deque[list[Any]] = deque()
         """[endpoint or None, data, from outside]: filled by endpoints, emptied by `spin`."""
+        self.is_destroyed = self._closing = False
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
-        self._names = names.Resolver(self.namespace, self.name, remappings)
-        self._parameters = Parameters(self.fully_qualified_name, parameters)
+        self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
         self._liveliness: Any = bus.session.liveliness().declare_token(str(self.token))
+        self.action_clients = 0
+        """How many there have been."""
         self._endpoints: list[OwnedEndpoint] = []
         self._timers: list[Timer] = []
         self._executions: list[Execution] = []
-        self._logger = Logger(self)
+        self._logger = Logger(Rosout(self), logger_name(self))
+        self._logger.levels.start(self._logger.name, self.options.arguments.log_levels)
+        self._parameter_events: Publisher[ParameterEvent] | None = None
+        self._parameters = start_parameters(self, parameters)
+        bus.standard_services.added(self)
 
     @property
     def fully_qualified_name(self) -> str:
@@ -106,9 +82,18 @@ class Node:
         return f"{self.namespace.rstrip('/')}/{self.name}"
 
     @property
+    def endpoints(self) -> tuple[OwnedEndpoint, ...]:
+        """Publishers, subscriptions, services and clients in the order of their creation."""
+        return tuple(self._endpoints)
+
+    @property
     def now_ns(self) -> int:
         """Simulated time [ns]."""
         return self.bus.clock.now_ns
+
+    def get_clock(self) -> Clock:
+        """Return the bus's clock."""
+        return self.bus.clock
 
     def get_logger(self) -> Logger:
         """Return the node's log."""
@@ -118,8 +103,12 @@ class Node:
         """Return the absolute, remapped name of a topic, service or action.
 
         Raises:
-            BridgeError: not a valid name.
+            BridgeError: not a valid name, or the node is destroyed.
         """
+        if self.is_destroyed:
+            raise BridgeError(
+                f"the node {self.fully_qualified_name} is destroyed; {name!r} is of no use any more"
+            )
         return self._names.resolve(name)
 
     def create_publisher(self, msg_type: type[M], topic: str, qos: QoS | int = 10) -> Publisher[M]:
@@ -142,15 +131,36 @@ class Node:
             Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
         )
 
-    def create_timer(self, period_ns: int, callback: Callable[[], Any]) -> Timer:
+    def create_timer(self, period_ns: int, callback: Callable[[], Any], *, autostart: bool = True) -> Timer:
         """Call back at multiples of a period [ns] of simulated time, first at the next one.
+
+        Args:
+            period_ns: More than zero.
+            callback: Takes nothing.
+            autostart: Whether it runs without a `reset`.
 
         Raises:
             BridgeError: a period that is not positive.
         """
-        timer = Timer(period_ns, callback, self.now_ns)
+        timer = Timer(period_ns, callback, self.bus.clock, autostart=autostart)
         self._timers.append(timer)
         return timer
+
+    def create_rate(self, frequency: float) -> Rate:
+        """Return a rate [Hz] for executions: `yield from rate.sleep()`.
+
+        Raises:
+            BridgeError: a frequency that is not positive.
+        """
+        if not 0.0 < frequency <= 1e9:
+            raise BridgeError(f"a rate of {frequency} Hz; valid is more than zero")
+        return Rate(round(1e9 / frequency), self.bus.clock)
+
+    def create_task(self, generator: Generator[None, None, Any]) -> Task:
+        """Run a generator: each spin of the node advances it to its next yield, first the next spin."""
+        task = Task(generator)
+        self._executions.append(task)
+        return task
 
     def create_service(self, srv_type: ServiceType, name: str, callback: Callable[[Any], Any]) -> Service:
         """Offer a service; the callback takes the request and returns the response.
@@ -180,72 +190,85 @@ class Node:
         """
         return self.add_endpoint(Client(self, srv_type, self.resolve_name(name)))
 
-    def declare_parameter(self, name: str, default: Any) -> Parameter:
-        """Declare a parameter; the value given at the node's creation goes before the default.
+    def destroy_publisher(self, publisher: Publisher[Any]) -> bool:
+        """Leave a topic; return whether it was this node's."""
+        return self._destroy(publisher)
 
-        Raises:
-            BridgeError: declared twice, or a value of another type than the default.
-        """
-        return self._parameters.declare(name, default)
+    def destroy_subscription(self, subscription: Subscription[Any]) -> bool:
+        """Hear a topic no more; return whether it was this node's."""
+        return self._destroy(subscription)
 
-    def get_parameter(self, name: str) -> Parameter:
-        """Return a declared parameter.
+    def destroy_service(self, service: Service) -> bool:
+        """Offer a service no more, who waits gets an error; return whether it was this node's."""
+        return self._destroy(service)
 
-        Raises:
-            BridgeError: not declared.
-        """
-        return self._parameters.get(name)
+    def destroy_client(self, client: Client) -> bool:
+        """Ask a service no more: pending futures end with an error; return whether it was this node's."""
+        return self._destroy(client)
 
-    def get_parameters(self, parameter_names: list[str]) -> list[Parameter]:
-        """Return declared parameters.
-
-        Raises:
-            BridgeError: one is not declared.
-        """
-        return [self._parameters.get(name) for name in parameter_names]
-
-    def set_parameter(self, name: str, value: Any) -> Parameter:
-        """Change a declared parameter.
-
-        Raises:
-            BridgeError: not declared, another type, or refused by the node.
-        """
-        return self._parameters.set(name, value)
-
-    def add_on_set_parameter_callback(self, callback: Callable[[Parameter], None]) -> None:
-        """Call back before a parameter changes; raise BridgeError in it to refuse."""
-        self._parameters.add_on_set_callback(callback)
+    def destroy_timer(self, timer: Timer) -> bool:
+        """Stop a timer for good; return whether it was this node's."""
+        timer.cancel()
+        return _remove(self._timers, timer)
 
     def add_execution(self, execution: Execution) -> None:
         """Advance something once in every spin, after inbox and timers."""
         self._executions.append(execution)
 
+    def remove_execution(self, execution: Execution) -> None:
+        """Advance something no more."""
+        _remove(self._executions, execution)
+
+    def advertise_parameter_events(self) -> Publisher[ParameterEvent]:
+        """Return the publisher of /parameter_events."""
+        if self._parameter_events is None:
+            self._parameter_events = self.create_publisher(
+                ParameterEvent, "/parameter_events", _PARAMETER_EVENTS_QOS
+            )
+        return self._parameter_events
+
+    def publish_parameter_event(self, event: ParameterEvent) -> None:
+        """Tell /parameter_events of a change."""
+        self.advertise_parameter_events().publish(event)
+
     def spin(self) -> None:
-        """Handle what was in the inbox when called, then timers due, then one step of every execution."""
+        """Handle what was in the inbox when called, then timers due, then one step of every execution.
+
+        Callbacks may create and destroy whatever they like, this node too.
+        """
         inbox = self.inbox
         for _ in range(len(inbox)):
+            if not inbox:  # emptied by `destroy`
+                return
             endpoint, data, external = inbox.popleft()
             if endpoint is not None:
                 endpoint.handle(data, external)
-        now_ns = self.bus.clock.now_ns
-        for timer in self._timers:
-            timer.run(now_ns)
-        for execution in self._executions:
+        if self._timers:
+            now_ns = self.bus.clock.now_ns
+            for timer in tuple(self._timers):
+                timer.run(now_ns)
+        for execution in tuple(self._executions):
             execution.step()
+            if isinstance(execution, Task) and execution.done:
+                self.remove_execution(execution)
 
     def destroy(self) -> None:
-        """Leave the bus. Harmless when repeated."""
-        for execution in self._executions:
+        """Leave the bus; executions end as if cancelled. Harmless when repeated."""
+        if self.is_destroyed or self._closing:
+            return
+        self._closing = True
+        for execution in tuple(self._executions):
             execution.close()
-        for endpoint in reversed(self._endpoints):
+        self.is_destroyed = True
+        for timer in self._timers:
+            timer.cancel()
+        for endpoint in reversed(tuple(self._endpoints)):
             endpoint.destroy()
         self._endpoints.clear()
         self._timers.clear()
         self._executions.clear()
         self.inbox.clear()
-        if self._liveliness is not None:
-            self._liveliness.undeclare()
-            self._liveliness = None
+        self._liveliness.undeclare()
         self.bus.forget(self)
 
     @property
@@ -253,7 +276,7 @@ class Node:
         """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
         if self.inbox:
             return 0
-        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_cancelled]
+        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_canceled]
         due += [_EXECUTION_NS] * bool(self._executions)
         return max(0, min(due)) if due else None
 
@@ -261,3 +284,18 @@ class Node:
         """Own an endpoint: it leaves the graph with the node."""
         self._endpoints.append(endpoint)
         return endpoint
+
+    def _destroy(self, endpoint: OwnedEndpoint) -> bool:
+        if not _remove(self._endpoints, endpoint):
+            return False
+        endpoint.destroy()
+        return True
+
+
+def _remove(things: list[Any], thing: Any) -> bool:
+    """Remove a thing, not one that is equal to it; return whether it was there."""
+    for index, other in enumerate(things):
+        if other is thing:
+            del things[index]
+            return True
+    return False

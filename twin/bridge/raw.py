@@ -101,10 +101,13 @@ class RawSubscription:
         self._pending.clear()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        data = self._read(self.node.bus, str(sample.key_expr), sample)
+        if data is not None:
+            self._take(data)
+
+    def _take(self, data: RawSample) -> None:
+        """Keep what came for the node's turn; called in any thread."""
         bus = self.node.bus
-        data = self._read(bus, str(sample.key_expr), sample)
-        if data is None:
-            return
         if bus.in_own_thread():
             self.enqueue(data, False)
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
 import zenoh
@@ -30,7 +30,10 @@ Respond = Callable[[Any], None]
 
 
 class Future:
-    """A response that may not have come yet; done in a spin of the client's node."""
+    """A response that may not have come yet; done in a spin of the client's node.
+
+    In executions and tasks: `response = yield from future`.
+    """
 
     def __init__(self, service: str) -> None:
         self.done = False
@@ -64,6 +67,20 @@ class Future:
         else:
             self._callbacks.append(callback)
 
+    def __iter__(self) -> Generator[None, None, Any]:
+        """Wait in an execution; the value is the response.
+
+        Raises:
+            BridgeError: nobody answered.
+        """
+        while not self.done:
+            yield
+        return self.result
+
+    def cancel(self) -> None:
+        """Wait no more; a response that comes later is ignored."""
+        self.finish(None, f"the request to {self._service} was cancelled")
+
     def finish(self, response: Any, error: str | None = None) -> None:
         """Set the response, or why there is none; what comes later is ignored."""
         if self.done:
@@ -82,6 +99,7 @@ class Service(Endpoint):
         super().__init__(node, "SS", name, srv_type.name, _QOS)
         self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
         self._callback = callback
+        self._open: set[zenoh.Query] = set()
         bus = node.bus
         self._entrance = Entrance(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
@@ -92,6 +110,16 @@ class Service(Endpoint):
     def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
         """Put a request into the node's inbox."""
         self.node.inbox.append([self, data, external])
+
+    def destroy(self) -> None:
+        """Leave the graph; who still waits for a response learns that there will be none."""
+        super().destroy()
+        for entry in self.node.inbox:
+            if entry[0] is self:
+                entry[0] = None
+                self._open.add(entry[1][0])
+        while self._open:
+            self._open.pop().drop()  # type: ignore[no-untyped-call]
 
     def handle(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
         """Decode and call back."""
@@ -107,12 +135,21 @@ class Service(Endpoint):
             return
 
         def respond(response: Any) -> None:
+            if type(response) is not self._responses.cls:
+                what = type(response).__name__
+                raise TypeError(f"{self.name} answers with {self._responses.msgtype}, not {what}")
+            if query not in self._open:
+                if not self._declared:
+                    return  # destroyed meanwhile: the client knows
+                raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
+            self._open.discard(query)
             now_ns = self.node.bus.clock.now_ns
             typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
             attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
             with query:
                 query.reply(query.key_expr, self._responses.encode(response), attachment=attachment)
 
+        self._open.add(query)
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
@@ -135,6 +172,8 @@ class Client(Endpoint):
         super().__init__(node, "SC", name, srv_type.name, _QOS)
         self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
         self._sequence = 0
+        self._pending: dict[Future, None] = {}
+        node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
         self._querier = node.bus.session.declare_querier(
             self.key,
@@ -151,16 +190,44 @@ class Client(Endpoint):
         """Whether somebody offers the service now."""
         return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
 
+    def wait_for_service(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
+        """Wait in an execution: `ready = yield from client.wait_for_service()`.
+
+        Args:
+            timeout_ns: Of the bus's clock [ns]; then the value is False. None waits for ever.
+        """
+        start_ns = self.node.now_ns
+        while not self.service_is_ready:
+            if timeout_ns is not None and self.node.now_ns - start_ns >= timeout_ns:
+                return False
+            yield
+        return True
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Forget a request: its future stays undone, and a response that comes later is ignored."""
+        self._pending.pop(future, None)
+
+    def destroy(self) -> None:
+        """Leave the graph; futures that are not done end with an error."""
+        super().destroy()
+        for future in tuple(self._pending):
+            future.finish(None, f"the client of {self.name} was destroyed before an answer came")
+        self._pending.clear()
+
     def call_async(self, request: Any) -> Future:
         """Send a request.
 
         Raises:
             TypeError: a request of another type.
+            BridgeError: the client is destroyed.
         """
+        if not self._declared:
+            raise BridgeError(f"the client of {self.name} is destroyed")
         if type(request) is not self._requests.cls:
             raise TypeError(f"{self.name} takes {self._requests.msgtype}, not {type(request).__name__}")
         self._sequence += 1
         bus, future = self.node.bus, Future(self.name)
+        self._pending[future] = None
         source = Attachment(self._sequence, bus.clock.now_ns, self.gid)
 
         def deliver(data: Any) -> None:
@@ -190,13 +257,15 @@ class Client(Endpoint):
 
     def enqueue(self, data: tuple[Future, bytes | None], external: bool) -> None:
         """Put a response, or the end of the query, into the node's inbox."""
-        self.node.inbox.append([self, data, external])
+        if self._declared:
+            self.node.inbox.append([self, data, external])
 
     def handle(self, data: tuple[Future, bytes | None], external: bool) -> None:
         """Decode and finish the future; the end of a query matters only if no response came before."""
         future, payload = data
-        if future.done:
+        if future not in self._pending:  # done, removed, or the client destroyed
             return
+        del self._pending[future]
         if payload is None:
             future.finish(None, f"nobody answered on the service {self.name}; is its node running?")
             return

@@ -10,13 +10,14 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr import Codec, codec
+from twin.bridge.cdr import codec
 from twin.bridge.external import Arrival
-from twin.bridge.keys import EndpointKind, gid, pack_attachment
+from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.qos import INFINITE_NS, QoS
 from twin.bridge.session import direct
 from twin.bridge.wire_entrance import Entrance
 from twin.bridge.wire_naming import Interface
+from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
@@ -31,17 +32,20 @@ _KEEP_ALL = 100_000
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "time_ns", "topic")
+    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
-    def __init__(self, topic: str, time_ns: int, message: M, message_codec: Codec[M]) -> None:
-        self.topic = topic
+    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        """The publisher's count, from 1."""
+        self.topic: str = publisher.name
         """Absolute name."""
-        self.msgtype = message_codec.msgtype
+        self.msgtype = publisher.codec.msgtype
         self.time_ns = time_ns
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = message_codec
+        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
@@ -60,7 +64,7 @@ class Endpoint:
         self.interface = Interface(name, types.dds_name(typename), types.rihs01(typename))
         type_hash = bus.naming.type_hash(self.interface.type_hash)
         token = node.token.endpoint(bus.next_id(), kind, name, self.interface.dds_name, type_hash, qos)
-        self.name = name
+        self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
         self.qos = qos
@@ -90,7 +94,7 @@ class Publisher(Endpoint, Generic[M]):
         self._bus = node.bus
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
-        self._zenoh: Any = _declare_publisher(node.bus.session, self.key, qos)
+        self._zenoh: Any = declare_publisher(node.bus.session, self.key, qos)
         self._declared.append(self._zenoh)
         self.announce()
 
@@ -104,14 +108,17 @@ class Publisher(Endpoint, Generic[M]):
 
         Raises:
             TypeError: a message of another type.
+            BridgeError: the publisher is destroyed.
         """
         if type(message) is not self.codec.cls:
             raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
+        if not self._declared:
+            raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         time_ns = self._bus.clock.now_ns
         sample = None
         if self._bus.taps:
-            sample = Sample(self.name, time_ns, message, self.codec)
+            sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
@@ -128,6 +135,7 @@ class Subscription(Endpoint, Generic[M]):
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
+        self._origin: zenoh.Sample | Attachment | None = None
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
         self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
@@ -140,7 +148,15 @@ class Subscription(Endpoint, Generic[M]):
             self._declared.append(declare_subscriber(bus.session, key, self._on_sample, qos))
         self.announce()
 
-    def enqueue(self, data: bytes, external: bool) -> None:
+    @property
+    def source(self) -> Attachment | None:
+        """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if not isinstance(self._origin, zenoh.Sample):
+            return self._origin
+        attachment = self._origin.attachment  # read only if asked for: few want to know
+        return parse_attachment(attachment.to_bytes() if attachment else None)
+
+    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
@@ -151,12 +167,13 @@ class Subscription(Endpoint, Generic[M]):
         self._pending.append(entry)
         self.node.inbox.append(entry)
 
-    def handle(self, payload: bytes, external: bool) -> None:
+    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Decode and call back."""
         entry = self._pending.popleft()
         if len(entry) > 3 and self.node.now_ns > entry[3]:
             self.dropped += 1
             return
+        payload, self._origin = data
         if external:
             try:
                 message = self.codec.decode(payload)
@@ -166,6 +183,7 @@ class Subscription(Endpoint, Generic[M]):
         else:
             message = self.codec.decode(payload)
         self._callback(message)
+        self._origin = None
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
@@ -179,16 +197,16 @@ class Subscription(Endpoint, Generic[M]):
         if bus.in_own_thread():
             # The wide expressions of a networked bus match this process's topics of other types too.
             if not self._networked or str(sample.key_expr) == self.key:
-                self.enqueue(sample.payload.to_bytes(), self._untyped)
+                self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
         attachment = sample.attachment.to_bytes() if sample.attachment else None
         source = self._entrance.source(str(sample.key_expr), attachment)
         if source is not None:
             payload = sample.payload.to_bytes()
-            bus.external.push(Arrival(source, self, payload, len(payload)))
+            bus.external.push(Arrival(source, self, (payload, source), len(payload)))
 
 
-def _declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
     """Return a publisher with rmw_zenoh's settings (rmw_publisher_data.cpp)."""
     reliable = qos.reliability == "reliable"
     waits = reliable and qos.history == "keep_all"

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from typing import Any
 
@@ -12,6 +13,7 @@ from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
 from twin.bridge.defaults import new
+from twin.bridge.interface_values import Scalar, Value, parse_scalar
 from twin.bridge.rihs01 import BASE_NAMES, FieldDefs, description_of, rihs01_of
 from twin.bridge.type_bounds import MOST_NUMBERS, MOST_OBJECTS, STRINGS
 from twin.errors import BridgeError
@@ -77,13 +79,25 @@ def learn(description: Any, type_hash: str | None = None) -> str:
     found = rihs01_of(name, definitions)
     if type_hash is not None and found != type_hash:
         raise BridgeError(f"the description of {name} has the hash {found}, not {type_hash}")
-    types.add_definitions(definitions)
+    defaults = {item.type_name: _defaults(item, definitions[item.type_name][1]) for item in items}
+    types.add_definitions(definitions, defaults)
     return name
 
 
 def _individual(plain: dict[str, Any]) -> Any:
-    fields = [_Field(field["name"], _FieldType(**field["type"]), "") for field in plain["fields"]]
-    return _Individual(plain["type_name"], fields)
+    name, defaults = plain["type_name"], {}
+    if name in types.store.types:
+        defaults = types.defaults(name)
+    fields = [
+        _Field(field["name"], _FieldType(**field["type"]), _default_text(defaults.get(field["name"])))
+        for field in plain["fields"]
+    ]
+    return _Individual(name, fields)
+
+
+def _default_text(value: Value | None) -> str:
+    """Return a default as rosidl writes it: 1.0, True, (0, 1)."""
+    return "" if value is None else str(tuple(value) if isinstance(value, list) else value)
 
 
 def _source(name: str) -> Any:
@@ -112,6 +126,39 @@ def _definition(item: Any, field: Any) -> tuple[str, Any]:
         return field.name, element
     node = Nodetype.ARRAY if many == 1 else Nodetype.SEQUENCE
     return field.name, (node, (element, 0 if many == 3 else field.type.capacity))
+
+
+def _defaults(item: Any, fields: list[tuple[str, Any]]) -> dict[str, Value]:
+    """Return the values of the fields of a description that have a default.
+
+    Raises:
+        BridgeError: a text that is no value of its field's type.
+    """
+    found: dict[str, Value] = {}
+    for field, (name, (node, value)) in zip(item.fields, fields, strict=True):
+        if not field.default_value:
+            continue
+        inner, element = (node, value) if node in (Nodetype.BASE, Nodetype.NAME) else value[0]
+        try:
+            if inner != Nodetype.BASE:
+                raise ValueError("only plain values have a default")
+            if node == Nodetype.BASE:
+                found[name] = _parse(element, field.default_value)
+            else:
+                items = ast.literal_eval(field.default_value)
+                found[name] = [_parse(element, str(one)) for one in items]
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
+            raise BridgeError(
+                f"{item.type_name}.{name} has a default that it cannot have: {error}"
+            ) from error
+        if node == Nodetype.ARRAY and len(found[name]) != value[1]:  # type: ignore[arg-type]
+            raise BridgeError(f"{item.type_name}.{name} has a default of another length than the array")
+    return found
+
+
+def _parse(element: tuple[str, int], text: str) -> Scalar:
+    base, bound = element
+    return text if base in STRINGS else parse_scalar(base, text, bound)  # texts have no quotes here
 
 
 def _check(name: str, definitions: FieldDefs, path: tuple[str, ...] = ()) -> None:

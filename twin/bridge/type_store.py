@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,14 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from twin.bridge.interface_folders import find_definitions
-from twin.bridge.interface_parser import Definition, Structure
+from twin.bridge.interface_parser import Definition, Reference, Structure
 from twin.bridge.interface_shipped import shipped, shipped_names
 from twin.bridge.interface_text import definition_text
 from twin.bridge.interface_values import Value
 from twin.bridge.rihs01 import FieldDefs
+from twin.bridge.type_bounds import BASE_TYPES
 from twin.bridge.type_names import whole
+from twin.bridge.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
 store = get_typestore(Stores.ROS2_JAZZY)
@@ -26,9 +28,13 @@ derived: FieldDefs = {}
 definitions: ChainMap[str, Any] = ChainMap(store.fielddefs, derived)
 """Constants and fields of all loaded types."""
 defaults: dict[str, dict[str, Value]] = {
-    "geometry_msgs/msg/Quaternion": {"w": 1.0},
+    "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
+    "sensor_msgs/msg/NavSatStatus": {"status": -2},
+    "type_description_interfaces/msg/FieldType": {"type_id": 0},
 }
-"""Default values, which rosbags drops: type name -> field -> value."""
+"""Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from
+the Jazzy branches of common_interfaces and rcl_interfaces."""
 
 _PADDING: Any = ("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
@@ -84,18 +90,20 @@ def load(name: str) -> None:
     _loading.append(owner)
     try:
         sections = definition.parse()
-        _check_references([(definition, sections)])
+        unknown = _unknown_references(definition, sections)
+        if unknown:
+            raise BridgeError(unknown)
         for section in sections:
             for reference in section.references:
                 load(reference.typename)
-        _REGISTER[owner.split("/")[1]](owner, *sections)
+        _register_all(owner, sections)
     finally:
         _loading.pop()
     if name not in definitions:
         raise BridgeError(f"{owner} has no part {name}")
 
 
-def add_fields(given: FieldDefs) -> None:
+def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
     """Make types known by their fields; see `types.add_definitions`."""
     for name, (_, fields) in given.items():
         if _exists(name):
@@ -108,6 +116,7 @@ def add_fields(given: FieldDefs) -> None:
                 derived[name] = definition
             else:
                 _register(name, *definition)
+                defaults[name] = values.get(name, {})
 
 
 def text_of(name: str) -> str | None:
@@ -116,10 +125,11 @@ def text_of(name: str) -> str | None:
     if definition is not None:
         return definition.text
     load(name)
-    if name.split("/")[1] != "msg":
+    if name != whole(name):
         return None
-    constants, fields = store.fielddefs[name]
-    return definition_text(name, constants, fields, defaults.get(name, {}))
+    suffixes = {"msg": [""], "srv": ["_Request", "_Response"], "action": ["_Goal", "_Result", "_Feedback"]}
+    parts = [name + suffix for suffix in suffixes[name.split("/")[1]]]
+    return "---\n".join(definition_text(p, *store.fielddefs[p], defaults.get(p, {})) for p in parts)
 
 
 def names() -> list[str]:
@@ -135,36 +145,28 @@ def _exists(name: str) -> bool:
 
 
 def _add_all(given: list[Definition]) -> None:
-    problems: list[Problem] = []
-    parsed = []
-    for definition in given:
-        try:
-            parsed.append((definition, definition.parse()))
-        except BridgeError as fault:
-            problems += fault.problems
+    names = {definition.typename for definition in given}
     new: dict[str, Definition] = {}
-    for definition, sections in parsed:
+    problems: list[Problem] = []
+    for definition in given:
         name = definition.typename
+        sections, faults = definition.read()
+        if definition.file is not None:  # a text's references may still come
+            faults += _unknown_references(definition, sections, names)
         other = new.get(name) or _own.get(name) or shipped(name)
-        if other is None and name not in _in_library:
-            new[name] = definition
-        elif not _same(definition, sections, other):
+        if (
+            not faults
+            and (other is not None or name in _in_library)
+            and not _same(definition, sections, other)
+        ):
             where = other.where if other is not None else "ROS's own definition"
-            problems.append(
-                definition.problem(f"{name} is already known with another definition: {where}", 1)
-            )
-        elif other is not None and other.file is None:
+            faults.append(definition.problem(f"{name} is already known with another definition: {where}", 1))
+        problems += sorted(faults, key=lambda fault: fault.line or 0)
+        if other is None or other.file is None:
             new[name] = definition
     if problems:
         raise BridgeError(problems)
-    before = dict(_own)
     _own.update(new)
-    try:
-        _check_references([item for item in parsed if item[0].file is not None])
-    except BridgeError:
-        _own.clear()
-        _own.update(before)
-        raise
 
 
 def _same(definition: Definition, sections: tuple[Structure, ...], other: Definition | None) -> bool:
@@ -191,26 +193,32 @@ def _plain(description: Any) -> Any:
     return int(node), _plain(value[0]), value[1]
 
 
-def _check_references(parsed: list[tuple[Definition, tuple[Structure, ...]]]) -> None:
-    """Tell every type that a field names and that nobody knows."""
-    problems = [
+def _unknown_references(
+    definition: Definition, sections: Iterable[Structure], coming: Collection[str] = ()
+) -> list[Problem]:
+    """Return a fault for every type that a field names and that nobody knows."""
+    return [
         definition.problem(
-            f"the type {reference.written} is not known; {_near(reference.typename)}", reference.line
+            f"the type {reference.written} is not known; {_near(reference, definition)}", reference.line
         )
-        for definition, sections in parsed
         for section in sections
         for reference in section.references
-        if not _exists(reference.typename)
+        if reference.typename not in coming and not _exists(reference.typename)
     ]
-    if problems:
-        raise BridgeError(problems)
 
 
-def _register_message(name: str, section: Structure) -> None:
-    fields = section.fields or [_PADDING]
-    _register(name, section.constants, fields)
-    if section.defaults:
-        defaults[name] = section.defaults
+def _register_all(owner: str, sections: tuple[Structure, ...]) -> None:
+    """Register a definition's messages, and the structures as which a service or an action is hashed."""
+    kind = owner.split("/")[1]
+    if kind == "msg":
+        messages = {owner: sections[0]}
+    else:
+        messages = (service_parts if kind == "srv" else action_parts)(owner, *sections)
+        derived.update((service_structure if kind == "srv" else action_structures)(owner))
+    for name, section in messages.items():
+        _register(name, section.constants, section.fields or [_PADDING])
+        if section.defaults:
+            defaults[name] = section.defaults
 
 
 def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
@@ -221,72 +229,25 @@ def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
         raise BridgeError(f"{name} cannot be used: {error}") from error
 
 
-def _register_service(name: str, request: Structure, response: Structure) -> None:
-    _register_message(f"{name}_Request", request)
-    _register_message(f"{name}_Response", response)
-    load("service_msgs/msg/ServiceEventInfo")
-    event = Structure(fields=[("info", _message("service_msgs/msg/ServiceEventInfo"))])
-    for field in ("request", "response"):
-        element = _message(f"{name}_{field.capitalize()}")
-        event.fields.append((field, (Nodetype.SEQUENCE, (element, 1))))
-    _register_message(f"{name}_Event", event)
-    _derive(name, request_message="_Request", response_message="_Response", event_message="_Event")
-
-
-def _register_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> None:
-    uuid = ("goal_id", _message("unique_identifier_msgs/msg/UUID"))
-    stamp = ("stamp", _message("builtin_interfaces/msg/Time"))
-    _register_message(f"{name}_Goal", goal)
-    _register_message(f"{name}_Result", result)
-    _register_message(f"{name}_Feedback", feedback)
-    _register_service(
-        f"{name}_SendGoal",
-        Structure(fields=[uuid, ("goal", _message(f"{name}_Goal"))]),
-        Structure(fields=[("accepted", (Nodetype.BASE, ("bool", 0))), stamp]),
-    )
-    _register_service(
-        f"{name}_GetResult",
-        Structure(fields=[uuid]),
-        Structure(fields=[("status", (Nodetype.BASE, ("int8", 0))), ("result", _message(f"{name}_Result"))]),
-    )
-    fields = [uuid, ("feedback", _message(f"{name}_Feedback"))]
-    _register_message(f"{name}_FeedbackMessage", Structure(fields=fields))
-    _derive(
-        name,
-        goal="_Goal",
-        result="_Result",
-        feedback="_Feedback",
-        send_goal_service="_SendGoal",
-        get_result_service="_GetResult",
-        feedback_message="_FeedbackMessage",
-    )
-
-
-_REGISTER: dict[str, Callable[..., None]] = {
-    "msg": _register_message,
-    "srv": _register_service,
-    "action": _register_action,
-}
-
-
-def _derive(name: str, **fields: str) -> None:
-    derived[name] = ([], [(field, _message(name + suffix)) for field, suffix in fields.items()])
-
-
-def _message(name: str) -> Any:
-    return Nodetype.NAME, name
-
-
 def _is_interface(name: str) -> bool:
     """Say whether a name is that of a service or an action rather than of a message."""
     kind = name.split("/")[1]
     return kind != "msg" and (name == whole(name) or name.endswith(("_SendGoal", "_GetResult")))
 
 
-def _near(name: str) -> str:
-    """Return the tail of a message about an unknown type, with the nearest names."""
+def _near(reference: Reference, definition: Definition) -> str:
+    """Return the tail of a message about an unknown type in a definition, with the nearest names."""
+    if "/" in reference.written:
+        return _nearest_name(reference.typename)
+    own = definition.typename.split("/")[0] + "/msg/"
+    return nearest(
+        reference.written, [*BASE_TYPES, *(n.removeprefix(own) for n in names() if n.startswith(own))]
+    )
+
+
+def _nearest_name(name: str) -> str:
     package, kind, _ = name.split("/")
-    known = [*names(), *(n for n in store.types if kind != "msg")]
+    known = names()
     same = [n for n in known if n.startswith(f"{package}/{kind}/")]
     return nearest(name, same) if same else nearest(package, {n.split("/")[0] for n in known})
 
@@ -294,5 +255,5 @@ def _near(name: str) -> str:
 def _unknown(name: str) -> str:
     package, kind, _ = name.split("/")
     if any(n.startswith(f"{package}/{kind}/") for n in names()):
-        return f"the type {name} is not known; {_near(name)}"
-    return f"the type {name} is not known, nor any {kind} of {package}; {_near(name)}"
+        return f"the type {name} is not known; {_nearest_name(name)}"
+    return f"the type {name} is not known, nor any {kind} of {package}; {_nearest_name(name)}"

@@ -67,13 +67,17 @@ def definitions(typename: str) -> Mapping[str, Any]:
     return type_store.definitions
 
 
-def add_definitions(definitions: FieldDefs) -> None:
+def add_definitions(definitions: FieldDefs, defaults: Mapping[str, dict[str, Value]]) -> None:
     """Make types known by their fields, in rosbags' form; every type that they use must be among them.
+
+    Args:
+        definitions: type name -> (constants, fields).
+        defaults: type name -> field -> default value.
 
     Raises:
         BridgeError: a type that is already known with other fields.
     """
-    type_store.add_fields(definitions)
+    type_store.add_fields(definitions, defaults)
 
 
 def text_of(typename: str) -> str | None:
@@ -147,8 +151,8 @@ class ActionType:
 
 
 def dtype_of(base: str) -> np.dtype[Any]:
-    """Return the numpy type of the elements of an array of a base type other than string."""
-    return np.dtype({"char": "uint8", "byte": "uint8", "octet": "uint8"}.get(base, base))
+    """Return the numpy type of the elements of an array of a base type other than string, as received."""
+    return np.dtype({"char": "uint8", "byte": "int8", "octet": "int8"}.get(base, base))
 
 
 def defaults(typename: str) -> dict[str, Value]:

@@ -22,6 +22,11 @@ def run_folder(scenario: str) -> Path:
     raise FileExistsError(f"{parent / name}: a thousand runs were started in this second")
 
 
+def bag_folder() -> Path:
+    """Return `rosbag2_<YYYY_mm_dd-HH_MM_SS>`, as `ros2 bag record` names a bag."""
+    return Path(datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S"))
+
+
 def make_folder(path: Path) -> Path:
     """Make a folder for results, unless it is there; raises RecordingError where that cannot be."""
     try:

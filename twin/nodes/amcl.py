@@ -27,6 +27,7 @@ from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.amcl import Amcl, AmclConfig, Estimate
 from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.map_server import occupancy_map
+from twin.nodes.node_parameters import declare_config
 from twin.nodes.robot_pose import RobotPose
 
 
@@ -84,6 +85,8 @@ class AmclNode:
         self._filter: Amcl | None = None
         self._force = True
         self._particles_due = 0
+        declare_config(node, filter_config)
+        declare_config(node, self.config)
         self._tf = TransformBroadcaster(node)
         self._pose_publisher = node.create_publisher(PoseWithCovarianceStamped, "amcl_pose", LATCHED)
         self._cloud_publisher = node.create_publisher(PoseArray, "particle_cloud", SENSOR_DATA)

@@ -20,9 +20,12 @@ from twin.navigation.progress_checker import ProgressCheckerConfig, SimpleProgre
 from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuit, RegulatedPurePursuitConfig
 from twin.nodes.costmap import CostmapNode
 from twin.nodes.messages import path_array
+from twin.nodes.node_parameters import declare_config
 from twin.nodes.robot_pose import RobotPose
 
 _TF_ERROR, _INVALID_PATH, _FAILED_TO_MAKE_PROGRESS, _NO_VALID_CONTROL = 102, 103, 105, 106
+
+_PARAMETER_NAMES = {"controller": "FollowPath", "goal_checker": "general_goal_checker"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,11 +58,18 @@ class ControllerServerNode:
         self._robot_pose = robot_pose
         self._costmap = costmap
         self._controller = RegulatedPurePursuit(config=self.config.controller, footprint=footprint)
+        declare_config(self.node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = self.node.create_publisher(PointStamped, "lookahead_point", 1)
         self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
         ActionServer(self.node, FollowPath, "follow_path", self._execute)
+
+    def _reconfigure(self, config: ControllerServerConfig) -> None:
+        """Go on with other parameters: the checkers from the next goal on, the rest at once."""
+        self.config = config
+        self._controller.config = config.controller
+        self._controller.set_speed_limit(None)
 
     def _on_odom(self, message: Odometry) -> None:
         self._velocity = (message.twist.twist.linear.x, message.twist.twist.angular.z)

@@ -26,6 +26,7 @@ from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
 from twin.nodes.hardware import HardwareInterface
+from twin.nodes.node_parameters import declare_config
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +53,7 @@ class DiffDriveControllerNode:
         self.odometry = Odometry(
             OdometryConfig(wheel_radius=config.drive.wheel_radius, track=self.controller.track)
         )
+        declare_config(self.node, config, names={"drive": "", "linear": "linear.x", "angular": "angular.z"})
         self._hardware = hardware
         index = {name: i for i, name in enumerate(hardware.joint_names)}
         self._left = [index[name] for name in config.left_joints]

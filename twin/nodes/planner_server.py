@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,16 @@ from twin.navigation.planner import Planner, PlannerConfig
 from twin.navigation.smoother import SimpleSmoother, SmootherConfig
 from twin.nodes.costmap import CostmapNode
 from twin.nodes.messages import path_array, path_msg
+from twin.nodes.node_parameters import declare_config
 from twin.nodes.robot_pose import RobotPose
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerParameters:
+    """Parameters of the server's plugins."""
+
+    planner: PlannerConfig
+    smoother: SmootherConfig
 
 
 class PlannerServerNode:
@@ -40,9 +50,16 @@ class PlannerServerNode:
         self._costmap = costmap
         self._planner = Planner(config=config or PlannerConfig())
         self._smoother = SimpleSmoother(config=smoother or SmootherConfig())
+        parameters = PlannerParameters(planner=self._planner.config, smoother=self._smoother.config)
+        declare_config(self.node, parameters, self._reconfigure, {"planner": "GridBased"})
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._execute)
+
+    def _reconfigure(self, parameters: PlannerParameters) -> None:
+        """Plan the next path with other parameters."""
+        self._planner.config = parameters.planner
+        self._smoother = SimpleSmoother(config=parameters.smoother)
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         request = handle.request

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import (
+    Header,
     JointState,
     Quaternion,
     String,
     TransformStamped,
     Vector3,
-    header,
+    ns,
 )
 from twin.bridge.msgs import Transform as TransformMsg
 from twin.bridge.qos import LATCHED
 from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster, transform_stamped
+from twin.errors import BridgeError
 from twin.geometry import rotate_wxyz
 from twin.models.description import Joint, RobotDescription
+
+_MAX_HZ = 1000.0
+_MOVING = ("continuous", "revolute", "prismatic")
 
 
 class _MovingFrame:
@@ -50,7 +57,16 @@ class _MovingFrame:
 
 
 class RobotStatePublisherNode:
-    """Subscribes to `joint_states`; publishes `tf`, `tf_static` and `robot_description`."""
+    """Subscribes to `joint_states`; publishes `tf`, `tf_static` and `robot_description`.
+
+    Parameters, as those of ROS's node of this name (robot_state_publisher.cpp):
+        robot_description: The robot file.
+        publish_frequency: At most so often is a joint's frame published [Hz]; up to 1000, default 20.
+        frame_prefix: What every frame's name begins with, such as `robot/`.
+        ignore_timestamp: Whether every joint state is published at once, whatever its stamp.
+
+    Frames of planar and floating joints, which a joint state cannot tell, are left out.
+    """
 
     def __init__(
         self,
@@ -58,39 +74,84 @@ class RobotStatePublisherNode:
         description: RobotDescription,
         *,
         namespace: str = "",
-        publish_period_ns: int = 50_000_000,
+        parameters: Mapping[str, Any] | None = None,
     ) -> None:
-        self.node = bus.create_node("robot_state_publisher", namespace)
-        self._tf = TransformBroadcaster(self.node)
-        self._period_ns = publish_period_ns
-        self._window = -1
+        self.node = node = bus.create_node("robot_state_publisher", namespace, parameters)
+        node.declare_parameter("robot_description", description.urdf)
+        node.declare_parameter("publish_frequency", 20.0)
+        node.declare_parameter("frame_prefix", "")
+        node.declare_parameter("ignore_timestamp", False)
+        self._check_frequency()
+        self._tf = TransformBroadcaster(node)
+        self._windows: dict[str, int] = {}
+        self._warned = False
         joints = description.joints.values()
-        self._frames = {joint.name: _MovingFrame(joint) for joint in joints if joint.type != "fixed"}
-        self._mimics = [joint for joint in joints if joint.type != "fixed" and joint.mimic is not None]
-        description_publisher = self.node.create_publisher(String, "robot_description", LATCHED)
+        self._frames = {joint.name: _MovingFrame(joint) for joint in joints if joint.type in _MOVING}
+        self._mimics = [(j.name, j.mimic) for j in joints if j.type in _MOVING and j.mimic is not None]
+        self._followed = {*self._frames, *(mimic.joint for _, mimic in self._mimics)}
+        description_publisher = node.create_publisher(String, "robot_description", LATCHED)
         description_publisher.publish(String(data=description.urdf))
-        StaticTransformBroadcaster(self.node).send_transform(
-            transform_stamped(joint.parent, joint.child, self.node.now_ns, joint.T_parent_joint)
+        prefix = self._prefix()
+        StaticTransformBroadcaster(node).send_transform(
+            transform_stamped(prefix + joint.parent, prefix + joint.child, node.now_ns, joint.T_parent_joint)
             for joint in joints
             if joint.type == "fixed"
         )
-        self.node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+
+    def _prefix(self) -> str:
+        prefix: str = self.node.get_parameter("frame_prefix").value
+        return prefix
+
+    def _check_frequency(self) -> None:
+        frequency: float = self.node.get_parameter("publish_frequency").value
+        if not 0.0 < frequency <= _MAX_HZ:
+            raise BridgeError(
+                f"the parameter publish_frequency of {self.node.fully_qualified_name} is {frequency:g}; "
+                f"valid is more than 0 and at most {_MAX_HZ:g} Hz"
+            )
+
+    def _period_ns(self) -> int:
+        frequency: float = self.node.get_parameter("publish_frequency").value
+        return round(1e9 / min(max(frequency, 1e-3), _MAX_HZ))
 
     def _on_joint_states(self, message: JointState) -> None:
-        now = self.node.now_ns
-        # The first state of each period: so its whole multiples, at which sensors sample, are hit exactly.
-        window = now // self._period_ns
-        if window == self._window:
+        if len(message.name) != len(message.position):
+            if not self._warned:
+                self._warned = True
+                self.node.get_logger().warn(
+                    f"a joint state with {len(message.name)} names and {len(message.position)} positions "
+                    "was ignored (said once)"
+                )
             return
-        self._window = window
-        positions = dict(zip(message.name, message.position.tolist(), strict=True))
-        for joint in self._mimics:
-            assert joint.mimic is not None
-            if joint.mimic.joint in positions:
-                leader = positions[joint.mimic.joint]
-                positions[joint.name] = joint.mimic.multiplier * leader + joint.mimic.offset
+        positions = {
+            name: position
+            for name, position in zip(message.name, message.position.tolist(), strict=True)
+            if name in self._followed and math.isfinite(position)
+        }
+        if not self._is_due(positions, ns(message.header.stamp)):
+            return
+        for name, mimic in self._mimics:
+            if mimic.joint in positions:
+                positions.setdefault(name, positions[mimic.joint] * mimic.multiplier + mimic.offset)
+        prefix, stamp = self._prefix(), message.header.stamp
         self._tf.send_transform(
-            TransformStamped(header(now, frame.parent), frame.child, frame.at(positions[name]))
+            TransformStamped(
+                Header(stamp, prefix + frame.parent), prefix + frame.child, frame.at(positions[name])
+            )
             for name, frame in self._frames.items()
             if name in positions
         )
+
+    def _is_due(self, positions: Mapping[str, float], time_ns: int) -> bool:
+        """Return whether a joint is in its first state of a period.
+
+        Periods begin at whole multiples, so that the times at which sensors sample are hit exactly. Each
+        joint counts for itself, as several nodes may each publish some joints.
+        """
+        window = time_ns // self._period_ns()
+        windows = self._windows
+        due = any(windows.get(name) != window for name in positions)
+        if due:
+            windows.update(dict.fromkeys(positions, window))
+        return due or (bool(positions) and self.node.get_parameter("ignore_timestamp").value)

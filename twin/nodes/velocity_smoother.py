@@ -6,6 +6,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
+from twin.nodes.node_parameters import declare_config
 
 
 class VelocitySmootherNode:
@@ -21,6 +22,7 @@ class VelocitySmootherNode:
     ) -> None:
         self.node = bus.create_node("velocity_smoother", namespace)
         self.smoother = VelocitySmoother(config)
+        declare_config(self.node, config)
         self._period_s = period_ns * 1e-9
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_smoothed", 10)
         self.node.create_subscription(Twist, "cmd_vel_nav", self._on_twist, 10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -12,18 +13,24 @@ from pathlib import Path
 import pytest
 
 GRAPH = Path(__file__).with_name("some_graph.py")
+ROOT = Path(__file__).parents[3]
 
 Twin = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    """A process with some nodes (some_graph.py), and where it listens."""
+def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
+    """A process with some nodes (some_graph.py, or what the module names as GRAPH), and where it listens."""
+    graph = GRAPH.with_name(getattr(request.module, "GRAPH", GRAPH.name))
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     with subprocess.Popen(
-        [sys.executable, str(GRAPH), address], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
+        [sys.executable, str(graph), address],
+        stdout=subprocess.PIPE,
+        stdin=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},  # of this checkout, wherever the package is installed
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -39,6 +46,16 @@ def twin(endpoint: str) -> Twin:
     def run(*arguments: str, timeout: float = 30.0) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "twin.cli", *arguments, "--connect", endpoint]
         return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+
+    return run
+
+
+@pytest.fixture
+def twin_here(endpoint: str, invoke: Callable[..., tuple[int, str, str]]) -> Twin:
+    """Run `twin …` in this process, connected to the graph: as `twin`, and several times as fast."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(arguments, *invoke(*arguments, "--connect", endpoint))
 
     return run
 

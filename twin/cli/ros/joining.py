@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.bridge.wire import Wire
+from twin.cli.ros.endings import quiet_pipe
+from twin.cli.ros.option_groups import takes
+from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -69,7 +71,9 @@ def _options(
         bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
     ] = False,
     wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    interfaces: Interfaces = None,
 ) -> Joining:
+    add_interfaces(interfaces)
     return Joining(
         connect=tuple(connect) if connect else None,
         config=config,
@@ -81,15 +85,11 @@ def _options(
 
 def joins(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
-    shared = inspect.signature(_options, eval_str=True).parameters
-    own = inspect.signature(command, eval_str=True)
+    joined = takes("joining", _options)(command)
 
-    @functools.wraps(command)
+    @functools.wraps(joined)
     def wrapper(**given: Any) -> None:
-        joining = _options(**{name: given.pop(name) for name in shared})
-        command(**given, joining=joining)
+        with quiet_pipe():
+            joined(**given)
 
-    parameters = [*(own.parameters[name] for name in own.parameters if name != "joining"), *shared.values()]
-    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapper

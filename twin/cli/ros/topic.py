@@ -1,33 +1,32 @@
-"""`twin topic`: what is published, by whom, how often."""
+"""`twin topic`: what is published, by whom, how often; and publishing by hand."""
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros import topic_echo, topic_list, topic_measure, topic_pub, topic_relay
 
-app = typer.Typer(no_args_is_help=True, help="Topics: list, look, measure, publish; as `ros2 topic`.")
+app = typer.Typer(
+    no_args_is_help=True,
+    help="Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.",
+    epilog="Example: [bold]twin topic echo /odom --field pose.pose.position[/bold]",
+)
 
+_COMMANDS = (
+    ("list", topic_list.list_topics, "twin topic list -t"),
+    ("info", topic_list.info, "twin topic info /cmd_vel --verbose"),
+    ("type", topic_list.type_of, "twin topic type /cmd_vel"),
+    ("find", topic_list.find, "twin topic find geometry_msgs/msg/Twist"),
+    ("echo", topic_echo.echo, "twin topic echo /odom --field pose.pose.position --once"),
+    ("hz", topic_measure.hz, "twin topic hz /scan --use-sim-time"),
+    ("bw", topic_measure.bw, "twin topic bw /scan"),
+    ("delay", topic_measure.delay, "twin topic delay /scan --use-sim-time"),
+    ("pub", topic_pub.pub, "twin topic pub -r 10 /cmd_vel geometry_msgs/msg/Twist '{linear: {x: 0.1}}'"),
+    ("relay", topic_relay.relay, "twin topic relay /odom /robot/odom"),
+    ("drop", topic_relay.drop, "twin topic drop /scan 1 2"),
+)
 
-@app.command("list", epilog="Example: [bold]twin topic list -t[/bold]")
-@joins
-def list_topics(
-    show_types: Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")] = False,
-    count: Annotated[bool, typer.Option("--count-topics", "-c", help="Only show how many.")] = False,
-    hidden: Annotated[bool, typer.Option("--include-hidden-topics", help="Those of actions too.")] = False,
-    *,
-    joining: Joining,
-) -> None:
-    """List the topics."""
-    from twin.bridge.graph import Graph, is_hidden
+for _name, _function, _example in _COMMANDS:
+    app.command(_name, epilog=f"Example: [bold]{_example.replace('[', chr(92) + '[')}[/bold]")(_function)
 
-    with joining.open() as process:
-        topics = Graph.snapshot(process.bus).topics()
-    shown = {name: types for name, types in topics.items() if hidden or not is_hidden(name)}
-    if count:
-        typer.echo(len(shown))
-        return
-    for name, types in shown.items():
-        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+app.add_typer(topic_relay.throttle, name="throttle")

@@ -1,0 +1,208 @@
+"""Runs in a bag: the same bytes for the same run, and a node run again on it says the same."""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tests.bridge import bag_helpers as bags
+from twin.bridge import live
+from twin.bridge.bags.reader import BagReader
+from twin.bridge.bags.replay import replay
+from twin.bridge.bags.tap import BagTap
+from twin.bridge.bags.writer import BagConfig
+from twin.bridge.bus import Bus
+from twin.bridge.cdr import codec
+from twin.bridge.clock import Clock
+from twin.bridge.msgs import Clock as ClockMsg
+from twin.bridge.msgs import String, stamp
+from twin.bridge.qos import LATCHED
+from twin.errors import RecordingError
+from twin.navigation.amcl import AmclConfig
+from twin.nodes.amcl import AmclNode, InitialPose
+from twin.nodes.robot_pose import Frames, RobotPose
+from twin.nodes.transforms import TransformListenerNode
+from twin.runtime import run
+from twin.runtime.robot_stack import _initial_guess
+from twin.scenario.schema import load
+from twin.warehouse import arena
+
+SCENARIO = """
+name: short
+seed: 3
+duration: 4 s
+world: {arena: warehouse}
+robots:
+  - model: warehouse_bot
+    start: start
+    localisation: {type: amcl, initial_pose_error: {xy: 20 cm, yaw: 5 deg}}
+mission:
+  type: velocity_profile
+  robot: warehouse_bot
+  steps:
+    - {duration: 3 s, linear: 0.3 m/s, angular: 20 deg/s}
+checks:
+  - no_collision:
+"""
+
+
+def record(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "short.yaml").write_text(SCENARIO, encoding="utf-8")
+    run(load(folder / "short.yaml"), bag=folder / "bag")
+    return folder / "bag"
+
+
+@pytest.fixture(scope="module")
+def bag_of_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("run") / "one")
+
+
+def amcl(config: AmclConfig, seed: int = 3) -> Callable[[Bus], Any]:
+    """Return what makes the nodes of localisation as the run had them."""
+
+    def make(bus: Bus) -> None:
+        hall = arena.load("warehouse")
+        guess = _initial_guess(
+            hall.pose("start"), SimpleNamespace(xy=0.2, yaw=math.radians(5)), seed, "warehouse_bot"
+        )
+        buffer = TransformListenerNode(bus).buffer
+        pose = RobotPose(buffer, Frames(odom="odom", base="base_footprint"))
+        AmclNode(bus, pose, config, InitialPose.from_error(guess, 0.2, math.radians(5)), seed=seed)
+
+    return make
+
+
+def test_localisation_says_the_same_again(bag_of_run: Path) -> None:
+    with BagReader(bag_of_run) as bag:
+        again = replay(bag, amcl(AmclConfig()))
+    assert again.difference is None
+    topics = Counter(message.topic for message in again.recorded)
+    assert topics["/amcl_pose"] >= 3
+    assert topics["/tf"] >= 30
+    assert topics["/particle_cloud"] >= 3
+
+
+def test_another_parameter_says_something_else(bag_of_run: Path) -> None:
+    with BagReader(bag_of_run) as bag:
+        again = replay(bag, amcl(replace(AmclConfig(), max_particles=1000)))
+    assert not again.identical
+    assert again.difference is not None
+    assert "differs: the payload" in again.difference
+
+
+def test_the_same_run_is_the_same_bag(bag_of_run: Path, tmp_path: Path) -> None:
+    again = record(tmp_path / "two")
+    for name in ("bag_0.mcap", "metadata.yaml"):
+        assert (again / name).read_bytes() == (bag_of_run / name).read_bytes()
+
+
+def test_a_bag_of_a_run_has_every_message_with_its_qos(bag_of_run: Path) -> None:
+    with BagReader(bag_of_run) as bag:
+        assert bag.notices == ()
+        messages = list(bag.messages())
+        assert len(messages) == bag.info.count
+        assert {"/scan", "/tf", "/tf_static", "/map", "/odom", "/clock", "/cmd_vel"} <= set(bag.topics)
+        assert bag.topics["/map"].latched
+        assert len(bag.topics["/tf"].qos) == 3  # odometry, the robot's joints, localisation
+        assert bag.topics["/scan"].qos[0].reliability == "best_effort"
+        assert all(a.log_ns <= b.log_ns for a, b in pairwise(messages))
+        scans = [message for message in messages if message.topic == "/scan"]
+        assert [message.sequence for message in scans] == list(range(1, len(scans) + 1))
+
+
+def test_the_order_within_a_tick_is_kept(tmp_path: Path) -> None:
+    """A node that counts what it hears, between two that talk: turns decide what it has heard when."""
+
+    def counter(bus: Bus) -> None:
+        node = bus.create_node("counter")
+        heard: list[str] = []
+        publisher = node.create_publisher(String, "heard", LATCHED)
+        node.create_subscription(String, "before", lambda m: heard.append(m.data))
+        node.create_subscription(String, "after", lambda m: heard.append(m.data))
+        node.create_timer(20_000_000, lambda: publisher.publish(String(" ".join(heard))))
+
+    clock = Clock()
+    with Bus.open(clock) as bus:
+        tap = BagTap(tmp_path / "bag", BagConfig(compression="zstd"))
+        bus.tap(tap.on_sample)
+        ticker = bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        for name in ("before", "", "after"):
+            if not name:
+                counter(bus)
+                continue
+            node = bus.create_node(f"talker_{name}")
+            talker = node.create_publisher(String, name)
+            node.create_timer(10_000_000, lambda t=talker, n=node: t.publish(String(f"{t.name}{n.now_ns}")))
+        for _ in range(10):
+            bus.spin()
+            clock.now_ns += 10_000_000
+            ticker.publish(ClockMsg(stamp(clock.now_ns)))
+        tap.close()
+    with BagReader(tmp_path / "bag") as bag:
+        again = replay(bag, counter)
+        assert len(again.recorded) == 4
+        assert again.difference is None
+        assert replay(bag, counter, topics=["/before"]).difference is not None
+
+
+def test_a_bag_without_turns_needs_the_outputs_named(tmp_path: Path) -> None:
+    path = bags.make_bag(tmp_path / "bag")
+
+    def echo(bus: Bus) -> None:
+        node = bus.create_node("echo")
+        publisher = node.create_publisher(String, "again")
+        node.create_subscription(String, "chatter", publisher.publish)
+
+    with BagReader(path) as bag:
+        again = replay(bag, echo)
+    assert [m.data for m in again.published] == [
+        codec(String).encode(m) for t, m, _ in bags.messages() if t == "/chatter"
+    ]
+    assert again.recorded == []
+    assert again.difference == f"{bags.COUNT} messages instead of 0"
+
+
+def test_a_run_from_outside_is_in_the_bag(tmp_path: Path) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    clock = Clock()
+    with Bus.open(clock, listen=[endpoint]) as bus, live.join([endpoint]) as other:
+        tap = BagTap(tmp_path / "bag")
+        bus.tap(tap.on_sample)
+        bus.arrival_taps.append(tap.on_arrival)
+        node = bus.create_node("listener")
+        for _ in range(2):  # two subscriptions, one message
+            node.create_subscription(String, "chatter", lambda m: None)
+        publisher = other.bus.create_node("talker").create_publisher(String, "chatter")
+        deadline = time.monotonic() + 20
+        while not tap.count:
+            assert time.monotonic() < deadline
+            if publisher.has_subscribers:
+                publisher.publish(String("hello"))
+            clock.now_ns += 1_000_000
+            bus.admit()
+            bus.spin()
+        count = tap.count
+        tap.close()
+    with BagReader(tmp_path / "bag") as bag:
+        messages = list(bag.messages())
+        assert len(messages) == count
+        assert [m.sequence for m in messages] == list(range(1, count + 1))
+        assert codec(String).decode(messages[0].data).data == "hello"
+
+
+def test_no_bag_is_made_over_another(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="exists already"):
+        BagTap(tmp_path)

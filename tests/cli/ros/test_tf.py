@@ -1,0 +1,103 @@
+"""`twin tf …` in a process of its own, about the transforms of another one."""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+Twin = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """A process that publishes transforms (some_transforms.py), and where it listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    script = Path(__file__).with_name("some_transforms.py")
+    with subprocess.Popen(
+        [sys.executable, str(script), address], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        yield address
+        process.communicate()
+    assert process.returncode == 0
+
+
+def test_tree(twin: Twin) -> None:
+    done = twin("tf", "tree", "-t", "0.5")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == "odom"
+    rate = re.fullmatch(r"└── base_link  \((.*) Hz, latest at \d+\.\d+ s, from /driver\)", lines[1])
+    assert rate, lines
+    assert 20.0 < float(rate[1]) < 100.0
+    assert lines[2:] == [
+        "    ├── imu  (static, from /robot/mounts)",
+        "    └── laser  (static, from /robot/mounts)",
+    ]
+
+
+def test_echo_has_tf2_echos_words(twin: Twin) -> None:
+    done = twin("tf", "echo", "odom", "laser", "--once")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert re.fullmatch(r"At time \d+\.\d{9}", lines[0])
+    assert lines[1] == "- Translation: [1.000, 2.500, 0.250]"
+    assert re.fullmatch(r"- Rotation: in Quaternion \(xyzw\) \[0\.707, 0\.707, -?0\.000, 0\.000\]", lines[2])
+    assert lines[4] == "- Rotation: in RPY (degree) [180.000, -0.000, 90.000]" or "180.000" in lines[4]
+    assert lines[5] == "- Matrix:"
+    assert [[abs(float(value)) for value in line.split()] for line in lines[6:]] == [
+        [0.0, 1.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0, 2.5],
+        [0.0, 0.0, 1.0, 0.25],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+
+
+def test_echo_of_a_frame_that_is_not_there_says_what_it_waits_for(twin: Twin) -> None:
+    done = twin("tf", "echo", "odom", "lasr", "--once", "--timeout", "1.2")
+    assert done.returncode == 2
+    assert "Waiting for transform odom ->  lasr: the frame 'lasr' is not in the transform tree" in done.stderr
+    assert "no transform odom -> lasr within 1.2 s" in " ".join(done.stderr.split())
+
+
+def test_monitor(twin: Twin) -> None:
+    done = twin("tf", "monitor", "--once", "--duration", "0.6")
+    assert done.returncode == 0, done.stderr
+    assert "RESULTS: for all Frames" in done.stdout
+    frame = re.search(
+        r"Frame: base_link, published by /driver, Average Delay: (\S+), Max Delay: (\S+), Rate: (\S+) Hz",
+        done.stdout,
+    )
+    assert frame, done.stdout
+    assert -0.1 < float(frame[1]) < 0.5
+    assert 20.0 < float(frame[3]) < 100.0
+    assert re.search(r"Node: /driver \S+ Hz, Average Delay: \S+ Max Delay: \S+", done.stdout)
+    chain = twin("tf", "monitor", "odom", "laser", "--once", "--duration", "0.4")
+    assert "Chain is: odom -> base_link -> laser" in chain.stdout
+    assert "Net delay     avg = " in chain.stdout
+
+
+def test_frames_as_gv_and_svg(twin: Twin, tmp_path: Path) -> None:
+    done = twin("tf", "frames", "-t", "0.4")
+    assert done.returncode == 0, done.stderr
+    assert '"odom" -> "base_link"[label=" Broadcaster: /driver\\nAverage rate: ' in done.stdout
+    assert (
+        '"base_link" -> "laser"[label=" Broadcaster: /robot/mounts\\nAverage rate: 10000.000' in done.stdout
+    )
+    picture = tmp_path / "new" / "frames.svg"
+    assert twin("tf", "frames", "-t", "0.4", "-o", str(picture)).returncode == 0
+    texts = {element.text for element in ElementTree.parse(picture).iter() if element.tag.endswith("tspan")}
+    assert {"odom", "base_link", "laser", "imu", "/driver", "/robot/mounts"} <= texts
+    refused = twin("tf", "frames", "-o", str(tmp_path / "frames.pdf"))
+    assert refused.returncode == 2
+    assert ".gv or .svg" in refused.stderr

@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from .conftest import ROOT, Start
+
+
+def test_the_listener_hears_the_talker_and_both_end_with_ctrl_c(start: Start) -> None:
+    listener = start("listener")
+    talker = start("talker", "--period", "0.02")
+    listener.wait_for('[INFO] [listener]: I heard: "Hello World: 3"')
+    assert '[INFO] [talker]: Publishing: "Hello World: 3"\n' in talker.text
+    assert talker.interrupt() == 0
+    assert listener.interrupt() == 0
+
+
+def test_a_program_without_a_graph_says_so_in_one_line(endpoint: str) -> None:
+    command = [sys.executable, "examples/talker.py", "--connect", endpoint]
+    done = subprocess.run(command, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: nobody answers at {endpoint}; start ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_program_explains_its_arguments() -> None:
+    command = [sys.executable, "examples/talker.py", "--help"]
+    done = subprocess.run(command, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert "Say Hello World on /chatter, once in a period [s]." in done.stdout
+    assert "--period FLOAT" in done.stdout

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
+from twin.bridge.msgs import ParameterEvent
+from twin.errors import BridgeError
+from twin.geometry import Array
+from twin.nodes.node_parameters import declare_config
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    speed: float = 1.0
+    cap: float = float("inf")
+    free: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed > 5.0:
+            raise ValueError("nothing is that fast")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    limits: Limits = field(default_factory=Limits)
+    controller_period_ns: int = 50_000_000
+    timeout_ns: int = 300_000_000
+    joints: tuple[str, ...] = ("a", "b")
+    corners: Array = field(default_factory=lambda: np.zeros((1, 2)))
+
+
+@pytest.fixture
+def bus() -> Iterator[Bus]:
+    with Bus.open(Clock()) as opened:
+        yield opened
+
+
+def test_a_config_can_be_read_and_replaced(bus: Bus) -> None:
+    events: list[ParameterEvent] = []
+    bus.create_node("watch").create_subscription(ParameterEvent, "/parameter_events", events.append, 100)
+    node, seen = bus.create_node("n"), []
+    declare_config(node, Config(), seen.append, {"limits": "FollowPath"})
+    values = {p.name: p.value for p in node.get_parameters(node.parameters.names[2:])}
+    assert values == {
+        "FollowPath.speed": 1.0,
+        "FollowPath.cap": float("inf"),
+        "controller_frequency": 20.0,
+        "timeout": pytest.approx(0.3),
+        "joints": ["a", "b"],
+    }
+    node.set_parameter("FollowPath.speed", 2)
+    node.set_parameter("controller_frequency", 10.0)
+    assert (seen[-1].limits.speed, seen[-1].controller_period_ns) == (2.0, 100_000_000)
+    for name, value, why in (
+        ("FollowPath.speed", 6.0, "nothing is that fast"),
+        ("FollowPath.speed", -1.0, "must not be negative"),
+        ("FollowPath.speed", float("nan"), "must be finite"),
+        ("controller_frequency", 0.0, "a frequency must be more than zero"),
+    ):
+        with pytest.raises(BridgeError, match=why):
+            node.set_parameter(name, value)
+    assert len(seen) == 2
+    bus.spin()
+    assert [len(e.new_parameters) for e in events] == [5, 0, 0]
+
+
+def test_without_a_way_to_replace_it_a_config_is_read_only(bus: Bus) -> None:
+    node = bus.create_node("n")
+    declare_config(node, Config(), names={"limits": ""})
+    with pytest.raises(BridgeError, match="read-only"):
+        node.set_parameter("speed", 2.0)

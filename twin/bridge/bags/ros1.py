@@ -1,0 +1,81 @@
+"""Messages of ROS 1 to ROS 2's types and back, by rosbags' rules of migration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rosbags.convert.converter import is_same_wireformat, migrate_bytes
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from twin.bridge import types
+from twin.bridge.bags import definitions
+from twin.errors import BridgeError
+
+Convert = Callable[[bytes], bytes]
+
+_RENAMED = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
+
+
+class FromRos1:
+    """Converts the messages of one ROS 1 bag; types that only the bag knows become known."""
+
+    def __init__(self) -> None:
+        self._store = get_typestore(Stores.EMPTY)
+        self._cache: dict[str, object] = {}
+
+    def converter(self, typename: str, definition: str) -> tuple[str, Convert]:
+        """Return the type in ROS 2 and what converts a message to CDR.
+
+        Raises:
+            BridgeError: the bag's definition cannot be parsed.
+        """
+        try:
+            self._store.register(get_types_from_msg(definition, typename))
+        except Exception as error:  # rosbags documents no single parser error
+            raise BridgeError(f"the definition of {typename} cannot be parsed: {error}") from error
+        target = _RENAMED.get(typename, typename)
+        try:
+            types.get(target)
+        except BridgeError:
+            definitions.learn(target, definitions.text_of(typename, self._store.fielddefs))
+        source, store, cache = self._store, types.store, self._cache
+        if is_same_wireformat(source, store, typename, target):
+            return target, lambda data: bytes(store.ros1_to_cdr(data, target))
+
+        def migrate(data: bytes) -> bytes:
+            return bytes(
+                migrate_bytes(source, store, typename, target, cache, data, src_is2=False, dst_is2=True)
+            )
+
+        return target, migrate
+
+
+class ToRos1:
+    """Converts ROS 2 messages to the types of Noetic, or to the like of ROS 2's where Noetic has none."""
+
+    def __init__(self) -> None:
+        self.store: Any = get_typestore(Stores.ROS1_NOETIC)
+        """The types, for the writer of a ROS 1 bag."""
+        self._cache: dict[str, object] = {}
+
+    def converter(self, typename: str) -> Convert:
+        """Return what converts a message in CDR.
+
+        Raises:
+            BridgeError: an unknown type.
+        """
+        types.get(typename)
+        source, store, cache = types.store, self.store, self._cache
+        if typename not in store.fielddefs:
+            copies = get_types_from_msg(definitions.definition(typename), typename)
+            store.register({name: fields for name, fields in copies.items() if name not in store.fielddefs})
+        if is_same_wireformat(source, store, typename, typename):
+            return lambda data: bytes(source.cdr_to_ros1(data, typename))
+
+        def migrate(data: bytes) -> bytes:
+            return bytes(
+                migrate_bytes(source, store, typename, typename, cache, data, src_is2=True, dst_is2=False)
+            )
+
+        return migrate

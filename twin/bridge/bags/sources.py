@@ -1,0 +1,279 @@
+"""Where a bag's messages come from: our own reader of MCAP, or rosbags' readers of everything else."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from twin.bridge.bags import metadata, offered_qos
+from twin.bridge.bags.mcap_reader import McapReader
+from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
+from twin.bridge.bags.offered_qos import OfferedQoS
+from twin.errors import BridgeError, RecordingError
+
+
+class Source(Protocol):
+    """An open bag."""
+
+    info: BagInfo
+    notices: list[str]
+    """What a user should know, one sentence each."""
+
+    def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
+        """Yield the messages of topics, by log time from `start_ns` to `end_ns`, both inclusive."""
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return a file within the bag."""
+
+    def close(self) -> None:
+        """Close the files."""
+
+
+class McapSource:
+    """One or more MCAP files, in their order."""
+
+    def __init__(self, folder: Path, files: Collection[str], known: BagInfo | None) -> None:
+        """Open the files; `known` is what metadata.yaml says, None without it."""
+        self.notices: list[str] = []
+        with ExitStack() as stack:
+            self._files = [McapReader(folder / name) for name in files]
+            for file in self._files:
+                stack.callback(file.close)
+                self._judge(file)
+            self.info = self._read_info(tuple(files), known)
+            self._stack = stack.pop_all()
+
+    def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
+        """Yield messages by log time; files follow one another."""
+        for file in self._files:
+            names = {c.id: c.topic for c in file.channels.values() if _usable(c) and c.topic in topics}
+            for m in file.messages(set(names), start_ns, end_ns):
+                yield BagMessage(names[m.channel_id], m.data, m.log_ns, m.publish_ns, m.sequence)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return an attachment of the last file that has one of this name."""
+        found = [a.data for file in self._files if (a := file.attachment(name)) is not None]
+        return found[-1] if found else None
+
+    def close(self) -> None:
+        """Close the files."""
+        self._stack.close()
+
+    def _judge(self, file: McapReader) -> None:
+        if file.damage:
+            count = file.counts.total()
+            self.notices.append(f"{file.path}: {file.damage}; {count} messages before that can be read")
+        foreign = Counter(c.message_encoding for c in file.channels.values() if not _usable(c))
+        if foreign and len(foreign) == len(file.channels):
+            raise RecordingError(
+                f"{file.path}: holds {', '.join(sorted(foreign))} messages; valid are those of ROS 2 (cdr)"
+            )
+        for encoding, topics in sorted(foreign.items()):
+            self.notices.append(f"{file.path}: {topics} topics of {encoding} messages are left out")
+
+    def _read_info(self, files: tuple[str, ...], known: BagInfo | None) -> BagInfo:
+        topics: dict[str, BagTopic] = {}
+        ranges = []
+        told = known
+        for file in self._files:
+            ranges.append((file.start_ns, file.end_ns, file.counts.total()))
+            text = file.metadata.get("rosbag2", {}).get("serialized_metadata")
+            told = told or (metadata.parse(text) if text else None)
+            for channel in file.channels.values():
+                if _usable(channel):
+                    _count(topics, _topic(file, channel), file.counts[channel.id])
+        filled = [(start, end) for start, end, count in ranges if count]
+        return BagInfo(
+            storage="mcap",
+            files=files,
+            start_ns=min((start for start, _ in filled), default=0),
+            end_ns=max((end for _, end in filled), default=0),
+            topics=tuple(topics.values()),
+            file_ranges=tuple(ranges),
+            custom_data=told.custom_data if told else {},
+            ros_distro=told.ros_distro if told else "",
+        )
+
+
+class Rosbag2Source:
+    """A SQLite bag, or one with compressed files or messages, read by rosbags."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a folder with metadata.yaml, or one .db3 file."""
+        from rosbags.rosbag2 import Reader
+
+        self.notices: list[str] = []
+        self._path = path
+        for log in sorted(path.glob("*.db3-wal")) if path.is_dir() else [path.with_name(f"{path.name}-wal")]:
+            self._recover(log)
+        with _foreign(path, "a ROS 2 bag"):
+            self._reader: Any = Reader(path)
+            self._reader.open()
+        self.info = self._read_info()
+
+    def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
+        """Yield messages by log time; the storage knows no other time."""
+        with _foreign(self._path, "a ROS 2 bag"):
+            wanted = [c for c in self._reader.connections if c.topic in topics]
+            if wanted:
+                for connection, time, data in self._reader.messages(wanted, start_ns, end_ns + 1):
+                    yield BagMessage(connection.topic, bytes(data), time, time)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return None: the storage has none."""
+        return None
+
+    def close(self) -> None:
+        """Close the files."""
+        self._reader.close()
+
+    def _read_info(self) -> BagInfo:
+        reader = self._reader
+        topics: dict[str, BagTopic] = {}
+        for c in reader.connections:
+            topic = BagTopic(
+                name=c.topic,
+                type=c.msgtype,
+                type_hash=c.digest,
+                definition=c.msgdef.data,
+                definition_format="ros2idl" if c.msgdef.format.name == "IDL" else "ros2msg",
+                qos=tuple(map(_from_rosbags, c.ext.offered_qos_profiles)),
+            )
+            _count(topics, topic, c.msgcount)
+        filled = reader.message_count > 0
+        base = (
+            metadata.read(self._path)
+            if self._path.is_dir()
+            else BagInfo(storage="sqlite3", files=(self._path.name,))
+        )
+        return replace(
+            base,
+            start_ns=reader.start_time if filled else 0,
+            end_ns=reader.end_time - 1 if filled else 0,
+            topics=tuple(topics.values()),
+        )
+
+    def _recover(self, log: Path) -> None:
+        """Take over what a recorder that was killed had flushed."""
+        if not log.exists():
+            return
+        database = log.with_name(log.name.removesuffix("-wal"))
+        try:
+            connection = sqlite3.connect(database)
+            connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            connection.close()
+        except sqlite3.Error as fault:
+            raise RecordingError(f"{database}: cannot be recovered: {fault}") from fault
+        self.notices.append(f"{database}: its writer was stopped; what it had flushed was recovered")
+
+
+class Rosbag1Source:
+    """A ROS 1 bag, its messages converted to ROS 2's types."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a .bag file."""
+        from rosbags.rosbag1 import Reader
+
+        self.notices: list[str] = []
+        self._path = path
+        with _foreign(path, "a ROS 1 bag"):
+            self._reader: Any = Reader(path)
+            self._reader.open()
+        self._converters: dict[int, Any] = {}
+        self.info = self._read_info()
+
+    def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
+        """Yield messages by log time."""
+        wanted = [c for c in self._reader.connections if c.topic in topics and c.id in self._converters]
+        with _foreign(self._path, "a ROS 1 bag"):
+            if wanted:
+                for connection, time, data in self._reader.messages(wanted, start_ns, end_ns + 1):
+                    converted = self._converters[connection.id](data)
+                    yield BagMessage(connection.topic, converted, time, time)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return None: the storage has none."""
+        return None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._reader.close()
+
+    def _read_info(self) -> BagInfo:
+        from twin.bridge.bags.definitions import complete
+        from twin.bridge.bags.ros1 import FromRos1
+
+        types_of_bag = FromRos1()
+        topics: dict[str, BagTopic] = {}
+        for c in self._reader.connections:
+            try:
+                typename, self._converters[c.id] = types_of_bag.converter(c.msgtype, c.msgdef.data)
+            except BridgeError as fault:
+                self.notices.append(f"{self._path}: {c.msgcount} messages on {c.topic} are left out: {fault}")
+                continue
+            latched = OfferedQoS(history="keep_last", depth=1, durability="transient_local")
+            qos = (latched if c.ext.latching else OfferedQoS(history="keep_last", depth=10),)
+            _count(topics, complete(BagTopic(name=c.topic, type=typename, qos=qos)), c.msgcount)
+        reader, filled = self._reader, self._reader.message_count > 0
+        return BagInfo(
+            storage="rosbag1",
+            files=(self._path.name,),
+            start_ns=reader.start_time if filled else 0,
+            end_ns=reader.end_time - 1 if filled else 0,
+            topics=tuple(topics.values()),
+        )
+
+
+@contextmanager
+def _foreign(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a library says of bytes that it cannot read into one sentence."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except Exception as fault:  # rosbags' readers raise many kinds on damaged files
+        words = " ".join(str(fault).split()).rstrip(".") or type(fault).__name__
+        raise RecordingError(f"{path}: cannot be read as {what}: {words}") from fault
+
+
+def _usable(channel: Any) -> bool:
+    return bool(channel.message_encoding == "cdr")
+
+
+def _topic(file: McapReader, channel: Any) -> BagTopic:
+    schema = file.schemas.get(channel.schema_id)
+    if schema is None:
+        raise RecordingError(f"{file.path}: the type of {channel.topic} is missing")
+    return BagTopic(
+        name=channel.topic,
+        type=schema.name,
+        type_hash=channel.metadata.get("topic_type_hash", ""),
+        definition=schema.data.decode(errors="replace"),
+        definition_format=schema.encoding or "ros2msg",
+        qos=offered_qos.parse(channel.metadata.get("offered_qos_profiles")),
+    )
+
+
+def _count(topics: dict[str, BagTopic], topic: BagTopic, count: int) -> None:
+    """Add a topic, or the messages of another publisher or file to it."""
+    known = topics.get(topic.name, topic)
+    topics[topic.name] = replace(known, count=known.count + count)
+
+
+def _from_rosbags(qos: Any) -> OfferedQoS:
+    """Return rosbags' form of a profile as ours."""
+    names = {
+        name: getattr(qos, name).name.lower()
+        for name in ("history", "reliability", "durability", "liveliness")
+    }
+    periods = {
+        name: {"sec": getattr(qos, name).sec, "nsec": getattr(qos, name).nsec}
+        for name in ("deadline", "lifespan", "liveliness_lease_duration")
+    }
+    flag = "avoid_ros_namespace_conventions"
+    return offered_qos.parse([{**names, **periods, "depth": qos.depth, flag: getattr(qos, flag)}])[0]

@@ -1,0 +1,216 @@
+"""Writes bags: a folder with one file of messages and `metadata.yaml`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Protocol, Self, cast, get_args
+
+from twin.bridge.bags import metadata
+from twin.bridge.bags.compression import Compression
+from twin.bridge.bags.definitions import complete
+from twin.bridge.bags.mcap_records import Attachment, Message
+from twin.bridge.bags.mcap_writer import McapConfig, McapWriter
+from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
+from twin.bridge.bags.offered_qos import to_yaml
+from twin.errors import RecordingError, nearest
+
+Storage = Literal["mcap", "sqlite3"]
+"""What rosbag2 calls a storage identifier."""
+
+
+def as_storage(name: str) -> Storage:
+    """Return the storage of that name.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    if name not in get_args(Storage):
+        raise RecordingError(f"{name!r} is no storage of bags; {nearest(name, get_args(Storage))}")
+    return cast(Storage, name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BagConfig:
+    """How a bag is written."""
+
+    storage: Storage = "mcap"
+    compression: Compression = "none"
+    """With mcap of chunks; with sqlite3 of messages, none or zstd."""
+    ros_distro: str = metadata.ROS_DISTRO
+
+
+class StorageWriter(Protocol):
+    """A file of messages."""
+
+    file: str
+    """Its name in the bag."""
+    compression_mode: str
+    """As in metadata.yaml."""
+
+    def add_topic(self, topic: BagTopic) -> None:
+        """Make a topic known."""
+
+    def write(self, message: BagMessage) -> None:
+        """Append a message of a known topic."""
+
+    def attach(self, attachment: Attachment) -> None:
+        """Append a file within the file, where the storage has such."""
+
+    def flush(self) -> None:
+        """Make what was written survive this process, as far as the storage can."""
+
+    def close(self, info: BagInfo) -> None:
+        """Write the end."""
+
+
+class BagWriter:
+    """An open bag; with mcap, its end or a crash costs at most the last half second of log time."""
+
+    def __init__(self, folder: Path, config: BagConfig | None = None) -> None:
+        """Create the bag.
+
+        Raises:
+            RecordingError: it exists, or cannot be written.
+        """
+        self.folder = folder
+        self.config = config or BagConfig()
+        self.topics: dict[str, BagTopic] = {}
+        """With the messages so far as `count`."""
+        self._counts: dict[str, int] = {}
+        self._start_ns: int | None = None
+        self._end_ns = 0
+        self._closed = False
+        self._storage = self._open_storage()
+
+    @property
+    def count(self) -> int:
+        """Messages written."""
+        return sum(self._counts.values())
+
+    def add_topic(self, topic: BagTopic) -> None:
+        """Make a topic known, before its first message; a repeated name is ignored."""
+        if topic.name not in self.topics:
+            self.topics[topic.name] = full = complete(topic)
+            self._counts[topic.name] = 0
+            self._storage.add_topic(full)
+
+    def write(self, message: BagMessage) -> None:
+        """Append a message of a known topic.
+
+        Raises:
+            RecordingError: the disk is full or gone.
+        """
+        self._storage.write(message)
+        self._counts[message.topic] += 1
+        self._start_ns = message.log_ns if self._start_ns is None else min(self._start_ns, message.log_ns)
+        self._end_ns = max(self._end_ns, message.log_ns)
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Append a file within the bag; other readers do not mind, SQLite bags have no place for it."""
+        self._storage.attach(Attachment(self._end_ns, name, media_type, data))
+
+    def flush(self) -> None:
+        """Make everything so far survive the end of this process.
+
+        Raises:
+            RecordingError: the disk is full or gone.
+        """
+        self._storage.flush()
+
+    def info(self) -> BagInfo:
+        """Return what metadata.yaml says, as of now."""
+        start = self._start_ns or 0
+        mode = self._storage.compression_mode
+        return BagInfo(
+            storage=self.config.storage,
+            files=(self._storage.file,),
+            start_ns=start,
+            end_ns=max(start, self._end_ns),
+            topics=tuple(replace(topic, count=self._counts[name]) for name, topic in self.topics.items()),
+            compression_mode=mode,
+            compression_format=self.config.compression if mode else "",
+            ros_distro=self.config.ros_distro,
+        )
+
+    def close(self) -> None:
+        """Write the end and metadata.yaml. Harmless when repeated.
+
+        Raises:
+            RecordingError: the disk is full or gone.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        info = self.info()
+        self._storage.close(info)
+        metadata.write(self.folder, info)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open_storage(self) -> StorageWriter:
+        try:
+            self.folder.mkdir(parents=True)
+        except FileExistsError as fault:
+            raise RecordingError(f"{self.folder} exists already; name another bag, or remove it") from fault
+        except OSError as fault:
+            raise RecordingError(f"{self.folder}: cannot be written: {fault.strerror}") from fault
+        if self.config.storage == "mcap":
+            return _McapStorage(self.folder, self.config)
+        from twin.bridge.bags.sqlite_writer import SqliteWriter
+
+        return SqliteWriter(self.folder, self.config.compression, self.config.ros_distro)
+
+
+class _McapStorage:
+    compression_mode = ""  # of chunks, which MCAP itself tells
+
+    def __init__(self, folder: Path, config: BagConfig) -> None:
+        self.file = f"{folder.resolve().name}_0.mcap"
+        library = f"twin {version('twin')}"
+        self._writer = McapWriter(
+            folder / self.file, McapConfig(library=library, compression=config.compression)
+        )
+        self._schemas: dict[tuple[str, str], int] = {}
+        self._channels: dict[str, int] = {}
+        # As rosbag2: readers of a file that has no end know its version and distribution.
+        self._tell(BagInfo(storage="mcap", files=(self.file,), ros_distro=config.ros_distro))
+
+    def add_topic(self, topic: BagTopic) -> None:
+        key = (topic.type, topic.definition)
+        if key not in self._schemas:
+            encoding = topic.definition_format if topic.definition else ""
+            self._schemas[key] = self._writer.add_schema(topic.type, encoding, topic.definition.encode())
+        self._channels[topic.name] = self._writer.add_channel(
+            topic.name,
+            self._schemas[key],
+            {"offered_qos_profiles": to_yaml(topic.qos), "topic_type_hash": topic.type_hash},
+        )
+
+    def write(self, message: BagMessage) -> None:
+        channel = self._channels[message.topic]
+        sequence = message.sequence & 0xFFFFFFFF
+        self._writer.write(Message(channel, sequence, message.log_ns, message.publish_ns, message.data))
+
+    def attach(self, attachment: Attachment) -> None:
+        self._writer.add_attachment(attachment)
+
+    def flush(self) -> None:
+        self._writer.flush()
+
+    def close(self, info: BagInfo) -> None:
+        try:
+            self._tell(info)
+        finally:
+            self._writer.close()
+
+    def _tell(self, info: BagInfo) -> None:
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(info)})

@@ -1,0 +1,81 @@
+"""Timers and rates, on the bus's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any
+
+from twin.bridge.clock import Clock
+from twin.errors import BridgeError
+
+
+class Timer:
+    """Calls back at multiples of a period of simulated time; several missed ones are one call."""
+
+    def __init__(
+        self, period_ns: int, callback: Callable[[], Any], clock: Clock, *, autostart: bool = True
+    ) -> None:
+        if period_ns <= 0:
+            raise BridgeError(f"a timer period of {period_ns} ns; valid is more than zero")
+        self.period_ns = period_ns
+        self.last_ns: int | None = None
+        """When it called back last [ns]."""
+        self._callback = callback
+        self._clock = clock
+        self.reset()
+        self._cancelled = not autostart
+
+    def reset(self) -> None:
+        """Fire next at the first multiple of the period after now; also after `cancel`."""
+        self._schedule(self._clock.now_ns)
+        self._cancelled = False
+
+    def cancel(self) -> None:
+        """Fire no more, until reset."""
+        self._cancelled = True
+
+    @property
+    def is_canceled(self) -> bool:
+        """Whether it fires no more, until reset."""
+        return self._cancelled
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is due."""
+        return not self._cancelled and self._clock.now_ns >= self.next_ns
+
+    @property
+    def time_until_next_call(self) -> int | None:
+        """How long until it is due [ns], negative if it is late; None if cancelled."""
+        return None if self._cancelled else self.next_ns - self._clock.now_ns
+
+    def run(self, now_ns: int) -> None:
+        """Call back if due."""
+        if self._cancelled:
+            return
+        if now_ns >= self.next_ns:
+            self._schedule(now_ns)
+            self.last_ns = now_ns
+            self._callback()
+        elif now_ns < self.next_ns - self.period_ns:  # the clock was set back: a bag played again, a new run
+            self._schedule(now_ns)
+
+    def _schedule(self, now_ns: int) -> None:
+        self.next_ns = (now_ns // self.period_ns + 1) * self.period_ns
+
+
+class Rate:
+    """Sleeps to the next multiple of a period in executions: `yield from rate.sleep()`."""
+
+    def __init__(self, period_ns: int, clock: Clock) -> None:
+        if period_ns <= 0:
+            raise BridgeError(f"a rate with a period of {period_ns} ns; valid is more than zero")
+        self.period_ns = period_ns
+        self._clock = clock
+
+    def sleep(self) -> Generator[None, None, None]:
+        """Wait until the clock reaches the next multiple of the period."""
+        start_ns = self._clock.now_ns
+        until_ns = (start_ns // self.period_ns + 1) * self.period_ns
+        while start_ns <= self._clock.now_ns < until_ns:
+            yield

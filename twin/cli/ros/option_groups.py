@@ -1,0 +1,31 @@
+"""Groups of options that several commands share."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+
+def takes(name: str, make: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command, instead of its parameter `name`, the parameters of `make`, which makes its value."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        shared = inspect.signature(make, eval_str=True).parameters
+        own = inspect.signature(command, eval_str=True)
+
+        @functools.wraps(command)
+        def wrapper(**given: Any) -> None:
+            value = make(**{each: given.pop(each) for each in shared})
+            command(**given, **{name: value})
+
+        parameters = []
+        for parameter in own.parameters.values():
+            parameters += [*shared.values()] if parameter.name == name else [parameter]
+        parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in parameters]
+        wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return wrapper
+
+    return decorate

@@ -1,0 +1,158 @@
+"""`twin topic list`, `info`, `type`, `find`: what is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.topic_options import TopicName
+from twin.errors import BridgeError
+
+if TYPE_CHECKING:
+    from twin.bridge.graph import EndpointInfo, Graph
+
+Hidden = Annotated[
+    bool, typer.Option("--include-hidden-topics", help="Those with a part that begins with _ too.")
+]
+Count = Annotated[bool, typer.Option("--count-topics", "-c", help="Only say how many.")]
+
+
+@joins
+def list_topics(
+    show_types: Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")] = False,
+    count: Count = False,
+    hidden: Hidden = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also show types, and how many publish and subscribe.")
+    ] = False,
+    *,
+    joining: Joining,
+) -> None:
+    """List the topics."""
+    graph, topics = _topics(joining, hidden)
+    if count:
+        typer.echo(len(topics))
+    elif verbose and topics:
+        published = [(name, len(graph.publishers(name))) for name in topics]
+        subscribed = [(name, len(graph.subscriptions(name))) for name in topics]
+        typer.echo(_table("Published topics:", "publisher", published, topics))
+        typer.echo(_table("Subscribed topics:", "subscriber", subscribed, topics))
+    else:
+        for name, types in topics.items():
+            typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+
+
+@joins
+def info(
+    topic: TopicName,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Also tell nodes, type hashes, GIDs, quality of service."),
+    ] = False,
+    *,
+    joining: Joining,
+) -> None:
+    """Tell type and number of publishers and subscriptions."""
+    graph, topics = _topics(joining, True)
+    name, types = _known(topic, topics)
+    end = "\n\n" if verbose else "\n"
+    for line, endpoints in (
+        (f"Type: {types[0] if len(types) == 1 else list(types)}", ()),
+        (f"Publisher count: {len(graph.publishers(name))}", graph.publishers(name)),
+        (f"Subscription count: {len(graph.subscriptions(name))}", graph.subscriptions(name)),
+    ):
+        typer.echo(f"{line}{end}", nl=False)
+        for endpoint in endpoints if verbose else ():
+            typer.echo(f"{_described(endpoint)}{end}", nl=False)
+
+
+@joins
+def type_of(topic: TopicName, *, joining: Joining) -> None:
+    """Print a topic's type."""
+    _, topics = _topics(joining, True)
+    for name in _known(topic, topics)[1]:
+        typer.echo(name)
+
+
+@joins
+def find(
+    topic_type: Annotated[
+        str, typer.Argument(metavar="TYPE", help="Such as std_msgs/msg/String.", show_default=False)
+    ],
+    count: Count = False,
+    hidden: Hidden = False,
+    *,
+    joining: Joining,
+) -> None:
+    """List the topics of a type."""
+    from twin.bridge import types
+
+    wanted = "/".join(types.parts(topic_type))
+    _, topics = _topics(joining, hidden)
+    found = [name for name, known in topics.items() if wanted in known]
+    if count:
+        typer.echo(len(found))
+        return
+    for name in found:
+        typer.echo(name)
+
+
+def _topics(joining: Joining, hidden: bool) -> tuple[Graph, dict[str, tuple[str, ...]]]:
+    from twin.bridge.graph import Graph, is_hidden
+
+    with joining.open() as process:
+        graph = Graph.snapshot(process.bus)
+    topics = graph.topics()
+    return graph, {name: types for name, types in topics.items() if hidden or not is_hidden(name)}
+
+
+def _known(topic: str, topics: dict[str, tuple[str, ...]]) -> tuple[str, tuple[str, ...]]:
+    from twin.cli.ros.topic_process import did_you_mean
+
+    name = topic if topic.startswith("/") else f"/{topic}"
+    if name not in topics:
+        raise BridgeError(f"Unknown topic '{topic}'{did_you_mean(name, topics)}")
+    return name, topics[name]
+
+
+def _table(
+    title: str, word: str, counts: Sequence[tuple[str, int]], topics: dict[str, tuple[str, ...]]
+) -> str:
+    rows = [
+        f" * {name} [{', '.join(topics[name])}] {count} {word}{'s' if count > 1 else ''}\n"
+        for name, count in counts
+        if count
+    ]
+    return f"{title}\n{''.join(rows)}"
+
+
+def _described(endpoint: EndpointInfo) -> str:
+    """Return an endpoint as rclpy's TopicEndpointInfo shows itself."""
+    qos = endpoint.qos
+    return "\n".join(
+        (
+            f"Node name: {endpoint.node.name}",
+            f"Node namespace: {endpoint.node.namespace}",
+            f"Topic type: {endpoint.type}",
+            f"Topic type hash: {endpoint.type_hash}",
+            f"Endpoint type: {'PUBLISHER' if endpoint.kind == 'MP' else 'SUBSCRIPTION'}",
+            f"GID: {'.'.join(f'{byte:02x}' for byte in endpoint.gid)}",
+            "QoS profile:",
+            f"  Reliability: {qos.reliability.upper()}",
+            f"  History (Depth): {f'KEEP_LAST ({qos.depth})' if qos.history == 'keep_last' else 'KEEP_ALL'}",
+            f"  Durability: {qos.durability.upper()}",
+            f"  Lifespan: {_duration(qos.lifespan_ns)}",
+            f"  Deadline: {_duration(qos.deadline_ns)}",
+            f"  Liveliness: {qos.liveliness.upper()}",
+            f"  Liveliness lease duration: {_duration(qos.lease_ns)}",
+        )
+    )
+
+
+def _duration(nanoseconds: int) -> str:
+    from twin.bridge.qos import INFINITE_NS
+
+    return "Infinite" if nanoseconds == INFINITE_NS else f"{nanoseconds} nanoseconds"

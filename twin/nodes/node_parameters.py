@@ -1,0 +1,126 @@
+"""A node's frozen config as ROS parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import reduce
+from typing import Any, TypeVar
+
+from twin.bridge.defaults import new
+from twin.bridge.msgs import ParameterDescriptor
+from twin.bridge.node import Node
+from twin.bridge.parameter_values import Parameter
+from twin.errors import BridgeError
+
+C = TypeVar("C")
+
+_NO_NAMES: Mapping[str, str] = {}
+
+
+@dataclasses.dataclass(frozen=True)
+class _Unit:
+    """How a field's value is told: a period in nanoseconds as a frequency, other nanoseconds as seconds."""
+
+    name: str
+    tell: Callable[[Any], Any] = lambda value: value
+    read: Callable[[Any], Any] = lambda value: value
+
+
+def declare_config(
+    node: Node, config: C, replace: Callable[[C], None] | None = None, names: Mapping[str, str] = _NO_NAMES
+) -> None:
+    """Declare the numbers, texts and lists of a config as parameters of a node, in one parameter event.
+
+    A field is a parameter of its name, `period_ns` is `frequency` [Hz], `timeout_ns` is `timeout` [s]; a
+    config in a config gives 'outer.inner'. Fields that are None or arrays are left out.
+
+    Args:
+        node: Whose parameters.
+        config: A frozen dataclass.
+        replace: Takes the changed config; without it the parameters are read-only.
+        names: Field -> the name that ROS has for it, such as 'controller' -> 'FollowPath'; empty: no level of
+            its own.
+    """
+    current = config
+    found = {unit.name: (path, unit, value) for path, unit, value in _fields(config, names)}
+    descriptor = new(ParameterDescriptor, read_only=replace is None)
+    node.parameters.declare_together(
+        [(name, unit.tell(value), descriptor) for name, (_, unit, value) in found.items()]
+    )
+    if replace is None:
+        return
+    apply = replace
+
+    def changed(parameters: list[Parameter]) -> C:
+        following = current
+        for parameter in parameters:
+            if parameter.name in found:
+                path, unit, _ = found[parameter.name]
+                _check(parameter, unit.tell(reduce(getattr, path, current)))
+                following = _with(following, path, unit.read(parameter.value))
+        return following
+
+    def on_set(parameters: list[Parameter]) -> None:
+        try:
+            changed(parameters)
+        except ZeroDivisionError as error:
+            raise BridgeError("a frequency must be more than zero") from error
+        except ValueError as error:
+            raise BridgeError(str(error)) from error
+
+    def post_set(parameters: list[Parameter]) -> None:
+        nonlocal current
+        if any(parameter.name in found for parameter in parameters):
+            current = changed(parameters)
+            apply(current)
+
+    node.add_on_set_parameters_callback(on_set)
+    node.add_post_set_parameters_callback(post_set)
+
+
+def _fields(
+    config: Any, names: Mapping[str, str], path: tuple[str, ...] = (), prefix: str = ""
+) -> Iterator[tuple[tuple[str, ...], _Unit, Any]]:
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        here = (*path, field.name)
+        name = names.get(field.name, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from _fields(value, names, here, f"{prefix}{name}." if name else prefix)
+        elif _is_plain(value):
+            yield here, _unit(prefix, name, value), value
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return bool(value) and all(type(item) is type(value[0]) and _is_plain(item) for item in value)
+    return type(value) in (bool, int, float, str)
+
+
+def _unit(prefix: str, name: str, value: Any) -> _Unit:
+    if name.endswith("period_ns"):
+        frequency = f"{prefix}{name.removesuffix('period_ns')}frequency"
+        return _Unit(frequency, lambda ns: 1e9 / ns, lambda hz: round(1e9 / hz))
+    if name.endswith("_ns"):
+        return _Unit(f"{prefix}{name.removesuffix('_ns')}", lambda ns: ns * 1e-9, lambda s: round(s * 1e9))
+    if isinstance(value, tuple):
+        return _Unit(prefix + name, list, tuple)
+    return _Unit(prefix + name)
+
+
+def _check(parameter: Parameter, old: Any) -> None:
+    value = parameter.value
+    if type(value) not in (int, float):
+        return
+    if math.isnan(value) or (math.isfinite(old) and not math.isfinite(value)):
+        raise BridgeError(f"{parameter.name} must be finite")
+    if old >= 0 > value:
+        raise BridgeError(f"{parameter.name} must not be negative")
+
+
+def _with(config: Any, path: tuple[str, ...], value: Any) -> Any:
+    head, *rest = path
+    inner = _with(getattr(config, head), tuple(rest), value) if rest else value
+    return dataclasses.replace(config, **{head: inner})
