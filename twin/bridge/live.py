@@ -147,6 +147,7 @@ def join(
         connect=tuple(connect),
         file=file,
         timeout_s=timeout_s,
+        domain_id=domain_id_of(domain_id),
     )
     clock = Clock()
     with Bus.of(session, clock) as bus:
