@@ -26,9 +26,11 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation
+bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation, messages to a put
 	$(BIN)/python -m tests.benchmarks.convert_cost
 	$(BIN)/python -m tests.benchmarks.run_cost
+	$(BIN)/python -m tests.benchmarks.cdr_cost
+	$(BIN)/python -m tests.benchmarks.lockstep_cost
 
 oracle: $(VENV)/.ready  ## conversions against pinocchio, and the table in docs/fidelity.md
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'

@@ -72,6 +72,9 @@ class ActionClient:
         self._count = 0
         self._node = node
         self._destroyed = False
+        node.action_clients += 1
+        # Not the gid: that depends on what other nodes have created before.
+        self._seed = f"{node.bus.session_id}{node.fully_qualified_name}#{node.action_clients}".encode()
         base = f"{self.name}/_action"
         self._send = node.create_client(action_type.SendGoal, f"{base}/send_goal")
         self._cancel = node.create_client(CancelGoal, f"{base}/cancel_goal")
@@ -100,7 +103,7 @@ class ActionClient:
             raise TypeError(f"{self.name} takes {self._type.name}_Goal, not {type(goal).__name__}")
         self._count += 1
         # Unique like a random UUID, and the same in the same run.
-        goal_id = xxhash.xxh3_128_digest(self._send.gid + self._count.to_bytes(8, "little"))
+        goal_id = xxhash.xxh3_128_digest(self._seed + self._count.to_bytes(8, "little"))
         client_goal = ClientGoal(self, goal_id)
         self._goals[goal_id] = (client_goal, feedback_callback)
         request = self._type.SendGoal.Request(uuid_msg(goal_id), goal)

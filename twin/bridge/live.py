@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +148,7 @@ def join(
         timeout_s=timeout_s,
     )
     clock = Clock()
-    with Bus.of(session, clock, domain_id=_domain_id() if domain_id is None else domain_id) as bus:
+    with Bus.of(session, clock) as bus:
         yield LiveBus(bus, clock, use_sim_time=use_sim_time)
 
 
@@ -173,7 +173,8 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
             process.bus.node_options = NodeOptions(arguments=ros)
             steps = make(process.bus, **own)
             if isinstance(steps, Generator):
-                process.spin(lambda: bool(received) or next(steps, received) is received)
+                with closing(steps):
+                    process.spin(lambda: bool(received) or next(steps, received) is received)
             else:
                 process.spin(lambda: bool(received))
     except TwinError as fault:
@@ -203,7 +204,14 @@ def _path(text: str | None) -> Path | None:
     return Path(text) if text else None
 
 
-def _domain_id() -> int:
+def domain_id_of(given: int | None) -> int:
+    """Return the domain that was given, else ROS_DOMAIN_ID.
+
+    Raises:
+        BridgeError: ROS_DOMAIN_ID is no number from 0 to 232.
+    """
+    if given is not None:
+        return given
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not text.isdecimal() or int(text) > 232:
         raise BridgeError(f"ROS_DOMAIN_ID is {text!r}; valid is a number from 0 to 232")

@@ -65,6 +65,8 @@ class Node(NodeParameters, NodeGraph):
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
         self._liveliness: Any = bus.session.liveliness().declare_token(str(self.token))
+        self.action_clients = 0
+        """How many there have been."""
         self._endpoints: list[OwnedEndpoint] = []
         self._timers: list[Timer] = []
         self._executions: list[Execution] = []
@@ -78,6 +80,11 @@ class Node(NodeParameters, NodeGraph):
     def fully_qualified_name(self) -> str:
         """Namespace and name: '/robot/amcl'."""
         return f"{self.namespace.rstrip('/')}/{self.name}"
+
+    @property
+    def endpoints(self) -> tuple[OwnedEndpoint, ...]:
+        """Publishers, subscriptions, services and clients in the order of their creation."""
+        return tuple(self._endpoints)
 
     @property
     def now_ns(self) -> int:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import xxhash
 import zenoh
 
+from twin.bridge.interrupts import from_zenoh
 from twin.bridge.wire import Wire
 from twin.errors import BridgeError
 
@@ -165,4 +166,7 @@ def direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = No
 
     Indirect handlers, the default, hand over to a thread: not deterministic, and alive at interpreter exit.
     """
+    from_zenoh(callback)
+    if drop is not None:
+        from_zenoh(drop)
     return zenoh.handlers.Callback(callback, drop, indirect=False)

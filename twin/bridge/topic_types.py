@@ -45,8 +45,8 @@ def message_class(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo
         BridgeError: no node tells an unknown type, or it is known here with another definition.
     """
     typename = endpoints[0].type
-    if not _is_known(typename):
-        _learn(process, node, endpoints)
+    if not is_known(typename):
+        learn_type(process, node, endpoints)
     cls = types.get(typename)
     ours, theirs = types.rihs01(typename), endpoints[0].type_hash
     if not same_hash(ours, theirs):
@@ -61,7 +61,7 @@ def hash_of(endpoint: EndpointInfo) -> str:
     """Return the hash with which an endpoint's type is sent, also if Humble or a bridge does not tell it."""
     if endpoint.type_hash not in _UNTOLD:
         return endpoint.type_hash
-    return types.rihs01(endpoint.type) if _is_known(endpoint.type) else HUMBLE_HASH
+    return types.rihs01(endpoint.type) if is_known(endpoint.type) else HUMBLE_HASH
 
 
 def same_hash(one: str, other: str) -> bool:
@@ -69,7 +69,8 @@ def same_hash(one: str, other: str) -> bool:
     return one == other or one in _UNTOLD or other in _UNTOLD
 
 
-def _is_known(typename: str) -> bool:
+def is_known(typename: str) -> bool:
+    """Return whether a type's definition is known here."""
     try:
         types.get(typename)
     except BridgeError:
@@ -77,8 +78,12 @@ def _is_known(typename: str) -> bool:
     return True
 
 
-def _learn(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> None:
-    """Ask the nodes one after the other with `~/get_type_description` (REP-2016)."""
+def learn_type(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> None:
+    """Ask the nodes of endpoints of one type for it, one by one (`~/get_type_description`, REP-2016).
+
+    Raises:
+        BridgeError: no node tells it.
+    """
     from twin.bridge import type_description
 
     service = types.ServiceType("type_description_interfaces/srv/GetTypeDescription")

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from twin.cli import batch, check, convert, graph, play, robots, run, schema, tree, view
+from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
@@ -23,6 +23,7 @@ app = typer.Typer(
 
 _COMMANDS = (
     ("run", run.run, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
+    ("exec", exec.execute, "twin exec my_controller.py:make_node --lockstep"),
     ("test", batch.run_batch, "twin test scenarios --junit results.xml"),
     ("play", play.play, "twin play runs/warehouse/20261121-101500"),
     ("check", check.check, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
@@ -46,7 +47,7 @@ _GROUPS = (
     ("bag", bag.app),
 )
 
-_NEED_ARGUMENTS = ("run", "play", "check", "tree", "graph", "convert", "view")
+_NEED_ARGUMENTS = ("run", "exec", "play", "check", "tree", "graph", "convert", "view")
 
 for _name, _function, _example in _COMMANDS:
     app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in _NEED_ARGUMENTS)(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
 from twin.cli.folders import make_folder, run_folder
@@ -11,17 +12,29 @@ from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
 
+if TYPE_CHECKING:
+    from twin.scenario.outside import ClockMode
+
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
     from twin.cli.log import show_warnings
     from twin.scenario import schema
+    from twin.scenario.outside import Outside
     from twin.scenario.verdict import Verdict
 
     show_warnings()
     name, seed, folder = options.scenario.stem, 0, None
+    clock: ClockMode = "inproc"
     try:
         folder = None if out is None else make_folder(out)
+        outside = Outside(
+            nodes=options.nodes,
+            wait_for=options.wait_for,
+            wait_timeout_s=options.wait_timeout,
+            free=options.free,
+        )
+        clock = outside.clock(options.network is not None)
         scenario = schema.load(options.scenario, options.overrides)
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
@@ -34,13 +47,14 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 record=options.record,
                 pace=options.pace,
                 network=options.network,
+                outside=outside,
                 bag=folder / "bag" if options.bag else None,
                 save_model=options.save_model,
                 progress=progress,
             )
     except TwinError as fault:
         print_error(fault)
-        verdict = Verdict(scenario=name, seed=seed, error=str(fault))
+        verdict = Verdict(scenario=name, seed=seed, error=str(fault), clock=clock)
         if folder is not None:
             verdict.write(folder)
         if as_json:

@@ -23,6 +23,11 @@ class RunOptions:
     pace: float | None = None
     """Simulated seconds per second; None: as fast as possible."""
     listen: tuple[str, ...] = ()
+    nodes: tuple[str, ...] = ()
+    wait_for: tuple[str, ...] = ()
+    wait_timeout: float = 10.0
+    """[s] of wall time."""
+    free: bool = False
     connect: tuple[str, ...] = ()
     wire: Wire = "rmw_zenoh"
     zenoh_config: Path | None = None
@@ -54,6 +59,10 @@ class RunOptions:
         words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
         words += [] if self.pace is None else ["--pace", repr(self.pace)]
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
+        words += [word for place in self.nodes for word in ("--node", place)]
+        words += [word for name in self.wait_for for word in ("--wait-for", name)]
+        words += ["--wait-timeout", repr(self.wait_timeout)] if self.wait_for else []
+        words += ["--free"] * self.free
         words += [word for endpoint in self.connect for word in ("--connect", endpoint)]
         if self.network is not None:
             words += ["--wire", self.wire, "--domain", str(self.domain_id)]
@@ -72,8 +81,13 @@ def parse_overrides(sets: Sequence[str], seed: int | None) -> dict[str, str]:
     return overrides if seed is None else {**overrides, "seed": str(seed)}
 
 
-def parse_pace(text: str) -> float | None:
-    """Return simulated seconds per second, None for `max`; raises ScenarioError."""
+def parse_pace(text: str | None, *, free: bool = False) -> float | None:
+    """Return simulated seconds per second, None for `max`; raises ScenarioError.
+
+    Who does not say it wants `max`, or real time if others live by their own clocks.
+    """
+    if text is None:
+        return 1.0 if free else None
     if text == "max":
         return None
     try:

@@ -22,11 +22,30 @@ def run(
     expect_one_hash: Annotated[
         bool, typer.Option("--expect-one-hash", help="Fail if the repeated runs differ in a single bit.")
     ] = False,
-    pace: Annotated[str, typer.Option(help="Simulated seconds per second: a number, or max.")] = "max",
+    pace: Annotated[
+        str | None,
+        typer.Option(
+            help="Simulated seconds per second: a number, or max.", show_default="max; 1 with --free"
+        ),
+    ] = None,
     listen: Annotated[
         list[str] | None,
         typer.Option(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
     ] = None,
+    node: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE.py:FACTORY", help="Also run these nodes, in this process."),
+    ] = None,
+    wait_for: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Run in lock-step with a node or topic of another process, e.g. /cmd_vel."
+        ),
+    ] = None,
+    wait_timeout: Annotated[float, typer.Option(help="How long to wait for an answer [s].")] = 10.0,
+    free: Annotated[
+        bool, typer.Option("--free", help="Let others take part at their own pace; not deterministic.")
+    ] = False,
     connect: Annotated[
         list[str] | None,
         typer.Option(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),
@@ -58,8 +77,12 @@ def run(
     options = RunOptions(
         scenario=scenario,
         overrides=parse_overrides(sets or [], seed),
-        pace=parse_pace(pace),
+        pace=parse_pace(pace, free=free),
         listen=tuple(listen or ()),
+        nodes=tuple(node or ()),
+        wait_for=tuple(wait_for or ()),
+        wait_timeout=wait_timeout,
+        free=free,
         connect=tuple(connect or ()),
         zenoh_config=zenoh_config,
         wire=wire,

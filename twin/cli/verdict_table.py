@@ -89,6 +89,8 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
     text.append("  " + " ".join(parts), style="not bold default")
     if verdict["digest"] is not None:
         text.append(f"  digest {verdict['digest'][:12]}", style="not bold dim default")
+    if verdict["clock"] != "inproc":
+        text.append(f"  clock {verdict['clock']}", style="not bold default")
     if not verdict["deterministic"]:
         text.append("  not deterministic", style="not bold yellow")
     return text

@@ -10,6 +10,7 @@ from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.factory import create_nodes
 from twin.bridge.session import SessionConfig
 from twin.bridge.topics import Sample
 from twin.convert import convert
@@ -24,6 +25,7 @@ from twin.runtime.robot_stack import RobotStack, StackContext
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.navigation import AmclLocalisation
 from twin.scenario.observation import CheckContext, Zone
+from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
 from twin.scenario.world import GoodOverride, Obstacle
@@ -57,6 +59,7 @@ def build(
     *,
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
     listen: Sequence[str] = (),
+    outside: Outside = ALONE,
     network: SessionConfig | None = None,
     crash_folder: Path | None = None,
 ) -> Parts:
@@ -66,6 +69,7 @@ def build(
         scenario: What to build.
         taps: Called for every sample, from the first one on that a node publishes while it is made.
         listen: Endpoints for other processes.
+        outside: The user's own nodes, and how the run keeps time with other processes.
         network: How else the bus takes part in a network, instead of `listen`.
         crash_folder: Where the last states go if the physics diverges.
 
@@ -88,7 +92,9 @@ def build(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
     )
     clock = Clock()
-    bus = Bus.open(clock, listen=listen) if network is None else Bus.of(network, clock)
+    network = network or SessionConfig(listen=tuple(listen))
+    name = outside.session if network.networked else "twin"
+    bus = Bus.of(replace(network, name=name), clock)
     for tap in taps:
         bus.tap(tap)
     try:
@@ -113,6 +119,8 @@ def build(
             for robot in scenario.robots
         }
         mission = build_mission(bus, scenario.mission, stacks, arena, namespaces)
+        for place in outside.nodes:
+            create_nodes(bus, place)
     except BaseException:
         bus.close()
         raise

@@ -19,7 +19,9 @@ from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
+from twin.runtime.outside import Lockstep
 from twin.scenario.checks import Check
+from twin.scenario.outside import ALONE, ClockMode, Outside
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -52,7 +54,9 @@ class Run:
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
 
-    def __init__(self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
+    ) -> None:
         self.scenario = scenario
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
@@ -65,6 +69,7 @@ class Run:
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = self.tick_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
@@ -96,11 +101,16 @@ class Run:
 
     def admit(self) -> None:
         """1. Samples from outside enter the inboxes."""
-        self.bus.admit()
+        if self.lockstep is None:
+            self.bus.admit()
+        else:
+            self.lockstep.admit()
 
     def nodes(self) -> None:
-        """2. Nodes run: inboxes, timers due, actions; in the order of their creation."""
+        """2. Nodes run: inboxes, timers due, actions; in order of creation, then those waited for."""
         self.bus.spin()
+        if self.lockstep is not None:
+            self.lockstep.step()
 
     def actuate(self) -> None:
         """3. Actuators take the commands; obstacles come into the way."""
@@ -151,6 +161,7 @@ def run(
     pace: float | None = None,
     listen: Sequence[str] = (),
     network: SessionConfig | None = None,
+    outside: Outside = ALONE,
     bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -162,9 +173,10 @@ def run(
         out: Folder for the recording, and for the last states if the physics diverges; None writes neither.
         record: Whether to write `<scenario>.rrd`.
         pace: Simulated seconds per second; None is as fast as possible. Changes no result.
-        listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`; they make the run
-            non-deterministic, and the verdict says so.
+        listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`. Unless the run waits for
+            them, they make it non-deterministic, and the verdict says so.
         network: How else the bus takes part in a network, instead of `listen`.
+        outside: Who takes part from other processes, and how the run keeps time with them.
         bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
@@ -172,29 +184,41 @@ def run(
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
     """
+    if network is None:
+        listen = outside.endpoints(listen)
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
     taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
     bag_tap = None if bag is None else BagTap(bag)
     bag_taps = [] if bag_tap is None else [bag_tap.on_sample]
-    parts = build(scenario, taps=[*taps, *bag_taps], listen=listen, network=network, crash_folder=out)
+    simulation = None
+    parts = build(
+        scenario,
+        taps=[*taps, *bag_taps],
+        listen=listen,
+        network=network,
+        outside=outside,
+        crash_folder=out,
+    )
     try:
         if bag_tap is not None:
             parts.bus.arrival_taps.append(bag_tap.on_arrival)
         if save_model is not None:
             _save_model(parts, save_model)
-        simulation = Run(scenario, parts, sink)
+        simulation = Run(scenario, parts, sink, outside)
         if sink is not None:
             sink.declare(parts.world)
         warm_up()
         wall, cpu = _loop(simulation, pace, progress)
-        verdict = _verdict(simulation, digest, wall, cpu, deterministic=not parts.bus.networked)
+        verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
     finally:
         if sink is not None:
             sink.close()
+        if simulation is not None and simulation.lockstep is not None:
+            simulation.lockstep.close()
         if bag_tap is not None:
             bag_tap.close()
         parts.bus.close()
@@ -254,7 +278,7 @@ def _refused(bus: Bus) -> dict[str, float]:
     return {f"refused_{reason.replace(' ', '_')}": float(n) for reason, n in sorted(bus.refused.items())}
 
 
-def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, deterministic: bool) -> Verdict:
+def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock: ClockMode) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
         stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None
@@ -272,7 +296,8 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, *, det
             **_refused(simulation.bus),
         },
         digest=digest.finish(simulation.world.state_digest()),
-        deterministic=deterministic,
+        deterministic=clock != "free" and not (simulation.lockstep and simulation.lockstep.surplus),
+        clock=clock,
         versions=versions(),
         cpu=cpu_class(),
     )

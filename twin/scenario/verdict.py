@@ -28,6 +28,8 @@ class Verdict:
     """SHA-256 over every published sample and the final physics state; None if the run was not finished."""
     deterministic: bool = True
     """False if something outside of the process could change the run."""
+    clock: Literal["inproc", "lockstep", "free"] = "inproc"
+    """Whose time counted: the run's alone, the run's with others that it waited for, everybody's own."""
     versions: Mapping[str, str] = field(default_factory=dict)
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
@@ -57,6 +59,7 @@ class Verdict:
             "metrics": dict(self.metrics),
             "digest": self.digest,
             "deterministic": self.deterministic,
+            "clock": self.clock,
             "versions": dict(self.versions),
             "cpu": self.cpu,
         }

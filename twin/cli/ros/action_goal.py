@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.ros.joining import Joining
+from twin.cli.ros.service_call import know
 from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
@@ -45,8 +46,9 @@ def send_goal(
     text = text_of(goal, stdin)
     with joining.open() as process, noted_signals() as signals:
         kind = _action_type(action_type)
-        message = message_of(kind.Goal, text)
         node = tool_node(process.bus, f"send_goal_{kind.name.replace('/', '_')}")
+        know(process, node, _used(kind.name, f"{absolute(action)}/_action"))
+        message = message_of(kind.Goal, text)
         client = ActionClient(node, kind, absolute(action))
         typer.echo("Waiting for an action server to become available...")
         _wait_for_server(process, client, kind.name, timeout, signals)
@@ -132,12 +134,19 @@ def _refuse_other_type(process: LiveBus, name: str, typename: str) -> None:
             raise BridgeError(f"the action {name} is of type {offered}, not {typename}")
 
 
+def _used(typename: str, base: str) -> dict[str, tuple[str, str]]:
+    """Return the parts of an action's type, and what carries them."""
+    return {
+        f"{typename}_Goal": (f"{base}/send_goal", f"{typename}_SendGoal"),
+        f"{typename}_Result": (f"{base}/get_result", f"{typename}_GetResult"),
+        f"{typename}_Feedback": (f"{base}/feedback", f"{typename}_FeedbackMessage"),
+    }
+
+
 def _action_type(name: str) -> Any:
     from twin.bridge import types
 
     package, kind, tail = types.parts(name if name.count("/") != 1 else name.replace("/", "/action/"))
     if kind != "action":
         raise BridgeError(f"{name} is no action; valid is for example example_interfaces/action/Fibonacci")
-    action_type = types.ActionType(f"{package}/action/{tail}")
-    types.get(f"{action_type.name}_Goal")
-    return action_type
+    return types.ActionType(f"{package}/action/{tail}")

@@ -1,0 +1,295 @@
+"""A node in another process takes part in a deterministic run: one digest, whoever runs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from twin import runtime
+from twin.errors import BridgeError, ScenarioError
+from twin.scenario.outside import Outside
+from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Verdict
+
+ROOT = Path(__file__).parents[2]
+NODES = Path(__file__).with_name("lockstep_nodes.py")
+DRIVE = """
+name: stepped
+seed: 3
+duration: 2 s
+robots: [{model: diff_bot}]
+checks: [{driven_distance: {min: 0.05 m}}]
+"""
+NAVIGATE = """
+name: navigated
+seed: 3
+duration: 8 s
+world: {arena: warehouse}
+robots:
+  - model: warehouse_bot
+    start: start
+    localisation: {type: amcl, map: warehouse}
+    navigation: {}
+checks: [{driven_distance: {min: 0.3 m}}]
+"""
+Start = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture
+def start(endpoint: str) -> Iterator[Start]:
+    """Return a function that starts `twin exec` on a factory of lockstep_nodes; all are ended."""
+    children: list[subprocess.Popen[str]] = []
+
+    def begin(factory: str, *, sleep_s: float = 0.0) -> subprocess.Popen[str]:
+        words = ["exec", f"{NODES}:{factory}", "--lockstep", "--connect", endpoint]
+        children.append(
+            subprocess.Popen(
+                [sys.executable, "-m", "twin.cli", *words],
+                cwd=ROOT,
+                env={**os.environ, "LOCKSTEP_TEST_SLEEP": str(sleep_s)},
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+        )
+        return children[-1]
+
+    yield begin
+    for child in children:
+        child.kill()
+        child.wait()
+        if child.stderr is not None and not child.stderr.closed:
+            sys.stderr.write(child.communicate()[1])
+
+
+@pytest.fixture
+def answer(endpoint: str) -> Iterator[Callable[..., None]]:
+    """Return a function that starts a program of Zenoh and struct alone; it is ended."""
+    children: list[subprocess.Popen[bytes]] = []
+
+    def begin(*, sleep_s: float = 0.0, silent_after: int = 0) -> None:
+        peer = Path(__file__).with_name("answering_peer.py")
+        words = [sys.executable, str(peer), endpoint, str(sleep_s), str(silent_after)]
+        children.append(subprocess.Popen(words))
+
+    yield begin
+    for child in children:
+        child.kill()
+        child.wait()
+
+
+def stepped(scenario: Scenario, endpoint: str, *names: str, timeout_s: float = 30.0) -> Verdict:
+    outside = Outside(wait_for=names, wait_timeout_s=timeout_s)
+    return runtime.run(scenario, record=False, listen=[endpoint], outside=outside)
+
+
+def in_process(scenario: Scenario, *factories: str) -> Verdict:
+    outside = Outside(nodes=tuple(f"{NODES}:{factory}" for factory in factories))
+    return runtime.run(scenario, record=False, outside=outside)
+
+
+def test_a_node_gives_the_same_digest_in_another_process(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(DRIVE)
+    expected = in_process(what, "controller")
+    assert expected.clock == "inproc"
+    for _ in range(3):
+        child = start("controller", sleep_s=0.004)
+        verdict = stepped(what, endpoint, "/controller")
+        assert verdict.digest == expected.digest
+        assert (verdict.verdict, verdict.clock, verdict.deterministic) == ("pass", "lockstep", True)
+        assert child.wait(20) == 0, "the end of the run ends the process"
+    assert runtime.run(what, record=False).digest != expected.digest, "the node makes a difference"
+
+
+@pytest.mark.slow
+def test_twenty_of_twenty_runs_with_a_slow_controller_have_one_digest(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(DRIVE.replace("2 s", "0.5 s").replace("0.05 m", "0.01 m"))
+    expected = in_process(what, "controller").digest
+    digests = []
+    for _ in range(20):
+        start("controller", sleep_s=0.2)
+        digests.append(stepped(what, endpoint, "/controller").digest)
+    assert digests == [expected] * 20
+
+
+def test_services_and_actions_between_two_processes(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(DRIVE)
+    expected = in_process(what, "server", "client")
+    assert expected.verdict == "pass", "the feedback drives the robot"
+    for order in (("client", "server"), ("server", "client")):
+        for factory in order:  # who comes first does not matter
+            start(factory, sleep_s=0.002)
+        assert stepped(what, endpoint, "/server", "/client").digest == expected.digest
+
+
+def test_the_names_of_two_nodes_of_one_process_step_it_once(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(DRIVE)
+    expected = in_process(what, "server", "client")
+    start("server")
+    start("client")
+    assert stepped(what, endpoint, "/listener", "/server", "/client").digest == expected.digest
+
+
+def test_a_program_that_answers_on_a_topic_gives_the_digest_of_a_node(
+    scenario: Callable[[str], Scenario], endpoint: str, answer: Callable[..., None]
+) -> None:
+    what = scenario(DRIVE)
+    expected = in_process(what, "answering")
+    for name in ("/cmd_vel", "/cmd_vel@/odom"):
+        answer(sleep_s=0.004)
+        verdict = stepped(what, endpoint, name)
+        assert verdict.digest == expected.digest
+        assert (verdict.clock, verdict.deterministic) == ("lockstep", True)
+
+
+def test_a_topic_without_an_answer_is_named(
+    scenario: Callable[[str], Scenario], endpoint: str, answer: Callable[..., None]
+) -> None:
+    answer(silent_after=10)
+    with pytest.raises(BridgeError, match=r"/cmd_vel had no answer to /odom in tick \d+ .*within 1 s"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel", timeout_s=1.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGINT])
+def test_a_node_that_fails_ends_the_run_with_its_name(
+    number: signal.Signals, scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    child = start("controller", sleep_s=0.02)
+    ticks = []
+
+    def fail_later(progress: runtime.Progress) -> None:
+        ticks.append(progress.time_s)
+        child.send_signal(number)
+
+    began = time.monotonic()
+    problem = "did not answer tick" if number == signal.SIGSTOP else "left the run without an answer to tick"
+    with pytest.raises(BridgeError, match=rf"the node /controller {problem} \d+ \(t = .* s\)"):
+        runtime.run(
+            scenario(DRIVE),
+            record=False,
+            listen=[endpoint],
+            outside=Outside(wait_for=("/controller",), wait_timeout_s=4.0),
+            progress=fail_later,
+        )
+    assert ticks, "the run had begun"
+    assert time.monotonic() - began < 25.0
+    if number == signal.SIGINT:
+        assert (child.wait(10), child.communicate()[1]) == (130, "")
+
+
+def test_an_exception_in_the_node_is_seen_on_both_sides(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    child = start("broken")
+    with pytest.raises(BridgeError, match="/controller left the run without an answer to tick 25"):
+        stepped(scenario(DRIVE), endpoint, "/controller")
+    assert "ZeroDivisionError" in child.communicate()[1]
+    assert child.returncode == 1
+
+
+def test_nobody_comes(scenario: Callable[[str], Scenario], endpoint: str) -> None:
+    with pytest.raises(BridgeError, match=r"no node /controller has joined within 0\.2 s"):
+        stepped(scenario(DRIVE), endpoint, "/controller", timeout_s=0.2)
+    with pytest.raises(BridgeError, match=r"nobody has joined who hears /odom and publishes /cmd_vel"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel", timeout_s=0.2)
+    with pytest.raises(BridgeError, match=r"no node of the run publishes /nothing"):
+        stepped(scenario(DRIVE), endpoint, "/cmd_vel@/nothing", timeout_s=0.2)
+
+
+def test_who_only_watches_changes_nothing(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    """A stranger listens, asks, commands the robot and sets parameters: it only gets answers."""
+    what = scenario(DRIVE)
+    expected = in_process(what, "controller")
+    child = start("controller", sleep_s=0.02)
+    stranger = subprocess.Popen(
+        [sys.executable, str(Path(__file__).with_name("stranger.py")), endpoint],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    try:
+        verdict = stepped(what, endpoint, "/controller")
+        heard = json.loads(stranger.communicate(timeout=20)[0])
+    finally:
+        stranger.kill()
+        stranger.wait()
+    assert verdict.digest == expected.digest
+    assert verdict.deterministic
+    assert heard["odom"] > 0
+    assert heard["commands"] > 0, "also what the process in lock-step publishes"
+    assert heard["nodes"].count("/controller") == 1
+    assert heard["parameters"] is not False
+    assert heard["set"] is False
+    assert child.wait(20) == 0
+
+
+@pytest.mark.slow
+def test_a_navigation_goal_from_another_process(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    what = scenario(NAVIGATE)
+    expected = in_process(what, "navigator")
+    start("navigator")
+    verdict = stepped(what, endpoint, "/navigator")
+    assert verdict.verdict == "pass", "the robot has driven"
+    assert verdict.digest == expected.digest
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ("nowhere.py:make", r"nowhere\.py: there is no such file; valid: FILE\.py:FUNCTION"),
+        (
+            f"{NODES}:contoller",
+            r"lockstep_nodes\.py: there is no function contoller; did you mean 'contr",
+        ),
+        (f"{NODES}:faulty", r"lockstep_nodes\.py:\d+: KeyError: 'gain'"),
+        (f"{NODES}:delay", r"lockstep_nodes\.py:?\d*: TypeError: delay\(\) takes 0 positional arguments"),
+        ("controller", r"controller names no nodes; valid: FILE\.py:FUNCTION"),
+    ],
+)
+def test_what_is_wrong_with_the_users_nodes(
+    place: str, message: str, scenario: Callable[[str], Scenario]
+) -> None:
+    with pytest.raises(BridgeError, match=message):
+        runtime.run(scenario(DRIVE), record=False, outside=Outside(nodes=(place,)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"free": True, "wait_for": ("/a",)}, "a run waits for others or does not"),
+        ({"wait_for": ("controller",)}, r"--wait-for controller: must be a node such as /controller"),
+        ({"wait_for": ("/cmd_vel@scan",)}, r"--wait-for /cmd_vel@scan: must be"),
+        ({"wait_for": ("/a",), "wait_timeout_s": 0.0}, "must be more than 0 s"),
+    ],
+)
+def test_options_that_contradict(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        Outside(**options)

@@ -1,0 +1,45 @@
+"""`twin exec`: the user's own nodes in a process of their own."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from twin.cli.ros.joining import Joining, joins
+
+
+@joins
+def execute(
+    place: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE.py:FACTORY",
+            help="A function that takes the bus and returns a node, or a list of them.",
+            show_default=False,
+        ),
+    ],
+    lockstep: Annotated[
+        bool, typer.Option("--lockstep", help="Be stepped by a run that waits for a node of this process.")
+    ] = False,
+    *,
+    joining: Joining,
+) -> None:
+    """Run nodes beside a simulation until it ends, or Ctrl-C.
+
+    Without --lockstep they run as soon as something arrives, by the wall clock or by /clock.
+    """
+    from twin.bridge.factory import create_nodes
+    from twin.cli.log import show_warnings
+
+    show_warnings()
+    if not lockstep:
+        with joining.open() as live:
+            create_nodes(live.bus, place)
+            live.spin()
+        return
+    from twin.bridge import lockstep as stepped
+
+    with stepped.join(joining.connect, config=joining.config, domain_id=joining.domain_id) as process:
+        create_nodes(process.bus, place)
+        process.spin()
