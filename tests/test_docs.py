@@ -34,7 +34,13 @@ PAGES = {
 }
 ALL_TEXT = "\n".join(page.read_text("utf-8") for page in PAGES.values())
 
-SLOW = {"README.md", "docs/getting-started.md", "docs/navigation.md", "docs/arenas.md", "docs/ros/commands.md"}
+SLOW = {
+    "README.md",
+    "docs/getting-started.md",
+    "docs/navigation.md",
+    "docs/arenas.md",
+    "docs/ros/commands.md",
+}
 """Pages whose commands take longer than some seconds."""
 
 NOT_RUN = {
