@@ -35,13 +35,20 @@ PAGES = {
 }
 ALL_TEXT = "\n".join(page.read_text("utf-8") for page in PAGES.values())
 
-SLOW = {"README.md", "docs/getting-started.md", "docs/navigation.md", "docs/arenas.md"}
+SLOW = {
+    "README.md",
+    "docs/getting-started.md",
+    "docs/navigation.md",
+    "docs/arenas.md",
+    "docs/ros/commands.md",
+}
 """Pages whose commands take longer than some seconds."""
 
 NOT_RUN = {
     r"make (?P<target>\w+)": "sets up an environment of its own: only its recipe is looked at",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
+    r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
