@@ -16,7 +16,7 @@ from twin.bridge.bags.player import Player, PlayerConfig
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.recorder import Recorder, RecorderConfig
 from twin.bridge.bags.topic_choice import TopicChoice
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import Clock, LaserScan, String, TFMessage, Twist, new, ns, stamp
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS

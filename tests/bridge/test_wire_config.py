@@ -18,8 +18,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
-from twin.bridge.router import RouterConfig, run_router
-from twin.bridge.session import SessionConfig, open_session
+from twin.bridge.wire.router import RouterConfig, run_router
+from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
 
 ROOT = Path(__file__).parents[2]

@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from twin.bridge import types, wire_ros2dds
-from twin.bridge.cdr import codec
+from twin.bridge import types
+from twin.bridge.cdr.codec import codec
 from twin.bridge.graph import EndpointInfo, parse_token, parse_tokens
-from twin.bridge.keys import Attachment, NodeToken, gid, pack_attachment, parse_attachment, topic_key
 from twin.bridge.msgs import String
 from twin.bridge.qos import (
     INFINITE_NS,
@@ -23,7 +22,9 @@ from twin.bridge.qos import (
     profile,
     qos_string,
 )
-from twin.bridge.wire_naming import Interface, mismatch, parse_key
+from twin.bridge.wire import ros2dds as wire_ros2dds
+from twin.bridge.wire.keys import Attachment, NodeToken, gid, pack_attachment, parse_attachment, topic_key
+from twin.bridge.wire.naming import Interface, mismatch, parse_key
 
 FIXTURES: dict[str, list[dict[str, Any]]] = json.loads(
     (Path(__file__).parent / "data" / "wire_fixtures.json").read_text("utf-8")

@@ -13,7 +13,7 @@ import pytest
 from tests.bridge.wire_peer import free_endpoint
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.interrupts import guard
+from twin.bridge.wire.interrupts import guard
 
 ROOT = Path(__file__).parents[2]
 
@@ -94,7 +94,7 @@ def test_a_run_that_others_may_join(tmp_path: Path) -> None:
 
 def test_an_interrupt_inside_a_callback_comes_with_the_next_spin() -> None:
     with Bus.open(Clock()) as bus:
-        from twin.bridge.session import direct
+        from twin.bridge.wire.session import direct
 
         seen: list[str] = []
 

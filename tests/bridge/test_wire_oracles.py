@@ -17,12 +17,12 @@ import pytest
 from tests.bridge.wire_peer import free_endpoint, wait_for
 from twin.bridge import types
 from twin.bridge.bus import Bus
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
-from twin.bridge.keys import mangle, topic_key
 from twin.bridge.msgs import String, Twist, Vector3
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.wire.keys import mangle, topic_key
 
 PYTHON = os.environ.get("TWIN_WIRE_ORACLE", "")
 pytestmark = pytest.mark.skipif(

@@ -13,16 +13,16 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import Arrival, ExternalQueue
-from twin.bridge.interrupts import guard
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_services import StandardServices
-from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
 from twin.bridge.wire import Wire
-from twin.bridge.wire_naming import Naming
-from twin.bridge.wire_ros2dds import bridge_token
+from twin.bridge.wire.external import Arrival, ExternalQueue
+from twin.bridge.wire.interrupts import guard
+from twin.bridge.wire.naming import Naming
+from twin.bridge.wire.ros2dds import bridge_token
+from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
 
 _EXTERNAL_DEPTH = 10_000

@@ -14,19 +14,20 @@ from typing import Any
 
 import zenoh
 
-from twin.bridge import ros_args, types
+from twin.bridge import types
 from twin.bridge.bus import Bus
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
-from twin.bridge.console_log import show_log
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
 from twin.bridge.node_options import NodeOptions
-from twin.bridge.program_arguments import parser_of, split
-from twin.bridge.session import SessionConfig, direct, endpoints
+from twin.bridge.programs import ros_args
+from twin.bridge.programs.arguments import parser_of, split
+from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
-from twin.bridge.wire_entrance import Entrance
-from twin.bridge.wire_naming import Interface
+from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.naming import Interface
+from twin.bridge.wire.session import SessionConfig, direct, endpoints
 from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from twin.bridge import live, types
-from twin.bridge.action_server import ActionServer, GoalHandle
 from twin.bridge.action_types import Fibonacci
-from twin.bridge.defaults import new
+from twin.bridge.actions.server import ActionServer, GoalHandle
 from twin.bridge.msgs import ParameterDescriptor
 from twin.bridge.srvs import AddTwoInts, Empty, SetBool
+from twin.bridge.types.default_values import new
 
 types.register("lab_interfaces/srv/Weigh", "string what\nuint8 times 1\n---\nfloat64 grams\n")
 types.register("lab_interfaces/action/Count", "uint8 up_to\n---\nuint8 last\n---\nuint8 now\n")

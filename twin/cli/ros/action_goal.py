@@ -13,7 +13,7 @@ from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
-    from twin.bridge.action_client import ActionClient, ClientGoal
+    from twin.bridge.actions.client import ActionClient, ClientGoal
     from twin.bridge.live import LiveBus
 
 _STATUS = {1: "ACCEPTED", 2: "EXECUTING", 3: "CANCELING", 4: "SUCCEEDED", 5: "CANCELED", 6: "ABORTED"}
@@ -39,9 +39,9 @@ def send_goal(
     joining: Joining,
 ) -> None:
     """Send a goal and wait for its result; Ctrl-C cancels the goal."""
-    from twin.bridge.action_client import ActionClient
+    from twin.bridge.actions.client import ActionClient
     from twin.bridge.live import noted_signals
-    from twin.bridge.yaml_messages import message_to_yaml
+    from twin.bridge.messages.as_yaml import message_to_yaml
 
     text = text_of(goal, stdin)
     with joining.open() as process, noted_signals() as signals:
@@ -83,7 +83,7 @@ def _follow(
     feedback: list[Any],
 ) -> None:
     """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
-    from twin.bridge.yaml_messages import message_to_yaml
+    from twin.bridge.messages.as_yaml import message_to_yaml
 
     def is_over() -> bool:
         while feedback:

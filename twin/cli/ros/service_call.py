@@ -41,7 +41,7 @@ def call(
     if rate is not None and not rate > 0.0:
         raise BridgeError(f"a rate of {rate} Hz; valid: rate must be greater than zero")
     text = text_of(values, stdin)
-    from twin.bridge.message_repr import message_repr
+    from twin.bridge.messages.as_repr import message_repr
 
     with joining.open() as process:
         srv_type = _service_type(service_type)
@@ -134,7 +134,7 @@ def know(process: LiveBus, node: Node, used: dict[str, tuple[str, str]]) -> None
     """
     from twin.bridge import types
     from twin.bridge.graph import Graph
-    from twin.bridge.topic_types import is_known, learn_type
+    from twin.bridge.tools.unknown_types import is_known, learn_type
 
     unknown_types = [part for part in used if not is_known(part)]
     endpoints = Graph.snapshot(process.bus).endpoints if unknown_types else ()
