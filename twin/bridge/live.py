@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 import threading
 import time
@@ -26,12 +24,12 @@ from twin.bridge.programs.arguments import parser_of, split
 from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
 from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.interrupts import noted_signals
+from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.naming import Interface
-from twin.bridge.wire.session import SessionConfig, direct, endpoints
-from twin.errors import BridgeError, TwinError
+from twin.bridge.wire.session import direct
+from twin.errors import TwinError
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-"""Where rmw_zenoh expects a router."""
 _LONGEST_WAIT_S = 0.1
 
 
@@ -125,7 +123,7 @@ def join(
         connect: Endpoints of a run, a router or any rmw_zenoh peer; None: TWIN_CONNECT, or where rmw_zenoh
             expects a router.
         listen: Endpoints where others may connect; then the process is a peer that needs nobody.
-        config: Zenoh configuration file, as rmw_zenoh's ZENOH_SESSION_CONFIG_URI, which is the default.
+        config: Zenoh configuration file; None: ZENOH_SESSION_CONFIG_URI, as rmw_zenoh.
         domain_id: Default: ROS_DOMAIN_ID, or 0.
         use_sim_time: Whether the clock follows `/clock` instead of the wall clock.
         timeout_s: How long to try to connect [s].
@@ -134,21 +132,8 @@ def join(
     Raises:
         BridgeError: nobody answers, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
     """
-    file = config or _path(os.environ.get("ZENOH_SESSION_CONFIG_URI"))
-    if connect is None:
-        connect = (
-            ()
-            if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
-            else (os.environ.get("TWIN_CONNECT") or DEFAULT_ENDPOINT,)
-        )
-    session = SessionConfig(
-        mode="peer" if listen else "client",
-        wire=wire,
-        listen=tuple(listen),
-        connect=tuple(connect),
-        file=file,
-        timeout_s=timeout_s,
-        domain_id=domain_id_of(domain_id),
+    session = session_to_join(
+        connect, listen=listen, config=config, domain_id=domain_id, timeout_s=timeout_s, wire=wire
     )
     clock = Clock()
     with Bus.of(session, clock) as bus:
@@ -184,38 +169,3 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
         parser.exit(2, f"error: {fault}\n")
     except KeyboardInterrupt:
         parser.exit(130)
-
-
-@contextmanager
-def noted_signals() -> Iterator[list[int]]:
-    """Note SIGINT and SIGTERM, so that a program can end between two spins; a second one ends it at once."""
-    received: list[int] = []
-
-    def note(number: int, frame: object) -> None:
-        received.append(number)
-        signal.signal(number, before[signal.Signals(number)])
-
-    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield received
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
-
-
-def _path(text: str | None) -> Path | None:
-    return Path(text) if text else None
-
-
-def domain_id_of(given: int | None) -> int:
-    """Return the domain that was given, else ROS_DOMAIN_ID.
-
-    Raises:
-        BridgeError: ROS_DOMAIN_ID is no number from 0 to 232.
-    """
-    if given is not None:
-        return given
-    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-    if not text.isdecimal() or int(text) > 232:
-        raise BridgeError(f"ROS_DOMAIN_ID is {text!r}; valid is a number from 0 to 232")
-    return int(text)

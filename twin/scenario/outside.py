@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from twin.bridge.wire import DEFAULT_ENDPOINT
 from twin.errors import ScenarioError
 
 ClockMode = Literal["inproc", "lockstep", "free"]
 """Whose time counts: the run's alone, the run's with others that it waits for, everybody's own."""
-
-
-_NAME = re.compile(r"(/\w+)+(@(/\w+)+)?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +53,6 @@ class Outside:
 
     def endpoints(self, listen: Sequence[str]) -> tuple[str, ...]:
         """Return where to listen: where asked to, else where rmw_zenoh looks if others are to come."""
-        from twin.bridge.live import DEFAULT_ENDPOINT  # heavy
-
         return tuple(listen) or ((DEFAULT_ENDPOINT,) if self.free or self.wait_for else ())
 
     @property

@@ -15,11 +15,11 @@ import zenoh
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.live import DEFAULT_ENDPOINT, domain_id_of
 from twin.bridge.lockstep.protocol import STEP, node_token, requests, responses, run_token, step_key
 from twin.bridge.lockstep.recorder import Recorder
 from twin.bridge.msgs import ns
 from twin.bridge.node_services import StandardServices
+from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.keys import pack_attachment, parse_attachment
 from twin.bridge.wire.session import SessionConfig, direct, open_session
 from twin.errors import BridgeError
@@ -125,7 +125,7 @@ def join(
     """Take part in a run that waits for this process's nodes, and leave it at the end.
 
     Args:
-        connect: Where the run listens; None: where rmw_zenoh expects a router.
+        connect: Where the run listens; None: TWIN_CONNECT, or where rmw_zenoh expects a router.
         config: Zenoh configuration file; default: ZENOH_SESSION_CONFIG_URI.
         domain_id: Default: ROS_DOMAIN_ID, or 0.
         timeout_s: How long to look for the run [s] of wall time.
@@ -133,15 +133,11 @@ def join(
     Raises:
         BridgeError: there is no run, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
     """
-    uri = os.environ.get("ZENOH_SESSION_CONFIG_URI")
-    file = config or (Path(uri) if uri else None)
-    if connect is None:
-        connect = () if file else (DEFAULT_ENDPOINT,)
-    domain = domain_id_of(domain_id)
-    network = _connected(SessionConfig(mode="client", connect=tuple(connect), file=file), timeout_s)
+    session = session_to_join(connect, config=config, domain_id=domain_id)
+    network = _connected(session, timeout_s)
     try:
         clock = Clock()
-        with Bus.open(clock, domain_id=domain) as bus:
+        with Bus.open(clock, domain_id=session.domain_id) as bus:
             bus.standard_services = StandardServices(at_once=True)  # others may want to ask
             bus.skip_ids(_FIRST_ID + _IDS * os.getpid())
             yield LockstepProcess(bus, clock, network)

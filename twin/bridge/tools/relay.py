@@ -9,14 +9,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from twin.bridge import types
 from twin.bridge.graph import EndpointInfo, Graph
 from twin.bridge.qos import QoS
 from twin.bridge.raw import RawSample, RawSubscription
+from twin.bridge.raw_publisher import Presence, RawPublisher
 from twin.bridge.tools.unknown_types import hash_of, same_hash
-from twin.bridge.topics import declare_publisher
-from twin.bridge.wire.keys import EndpointKind, gid, pack_attachment
-from twin.bridge.wire.naming import Interface
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -26,57 +23,6 @@ Gate = Callable[[int, int], bool]
 """Says of a message, by the time [ns] and its size [bytes], whether it may pass."""
 
 _RELAY_DEPTH = 10
-
-
-class Presence:
-    """An endpoint's token in the graph, for what reads or writes bytes; without it others do not see it."""
-
-    def __init__(
-        self, node: Node, kind: EndpointKind, name: str, typename: str, type_hash: str, qos: QoS
-    ) -> None:
-        bus = node.bus
-        dds_name = types.dds_name(typename) if typename.count("/") == 2 else typename
-        self.interface = Interface(name, dds_name, type_hash)
-        token = node.token.endpoint(bus.next_id(), kind, name, dds_name, bus.naming.type_hash(type_hash), qos)
-        self.gid = gid(token)
-        spelled = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
-        self._token: Any = None if spelled is None else bus.session.liveliness().declare_token(spelled)
-        node.add_endpoint(self)
-
-    def destroy(self) -> None:
-        """Leave the graph. Harmless when repeated."""
-        if self._token is not None:
-            self._token.undeclare()
-            self._token = None
-
-
-class RawPublisher:
-    """Publishes bytes as messages of a type that need not be known here."""
-
-    def __init__(self, node: Node, topic: str, typename: str, type_hash: str, qos: QoS) -> None:
-        self.name = topic
-        self.type = typename
-        self.type_hash = type_hash
-        self.qos = qos
-        self._bus = node.bus
-        self._sequence = 0
-        self._presence = Presence(node, "MP", topic, typename, type_hash, qos)
-        key = self._bus.naming.key(self._presence.interface)
-        self._zenoh: Any = declare_publisher(self._bus.session, key, qos)
-        node.add_endpoint(self)
-
-    def publish(self, payload: bytes) -> None:
-        """Publish CDR at the clock's time."""
-        self._sequence += 1
-        attachment = pack_attachment(self._sequence, self._bus.clock.now_ns, self._presence.gid)
-        self._zenoh.put(payload, attachment=attachment)
-
-    def destroy(self) -> None:
-        """Leave the graph. Harmless when repeated."""
-        self._presence.destroy()
-        if self._zenoh is not None:
-            self._zenoh.undeclare()
-            self._zenoh = None
 
 
 class Relay:

@@ -7,3 +7,6 @@ from typing import Literal, get_args
 Wire = Literal["rmw_zenoh", "humble", "ros2dds"]
 """rmw_zenoh of Jazzy and later; rmw_zenoh of Humble, which has no type hashes; zenoh-bridge-ros2dds."""
 WIRES: tuple[Wire, ...] = get_args(Wire)
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+"""Where rmw_zenoh expects a router."""

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from twin.bridge.live import DEFAULT_ENDPOINT
+from twin.bridge.wire import DEFAULT_ENDPOINT
 from twin.bridge.wire.session import SessionConfig, endpoints, open_session
 
 

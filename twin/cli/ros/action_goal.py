@@ -40,8 +40,8 @@ def send_goal(
 ) -> None:
     """Send a goal and wait for its result; Ctrl-C cancels the goal."""
     from twin.bridge.actions.client import ActionClient
-    from twin.bridge.live import noted_signals
     from twin.bridge.messages.as_yaml import message_to_yaml
+    from twin.bridge.wire.interrupts import noted_signals
 
     text = text_of(goal, stdin)
     with joining.open() as process, noted_signals() as signals:

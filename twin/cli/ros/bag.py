@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,6 +42,7 @@ def record(
     from twin.bridge.bags.recorder import Recorder, RecorderConfig
     from twin.bridge.bags.topic_choice import TopicChoice
     from twin.bridge.bags.writer import BagConfig, as_storage
+    from twin.bridge.wire.interrupts import noted_signals
     from twin.cli.folders import bag_folder
 
     if not (topics or everything or regex):
@@ -56,11 +55,11 @@ def record(
         bag=BagConfig(storage=as_storage(storage), compression=as_compression(compression)),
     )
     folder = output or bag_folder()
-    with until_signal() as stopped, joining.open() as process:
+    with joining.open() as process, noted_signals() as signals:
         recorder = Recorder(process.bus, folder, config)
         _tell([f"recording to {folder}; Ctrl-C ends it"])
         try:
-            while not stopped():
+            while not signals:
                 process.spin_once()
                 recorder.update()
         finally:
@@ -103,6 +102,7 @@ def play(
     from twin.bridge.bags.player import Player, PlayerConfig
     from twin.bridge.bags.reader import BagReader
     from twin.bridge.bags.topic_choice import TopicChoice
+    from twin.bridge.wire.interrupts import noted_signals
 
     config = PlayerConfig(
         rate=rate,
@@ -118,10 +118,10 @@ def play(
     )
     with BagReader(bag) as reader:
         _tell(reader.notices)
-        with until_signal() as stopped, joining.open() as process:
+        with joining.open() as process, noted_signals() as signals:
             player = Player(reader, process, config)
             _tell(f"{topic} is left out: the hash of its type is not known" for topic in player.left_out)
-            player.play(stopped)
+            player.play(lambda: bool(signals))
 
 
 @app.command(no_args_is_help=True, epilog="Example: [bold]twin bag info drive[/bold]")
@@ -165,22 +165,6 @@ def convert(
     )
     _tell(done.notices)
     typer.echo(f"{done.messages} messages on {done.topics} topics in {output}")
-
-
-@contextmanager
-def until_signal() -> Iterator[Callable[[], bool]]:
-    """Yield a function that tells whether Ctrl-C or SIGTERM came: the work at hand is finished first."""
-    came: list[int] = []
-
-    def note(number: int, _frame: Any) -> None:
-        came.append(number)
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(came)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _losses(recorder: Any) -> Iterator[str]:

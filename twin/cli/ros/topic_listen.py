@@ -66,7 +66,7 @@ class Listener:
     def listen(self, qos: QoS, callback: Callable[[RawSample], Any]) -> None:
         """Call back for every sample of the topic's type."""
         from twin.bridge.raw import RawSubscription
-        from twin.bridge.tools.relay import Presence
+        from twin.bridge.raw_publisher import Presence
 
         node = self._process.node
         Presence(node, "MS", self.name, self._type, self._type_hash, qos)
