@@ -7,10 +7,8 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -21,6 +19,7 @@ import yaml
 from PIL import Image
 from typer.main import get_command
 
+from tests.processes import free_endpoint, wait_for_listener
 from twin.cli import app as app_module
 from twin.models import load
 from twin.models.catalogue import catalogue
@@ -92,11 +91,10 @@ class Reader:
         self.folder = folder
         for name in ("scenarios", "examples"):
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = str(probe.getsockname()[1])
+        self.endpoint = free_endpoint()
+        self.port = self.endpoint.rpartition(":")[2]
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        here = {"PATH": path, "COLUMNS": "200", "TWIN_CONNECT": f"tcp/127.0.0.1:{self.port}"}
+        here = {"PATH": path, "COLUMNS": "200", "TWIN_CONNECT": self.endpoint}
         self.environment = {**os.environ, **here}
         self.background: list[tuple[subprocess.Popen[str], list[str]]] = []
 
@@ -106,7 +104,7 @@ class Reader:
     def type(self, command: str, output: list[str]) -> None:
         if "--listen" in command:
             self.background.append((self._start(command), output))
-            self._wait_for_port()
+            wait_for_listener(self.endpoint)
         else:
             self._judge(command, self._start(command), output)
 
@@ -135,15 +133,6 @@ class Reader:
             assert found, (
                 f"{command}\nshould print {line!r}, and after the lines before it; it prints\n{printed}"
             )
-
-    def _wait_for_port(self) -> None:
-        deadline = time.monotonic() + 60
-        while True:
-            with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", int(self.port))) == 0:
-                    return
-            assert time.monotonic() < deadline, "nobody listens"
-            time.sleep(0.05)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import statistics
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import zenoh
 
+from tests.processes import free_endpoint
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Odometry, Twist, new
@@ -38,12 +38,6 @@ with zenoh.open(config) as session:
     print("ready", flush=True)
     sys.stdin.read()
 """
-
-
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def median(call: Callable[[int], None]) -> float:
@@ -84,7 +78,7 @@ def in_process() -> float:
 
 
 def lock_step() -> float:
-    clock, where = Clock(), endpoint()
+    clock, where = Clock(), free_endpoint()
     words = [sys.executable, "-m", "twin.cli", "exec", NODE, "--lockstep", "--connect", where]
     with Bus.open(clock, listen=[where], session="twin") as bus, subprocess.Popen(words, cwd=ROOT) as child:
         lockstep = Lockstep(bus, Outside(wait_for=("/answering",), wait_timeout_s=60.0))
@@ -96,7 +90,7 @@ def lock_step() -> float:
 
 def bare_get() -> float:
     """Return the median time [s] of a request of /odom's size and a response of /cmd_vel's."""
-    where = endpoint()
+    where = free_endpoint()
     config = zenoh.Config()
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("listen/endpoints", json.dumps([where]))

@@ -9,13 +9,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from tests.bridge import bag_helpers as bags
+from tests.processes import wait_for
 from twin.bridge import live
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.cdr.codec import codec
@@ -77,15 +78,8 @@ def recording(talker: Talker, folder: Path, *arguments: str) -> subprocess.Popen
         stderr=subprocess.PIPE,
         text=True,
     )
-    wait(lambda: any(f.stat().st_size > 4000 for f in folder.glob("*_0.*")))
+    wait_for(lambda: any(f.stat().st_size > 4000 for f in folder.glob("*_0.*")))
     return process
-
-
-def wait(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, "the other process did nothing"
-        time.sleep(0.01)
 
 
 def texts(path: Path) -> list[int]:
@@ -114,7 +108,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(
 ) -> None:
     with recording(talker, tmp_path / "bag", "chatter", "--storage", storage) as process:
         begun = time.time_ns()
-        wait(lambda: time.time_ns() - begun > 800_000_000)
+        wait_for(lambda: time.time_ns() - begun > 800_000_000)
         killed = time.time_ns()
         os.kill(process.pid, signal.SIGKILL)
         process.wait(20)
@@ -135,7 +129,7 @@ def test_a_bag_is_played_into_the_graph(talker: Talker, tmp_path: Path) -> None:
         "--connect", talker.endpoint, "--domain", "0",
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
-    wait(lambda: len(talker.heard) == bags.COUNT)
+    wait_for(lambda: len(talker.heard) == bags.COUNT)
     assert talker.heard == [f"Hello World: {number}" for number in range(bags.COUNT)]
 
 
@@ -144,7 +138,7 @@ def test_playing_is_ended_by_a_signal(talker: Talker, tmp_path: Path) -> None:
     talker.heard.clear()
     arguments = ["play", str(path), "--loop", "-m", "chatter:=again", "--connect", talker.endpoint]
     with subprocess.Popen([*CLI, *arguments, "--domain", "0"], stderr=subprocess.PIPE, text=True) as process:
-        wait(lambda: len(talker.heard) > 3)
+        wait_for(lambda: len(talker.heard) > 3)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=20)
     assert (process.returncode, err) == (0, "")

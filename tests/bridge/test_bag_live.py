@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.bridge import bag_helpers as bags
+from tests.processes import free_endpoint
 from twin.bridge import live
 from twin.bridge.bags.player import Player, PlayerConfig
 from twin.bridge.bags.reader import BagReader
@@ -29,9 +29,7 @@ Both = tuple[LiveBus, LiveBus]
 @pytest.fixture
 def both() -> Iterator[Both]:
     """A process that listens, and one that is connected to it."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     with ExitStack() as stack:
         here = stack.enter_context(live.join([], listen=[endpoint], domain_id=0))
         yield here, stack.enter_context(live.join([endpoint], domain_id=0))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import socket
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from typing import Any
 import pytest
 
 from tests.bridge import bag_helpers as bags
+from tests.processes import free_endpoint
 from twin.bridge import live
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.replay import replay
@@ -174,9 +174,7 @@ def test_a_bag_without_turns_needs_the_outputs_named(tmp_path: Path) -> None:
 
 
 def test_a_run_from_outside_is_in_the_bag(tmp_path: Path) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     clock = Clock()
     with Bus.open(clock, listen=[endpoint]) as bus, live.join([endpoint]) as other:
         tap = BagTap(tmp_path / "bag")

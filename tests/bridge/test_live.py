@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 import pytest
@@ -16,13 +15,6 @@ from twin.bridge.qos import LATCHED
 from twin.bridge.raw import RawSample, RawSubscription
 from twin.bridge.srvs import AddTwoInts
 from twin.errors import BridgeError
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def test_two_processes_talk_through_a_run(endpoint: str) -> None:

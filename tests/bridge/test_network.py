@@ -1,14 +1,13 @@
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.processes import wait_for
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import String, Twist
@@ -17,13 +16,6 @@ from twin.bridge.srvs import AddTwoInts
 from twin.errors import BridgeError
 
 PEER = Path(__file__).with_name("raw_peer.py")
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture
@@ -36,14 +28,6 @@ def _peer(endpoint: str, what: str) -> subprocess.Popen[str]:
     return subprocess.Popen([sys.executable, str(PEER), endpoint, what], stdout=subprocess.PIPE, text=True)
 
 
-def _wait(condition: Callable[[], bool]) -> None:
-    """Poll without time in the test's result: only for what another process does."""
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, "the other process did nothing"
-        time.sleep(0.002)
-
-
 def test_another_process_drives(open_bus: Bus, endpoint: str) -> None:
     node = open_bus.create_node("base")
     got: list[float] = []
@@ -52,7 +36,7 @@ def test_another_process_drives(open_bus: Bus, endpoint: str) -> None:
         assert peer.wait(20) == 0
     open_bus.spin()
     assert got == []  # nothing enters between admissions
-    _wait(lambda: open_bus.external.waiting == 3)
+    wait_for(lambda: open_bus.external.waiting == 3)
     assert open_bus.admit() == 3
     open_bus.spin()
     assert got == [1.0, 2.0, 1.5]  # by source, then sequence; not by arrival
@@ -74,7 +58,7 @@ def test_garbage_from_outside_is_counted_and_reported(
 
     with _peer(endpoint, "garbage") as peer:
         assert peer.wait(20) == 0
-        _wait(step)
+        wait_for(step)
     open_bus.admit()
     assert dict(open_bus.refused) == {"attachment": 2, "payload": 3, "type hash": 1, "type": 1}
     assert got == [7.0]
@@ -95,7 +79,7 @@ def test_another_process_calls_a_service(open_bus: Bus, endpoint: str) -> None:
             open_bus.spin()
             return peer.poll() is not None
 
-        _wait(step)
+        wait_for(step)
         assert peer.stdout is not None
         assert peer.stdout.read() == "42\n"
         assert peer.returncode == 0
@@ -104,7 +88,7 @@ def test_another_process_calls_a_service(open_bus: Bus, endpoint: str) -> None:
 def test_another_process_listens(open_bus: Bus, endpoint: str) -> None:
     publisher = open_bus.create_node("talker").create_publisher(String, "chatter")
     with _peer(endpoint, "listen") as peer:
-        _wait(lambda: publisher.has_subscribers)
+        wait_for(lambda: publisher.has_subscribers)
         publisher.publish(String("hi"))
         assert peer.stdout is not None
         assert peer.stdout.read() == "00010000" + "03000000" + "686900" + " 33\n"
@@ -117,7 +101,7 @@ def test_two_buses_meet(endpoint: str) -> None:
         talker = there.create_node("talker")
         talker.create_publisher(String, "map", LATCHED).publish(String("the map"))
         publisher = talker.create_publisher(String, "chatter")
-        _wait(lambda: publisher.has_subscribers)
+        wait_for(lambda: publisher.has_subscribers)
         publisher.publish(String("hello"))
 
         def step() -> bool:
@@ -125,7 +109,7 @@ def test_two_buses_meet(endpoint: str) -> None:
             here.spin()
             return bool(got)
 
-        _wait(step)
+        wait_for(step)
         assert got == ["hello"]
         here.create_node("late").create_subscription(String, "map", lambda m: got.append(m.data), LATCHED)
 
@@ -133,7 +117,7 @@ def test_two_buses_meet(endpoint: str) -> None:
             step()
             return len(got) > 1
 
-        _wait(latched)
+        wait_for(latched)
         assert got == ["hello", "the map"]
         assert here.session_id != there.session_id
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Generator
 from typing import Any
 
 import numpy as np
-import pytest
 
 from twin.bridge import live
 from twin.bridge.action_types import Fibonacci
@@ -16,13 +14,6 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.parameters.values import Parameter
 from twin.bridge.srvs import ListParameters, SetParameters
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def both(run: Bus, process: live.LiveBus, until: Any) -> None:

@@ -22,12 +22,11 @@ from tests.bridge.wire_peer import (
     STRING,
     STRING_HASH,
     attachment,
-    free_endpoint,
     matched,
     raw_session,
     string,
-    wait_for,
 )
+from tests.processes import wait_for
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
@@ -38,11 +37,6 @@ from twin.bridge.srvs import AddTwoInts
 from twin.bridge.wire.external import ExternalQueue
 
 CHATTER = f"{STRING}/{STRING_HASH}"
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.bridge.wire_peer import free_endpoint, raw_session, wait_for
+from tests.bridge.wire_peer import raw_session
+from tests.processes import free_endpoint, wait_for
 from twin.bridge import live
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
@@ -23,11 +24,6 @@ from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 def _config(path: Path, **settings: object) -> Path:

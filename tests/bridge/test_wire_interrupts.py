@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.bridge.wire_peer import free_endpoint
+from tests.processes import free_endpoint
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.wire.interrupts import guard

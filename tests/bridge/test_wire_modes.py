@@ -16,12 +16,11 @@ from tests.bridge.wire_peer import (
     STRING,
     STRING_HASH,
     attachment,
-    free_endpoint,
     matched,
     raw_session,
     string,
-    wait_for,
 )
+from tests.processes import wait_for
 from twin.bridge import live
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions.client import ActionClient
@@ -43,11 +42,6 @@ KEYS = {
     "ros2dds": "chatter",
 }
 REQUESTS = {"rmw_zenoh": f"{ADD}/{ADD_HASH}", "humble": f"{ADD}/TypeHashNotSupported", "ros2dds": "add"}
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 @pytest.fixture(params=WIRES)

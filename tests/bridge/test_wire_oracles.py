@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.bridge.wire_peer import free_endpoint, wait_for
+from tests.processes import wait_for
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import codec
@@ -28,11 +28,6 @@ PYTHON = os.environ.get("TWIN_WIRE_ORACLE", "")
 pytestmark = pytest.mark.skipif(
     not Path(PYTHON or "-").exists(), reason="TWIN_WIRE_ORACLE names no python; make oracle"
 )
-
-
-@pytest.fixture
-def endpoint() -> str:
-    return free_endpoint()
 
 
 @pytest.fixture

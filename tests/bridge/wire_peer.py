@@ -1,26 +1,20 @@
-"""What other programs do on the wire, made of Zenoh alone; and how tests wait for them."""
+"""What other programs do on the wire, made of Zenoh alone."""
 
 from __future__ import annotations
 
 import json
-import socket
 import struct
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import zenoh
+
+from tests.processes import wait_for
 
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 STRING = "0/chatter/std_msgs::msg::dds_::String_"
 ADD_HASH = "RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a"
 ADD = "0/add/example_interfaces::srv::dds_::AddTwoInts_"
-
-
-def free_endpoint(protocol: str = "tcp") -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @contextmanager
@@ -47,13 +41,6 @@ def string(text: str) -> bytes:
 
 def attachment(sequence: int, gid: bytes = b"g" * 16) -> bytes:
     return struct.pack("<qqB", sequence, 123, 16) + gid
-
-
-def wait_for(condition: Callable[[], object], seconds: float = 15.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "nothing happened in time"
-        time.sleep(0.002)
 
 
 def matched(session: zenoh.Session, key: str) -> zenoh.Publisher:

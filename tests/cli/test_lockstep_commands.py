@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.processes import wait_for
 
 ROOT = Path(__file__).parents[2]
 NODES = ROOT / "tests" / "runtime" / "lockstep_nodes.py"
@@ -27,13 +27,6 @@ Twin = Callable[..., subprocess.Popen[str]]
 
 
 @pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-@pytest.fixture
 def twin(tmp_path: Path) -> Iterator[Twin]:
     """Return a function that starts `twin` in a folder with `driven.yaml`; all are ended."""
     children: list[subprocess.Popen[str]] = []
@@ -45,7 +38,7 @@ def twin(tmp_path: Path) -> Iterator[Twin]:
             subprocess.Popen(
                 [sys.executable, "-m", "twin.cli", *words],
                 cwd=tmp_path,
-                env={**os.environ, "PYTHONPATH": str(ROOT), "LOCKSTEP_TEST_SIGN": str(tmp_path / "sign")},
+                env={**os.environ, "LOCKSTEP_TEST_SIGN": str(tmp_path / "sign")},
                 text=True,
                 **pipes,
             )
@@ -116,10 +109,7 @@ def test_one_ends_the_other(
     words = ("--wait-for", "/controller", "--listen", endpoint, "--pace", "1", "--wait-timeout", "60")
     node = twin("exec", f"{NODES}:controller", "--lockstep", "--connect", endpoint)
     run = twin("run", "driven.yaml", "--no-record", "--out", "o", *words, duration="60 s")
-    deadline = time.monotonic() + 60
-    while not (tmp_path / "sign").exists():
-        assert time.monotonic() < deadline, "the node was never stepped"
-        time.sleep(0.02)
+    wait_for((tmp_path / "sign").exists, 60.0)
     (run if who == "run" else node).send_signal(number)
     errors = run.communicate(timeout=20)[1] + node.communicate(timeout=20)[1]
     assert "Traceback" not in errors

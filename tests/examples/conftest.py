@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -15,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.processes import wait_for_listener
 from twin.cli.app import run_app
 
 ROOT = Path(__file__).parents[2]
@@ -27,7 +26,6 @@ class Program:
         self.process = subprocess.Popen(
             [sys.executable, *command],
             cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -77,20 +75,13 @@ Start = Callable[..., Program]
 
 
 @pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-@pytest.fixture
 def start(endpoint: str) -> Iterator[Start]:
     """Start an example; the first one listens, the others connect to it. They end with the test."""
     programs: list[Program] = []
 
     def begin(name: str, *arguments: str) -> Program:
         if programs:
-            _wait_for_port(endpoint)
+            wait_for_listener(endpoint)
         how = "--connect" if programs else "--listen"
         programs.append(Program(f"examples/{name}.py", how, endpoint, *arguments))
         return programs[-1]
@@ -116,14 +107,3 @@ def command(
         return ended.value.code, captured.out, captured.err
 
     return run
-
-
-def _wait_for_port(endpoint: str) -> None:
-    port = int(endpoint.rpartition(":")[2])
-    deadline = time.monotonic() + 20.0
-    while True:
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) == 0:
-                return
-        assert time.monotonic() < deadline, "the first program does not listen"
-        time.sleep(0.01)

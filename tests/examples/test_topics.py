@@ -17,7 +17,7 @@ def test_the_listener_hears_the_talker_and_both_end_with_ctrl_c(start: Start) ->
 
 def test_a_program_without_a_graph_says_so_in_one_line(endpoint: str) -> None:
     command = [sys.executable, "examples/talker.py", "--connect", endpoint]
-    done = subprocess.run(command, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.startswith(f"error: nobody answers at {endpoint}; start ")
     assert done.stderr.count("\n") == 1
@@ -25,6 +25,6 @@ def test_a_program_without_a_graph_says_so_in_one_line(endpoint: str) -> None:
 
 def test_a_program_explains_its_arguments() -> None:
     command = [sys.executable, "examples/talker.py", "--help"]
-    done = subprocess.run(command, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert "Say Hello World on /chatter, once in a period [s]." in done.stdout
     assert "--period FLOAT" in done.stdout

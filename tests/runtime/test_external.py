@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -23,10 +22,7 @@ checks:
 """
 
 
-def test_another_process_drives_the_robot_and_listens(tmp_path: Path) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+def test_another_process_drives_the_robot_and_listens(tmp_path: Path, endpoint: str) -> None:
     (tmp_path / "outside.yaml").write_text(SCENARIO, encoding="utf-8")
     words = [
         "run",
@@ -73,7 +69,7 @@ def test_another_process_drives_the_robot_and_listens(tmp_path: Path) -> None:
     assert abs(last["t"] - clock[-1]) < 0.1
 
 
-def test_without_listen_the_same_run_stands_still_and_is_deterministic(tmp_path: Path) -> None:
+def test_without_listen_the_same_run_stands_still_and_is_deterministic(tmp_path: Path, endpoint: str) -> None:
     (tmp_path / "alone.yaml").write_text(SCENARIO.replace("min: 0.2 m", "min: 0 m"), encoding="utf-8")
     words = ["run", "alone.yaml", "--no-record", "--json", "--out", "out"]
     done = subprocess.run(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -43,13 +42,6 @@ robots:
 checks: [{driven_distance: {min: 0.3 m}}]
 """
 Start = Callable[..., subprocess.Popen[str]]
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture
@@ -234,7 +226,6 @@ def test_who_only_watches_changes_nothing(
         [sys.executable, str(Path(__file__).with_name("stranger.py")), endpoint],
         stdout=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     try:
         verdict = stepped(what, endpoint, "/controller")

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.processes import free_endpoint
 
 GRAPH = Path(__file__).with_name("some_graph.py")
 ROOT = Path(__file__).parents[3]
@@ -22,15 +21,12 @@ Twin = Callable[..., subprocess.CompletedProcess[str]]
 def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
     """A process with some nodes (some_graph.py, or what the module names as GRAPH), and where it listens."""
     graph = GRAPH.with_name(getattr(request.module, "GRAPH", GRAPH.name))
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    address = free_endpoint()
     with subprocess.Popen(
         [sys.executable, str(graph), address],
         stdout=subprocess.PIPE,
         stdin=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},  # of this checkout, wherever the package is installed
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -58,11 +54,3 @@ def twin_here(endpoint: str, invoke: Callable[..., tuple[int, str, str]]) -> Twi
         return subprocess.CompletedProcess(arguments, *invoke(*arguments, "--connect", endpoint))
 
     return run
-
-
-def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
-    """Poll for what another process does."""
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, "the other process did nothing"
-        time.sleep(0.005)

@@ -3,33 +3,15 @@
 from __future__ import annotations
 
 import re
-import socket
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
-
-import pytest
 
 Twin = Callable[..., subprocess.CompletedProcess[str]]
 
 
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    """A process that publishes transforms (some_transforms.py), and where it listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    script = Path(__file__).with_name("some_transforms.py")
-    with subprocess.Popen(
-        [sys.executable, str(script), address], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        yield address
-        process.communicate()
-    assert process.returncode == 0
+GRAPH = "some_transforms.py"
 
 
 def test_tree(twin: Twin) -> None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import signal
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+from tests.processes import wait_for_listener
 
 SCENARIO = """
 name: open_floor
@@ -46,14 +46,11 @@ def positions(echo: subprocess.Popen[str]) -> Iterator[tuple[float, float]]:
 
 
 @pytest.mark.slow
-def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path) -> None:
+def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path, endpoint: str) -> None:
     (tmp_path / "open_floor.yaml").write_text(SCENARIO)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     run = ("run", str(tmp_path / "open_floor.yaml"), "--listen", endpoint, "--pace", "1", "--no-record")
     with twin(*run, "--out", str(tmp_path / "out")):
-        wait_for(endpoint)
+        wait_for_listener(endpoint)
         connect = ("--connect", endpoint)
         watch = ("topic", "echo", "/odom", "--field", "pose.pose.position", "--csv")
         pub = ("topic", "pub", "-p", "0", "-r", "10", "/cmd_vel", "geometry_msgs/msg/Twist", TWIST)
@@ -66,14 +63,3 @@ def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path) -> None:
     off = [abs(math.hypot(x, y - RADIUS) - RADIUS) for x, y in track]
     assert max(off) < 0.1 * RADIUS
     assert max(y for _, y in track) > 1.9 * RADIUS
-
-
-def wait_for(endpoint: str) -> None:
-    host, port = endpoint.removeprefix("tcp/").split(":")
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        with socket.socket() as probe:
-            if probe.connect_ex((host, int(port))) == 0:
-                return
-        time.sleep(0.05)
-    raise AssertionError("the run does not listen")

@@ -1,0 +1,35 @@
+"""How tests meet other processes: on a port of their own, and without fixed sleeps."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+POLL_S = 0.005
+
+
+def free_endpoint(protocol: str = "tcp") -> str:
+    """An endpoint on which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def wait_for(condition: Callable[[], object], seconds: float = 20.0) -> None:
+    """Poll for what another process or thread does."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "nothing happened in time"
+        time.sleep(POLL_S)
+
+
+def wait_for_listener(endpoint: str, seconds: float = 60.0) -> None:
+    """Wait until somebody listens there."""
+    host, _, port = endpoint.removeprefix("tcp/").partition(":")
+
+    def listens() -> bool:
+        with socket.socket() as probe:
+            return probe.connect_ex((host, int(port))) == 0
+
+    wait_for(listens, seconds)
