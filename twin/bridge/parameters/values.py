@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -200,8 +199,3 @@ def _in_range(name: str, value: Any) -> Any:
 
 def _words(kind: Type | None) -> str:
     return "nothing" if kind is None else kind.name.lower()
-
-
-def names_of(parameters: Iterable[Parameter]) -> str:
-    """Return names for a message."""
-    return ", ".join(parameter.name for parameter in parameters)

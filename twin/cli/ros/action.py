@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.ros.action_goal import send_goal
+from twin.cli.ros.graph_names import absolute, unknown
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.service_values import absolute, unknown
 
 if TYPE_CHECKING:
-    from twin.bridge.graph import EndpointInfo, Graph
+    from twin.bridge.graph import EndpointInfo
 
 app = typer.Typer(no_args_is_help=True, help="Actions: list, look, send goals; as `ros2 action`.")
 
@@ -30,7 +30,7 @@ app.command(
 @joins
 def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
     """List the actions that somebody offers or uses."""
-    actions = _graph(joining).actions()
+    actions = joining.graph().actions()
     if count:
         typer.echo(len(actions))
         return
@@ -42,7 +42,7 @@ def list_actions(show_types: _Types = False, count: _Count = False, *, joining: 
 @joins
 def show_type(action: _Name, *, joining: Joining) -> None:
     """Print the type of an action."""
-    actions, name = _graph(joining).actions(), absolute(action)
+    actions, name = joining.graph().actions(), absolute(action)
     if name not in actions:
         raise unknown("action", name, actions)
     for typename in actions[name]:
@@ -59,7 +59,7 @@ def find(
     action_type: Annotated[str, typer.Argument(metavar="TYPE")], count: _Count = False, *, joining: Joining
 ) -> None:
     """List the actions of a type."""
-    names = [name for name, types in _graph(joining).actions().items() if action_type in types]
+    names = [name for name, types in joining.graph().actions().items() if action_type in types]
     if count:
         typer.echo(len(names))
         return
@@ -77,7 +77,7 @@ def info(
     joining: Joining,
 ) -> None:
     """Print who uses and who offers an action."""
-    graph, name = _graph(joining), absolute(action)
+    graph, name = joining.graph(), absolute(action)
     goals = f"{name}/_action/send_goal"
     clients, servers = graph.clients(goals), graph.servers(goals)
     if not clients and not servers:
@@ -92,10 +92,3 @@ def info(
 def _line(endpoint: EndpointInfo, show_types: bool) -> str:
     typename = endpoint.type.removesuffix("_SendGoal")
     return f"{endpoint.node.full_name} [{typename}]" if show_types else endpoint.node.full_name
-
-
-def _graph(joining: Joining) -> Graph:
-    from twin.bridge.graph import Graph
-
-    with joining.open() as process:
-        return Graph.snapshot(process.bus)

@@ -17,6 +17,7 @@ from twin.cli.ros.option_groups import takes
 from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
+    from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
 
 
@@ -43,6 +44,13 @@ class Joining:
             wire=self.wire,
         ) as process:
             yield process
+
+    def graph(self) -> Graph:
+        """Return who is in the graph now; raises BridgeError if nobody is there."""
+        from twin.bridge.graph import Graph
+
+        with self.open() as process:
+            return Graph.snapshot(process.bus)
 
 
 def _options(

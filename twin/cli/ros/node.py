@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.drawing_file import check_ending, write_drawing
+from twin.cli.ros.graph_names import absolute, instead
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
 
@@ -33,7 +35,7 @@ def list_nodes(
     joining: Joining,
 ) -> None:
     """List the nodes."""
-    names = _names(_graph(joining), hidden=every)
+    names = _names(joining.graph(), hidden=every)
     if count:
         typer.echo(len(names))
         return
@@ -59,13 +61,13 @@ def info(
 ) -> None:
     """Tell what a node publishes, subscribes to, offers and uses."""
     from twin.bridge.graph import is_hidden
-    from twin.cli.ros.topic_process import did_you_mean
 
-    graph = _graph(joining)
-    name = node if node.startswith("/") else f"/{node}"
+    graph = joining.graph()
+    name = absolute(node)
     names = _names(graph, hidden=True)
     if name not in names:
-        raise BridgeError(f"Unable to find node '{node}'{did_you_mean(name, _names(graph, hidden=hidden))}")
+        hint = instead("node", name, _names(graph, hidden=hidden))
+        raise BridgeError(f"Unable to find node '{node}'; {hint}")
     if names.count(name) > 1:
         typer.echo(
             f'There are {names.count(name)} nodes in the graph with the exact name "{name}". '
@@ -109,33 +111,17 @@ def graph_(
     joining: Joining,
 ) -> None:
     """Draw nodes and topics, as rqt_graph: text, Graphviz text, or SVG, which needs no Graphviz."""
+    from twin.cli.ros.node_drawing import svg
     from twin.cli.ros.node_graph import GraphChoice, graphviz, node_graph, text
 
-    if output is not None and str(output) != "-" and output.suffix not in (".gv", ".svg"):
-        raise BridgeError(f"--output {output}: must end in .gv or .svg, or be - for .gv on stdout")
+    file = None if output is None or str(output) == "-" else output
+    check_ending(file)
     choice = GraphChoice(nodes_only=nodes_only, hidden=hidden, debug=debug, dead_sinks=dead_sinks)
-    shown = node_graph(_graph(joining), choice)
-    if output is None or str(output) == "-":
-        sys.stdout.write(text(shown) if output is None else graphviz(shown))
-        return
-    if output.suffix == ".svg":
-        from twin.cli.ros.node_drawing import svg
-
-        drawing = svg(shown)
+    shown = node_graph(joining.graph(), choice)
+    if output is None:
+        sys.stdout.write(text(shown))
     else:
-        drawing = graphviz(shown)
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(drawing, encoding="utf-8")
-    except OSError as error:
-        raise BridgeError(f"--output {output} cannot be written: {error.strerror}") from error
-
-
-def _graph(joining: Joining) -> Graph:
-    from twin.bridge.graph import Graph
-
-    with joining.open() as process:
-        return Graph.snapshot(process.bus)
+        write_drawing(file, lambda: graphviz(shown), lambda: svg(shown))
 
 
 def _names(graph: Graph, *, hidden: bool) -> list[str]:

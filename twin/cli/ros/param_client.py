@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from twin.cli.ros.graph_names import absolute
 from twin.cli.ros.service_call import answer
-from twin.cli.ros.service_values import absolute
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError, nearest
 

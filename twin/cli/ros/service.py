@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from twin.cli.ros.endpoint_text import endpoint_text
+from twin.cli.ros.graph_names import absolute, unknown
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.service_call import call
-from twin.cli.ros.service_values import absolute, unknown
-
-if TYPE_CHECKING:
-    from twin.bridge.graph import Graph
 
 app = typer.Typer(no_args_is_help=True, help="Services: list, look, call; as `ros2 service`.")
 
@@ -90,27 +88,21 @@ def info(
     joining: Joining,
 ) -> None:
     """Print type and number of clients and servers of a service."""
-    graph = _graph(joining)
+    graph = joining.graph()
     services, name = graph.services(), absolute(service)
     if name not in services:
         raise unknown("service", name, _services_shown(services, hidden))
-    from twin.cli.ros.service_endpoints import print_endpoints
-
     types = services[name]
     typer.echo(f"Type: {types[0] if len(types) == 1 else list(types)}")
-    print_endpoints("Clients", graph.clients(name), verbose)
-    print_endpoints("Services", graph.servers(name), verbose)
-
-
-def _graph(joining: Joining) -> Graph:
-    from twin.bridge.graph import Graph
-
-    with joining.open() as process:
-        return Graph.snapshot(process.bus)
+    blank = "\n" if verbose else ""
+    for title, endpoints in (("Clients", graph.clients(name)), ("Services", graph.servers(name))):
+        typer.echo(f"{title} count: {len(endpoints)}{blank}")
+        for endpoint in endpoints if verbose else ():
+            typer.echo(f"{endpoint_text(endpoint)}\n")
 
 
 def _services(joining: Joining, hidden: bool) -> dict[str, tuple[str, ...]]:
-    return _services_shown(_graph(joining).services(), hidden)
+    return _services_shown(joining.graph().services(), hidden)
 
 
 def _services_shown(services: dict[str, tuple[str, ...]], hidden: bool) -> dict[str, tuple[str, ...]]:

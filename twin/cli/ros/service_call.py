@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.cli.ros.graph_names import absolute, unknown
 from twin.cli.ros.joining import Joining
-from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
 from twin.cli.ros.tool_node import tool_node
+from twin.cli.ros.yaml_values import message_of, text_of
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:

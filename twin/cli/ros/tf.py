@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.drawing_file import Output, check_ending, write_drawing
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
 
@@ -40,28 +39,18 @@ def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
 @app.command("frames", epilog="Example: [bold]twin tf frames -o frames.svg[/bold]")
 @joins
 def frames(
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="File to write: .gv or .svg.", show_default=".gv on stdout"),
-    ] = None,
+    output: Output = None,
     wait_time: WaitTime = 5.0,
     *,
     joining: Joining,
 ) -> None:
     """Draw the tree: Graphviz text as view_frames writes it, or SVG, which needs no Graphviz."""
-    if output is not None and output.suffix not in (".gv", ".svg"):
-        raise BridgeError(f"--output {output}: must end in .gv or .svg")
+    check_ending(output)
     from twin.bridge.tf.drawing import graphviz, svg
-    from twin.scenario.verdict import write_atomically
 
     with joining.open() as process:
         infos, now_ns = _listen(process, wait_time)
-    if output is None:
-        sys.stdout.write(graphviz(infos, now_ns))
-        return
-    text = svg(infos, now_ns) if output.suffix == ".svg" else graphviz(infos, now_ns)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(output, text.encode())
+    write_drawing(output, lambda: graphviz(infos, now_ns), lambda: svg(infos, now_ns))
 
 
 @app.command("echo", epilog="Example: [bold]twin tf echo map base_link --once[/bold]")

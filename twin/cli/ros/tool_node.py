@@ -1,4 +1,4 @@
-"""The node that a command is while it talks: hidden, and nothing but what it needs."""
+"""The node that a command is while it talks: hidden as a rule, and nothing but what it needs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from twin.bridge.node import Node
 
 
-def tool_node(bus: Bus, name: str) -> Node:
-    """Return a node `_ros2cli_<name>` without parameters and log; lists leave it out."""
+def tool_node(bus: Bus, name: str, *, shown_as: str | None = None) -> Node:
+    """Return a node without parameters and log: `_ros2cli_<name>`, which lists leave out, or as asked for."""
     from twin.bridge.node_options import BARE
 
-    return bus.create_node(f"_ros2cli_{name}", options=BARE)
+    return bus.create_node(shown_as or f"_ros2cli_{name}", options=BARE)

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.ros.endpoint_text import endpoint_text
+from twin.cli.ros.graph_names import absolute, unknown
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.topic_options import TopicName
-from twin.errors import BridgeError
 
 if TYPE_CHECKING:
-    from twin.bridge.graph import EndpointInfo, Graph
+    from twin.bridge.graph import Graph
 
 Hidden = Annotated[
     bool, typer.Option("--include-hidden-topics", help="Those with a part that begins with _ too.")
@@ -66,7 +67,7 @@ def info(
     ):
         typer.echo(f"{line}{end}", nl=False)
         for endpoint in endpoints if verbose else ():
-            typer.echo(f"{_described(endpoint)}{end}", nl=False)
+            typer.echo(f"{endpoint_text(endpoint)}{end}", nl=False)
 
 
 @joins
@@ -101,20 +102,17 @@ def find(
 
 
 def _topics(joining: Joining, hidden: bool) -> tuple[Graph, dict[str, tuple[str, ...]]]:
-    from twin.bridge.graph import Graph, is_hidden
+    from twin.bridge.graph import is_hidden
 
-    with joining.open() as process:
-        graph = Graph.snapshot(process.bus)
+    graph = joining.graph()
     topics = graph.topics()
     return graph, {name: types for name, types in topics.items() if hidden or not is_hidden(name)}
 
 
 def _known(topic: str, topics: dict[str, tuple[str, ...]]) -> tuple[str, tuple[str, ...]]:
-    from twin.cli.ros.topic_process import did_you_mean
-
-    name = topic if topic.startswith("/") else f"/{topic}"
+    name = absolute(topic)
     if name not in topics:
-        raise BridgeError(f"Unknown topic '{topic}'{did_you_mean(name, topics)}")
+        raise unknown("topic", topic, topics)
     return name, topics[name]
 
 
@@ -127,32 +125,3 @@ def _table(
         if count
     ]
     return f"{title}\n{''.join(rows)}"
-
-
-def _described(endpoint: EndpointInfo) -> str:
-    """Return an endpoint as rclpy's TopicEndpointInfo shows itself."""
-    qos = endpoint.qos
-    return "\n".join(
-        (
-            f"Node name: {endpoint.node.name}",
-            f"Node namespace: {endpoint.node.namespace}",
-            f"Topic type: {endpoint.type}",
-            f"Topic type hash: {endpoint.type_hash}",
-            f"Endpoint type: {'PUBLISHER' if endpoint.kind == 'MP' else 'SUBSCRIPTION'}",
-            f"GID: {'.'.join(f'{byte:02x}' for byte in endpoint.gid)}",
-            "QoS profile:",
-            f"  Reliability: {qos.reliability.upper()}",
-            f"  History (Depth): {f'KEEP_LAST ({qos.depth})' if qos.history == 'keep_last' else 'KEEP_ALL'}",
-            f"  Durability: {qos.durability.upper()}",
-            f"  Lifespan: {_duration(qos.lifespan_ns)}",
-            f"  Deadline: {_duration(qos.deadline_ns)}",
-            f"  Liveliness: {qos.liveliness.upper()}",
-            f"  Liveliness lease duration: {_duration(qos.lease_ns)}",
-        )
-    )
-
-
-def _duration(nanoseconds: int) -> str:
-    from twin.bridge.qos import INFINITE_NS
-
-    return "Infinite" if nanoseconds == INFINITE_NS else f"{nanoseconds} nanoseconds"

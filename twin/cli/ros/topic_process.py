@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from twin.cli.ros.graph_names import instead
 from twin.cli.ros.joining import Joining
-from twin.errors import COMPARED, BridgeError
+from twin.cli.ros.tool_node import tool_node
+from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo, Graph
     from twin.bridge.live import LiveBus
     from twin.bridge.node import Node
 
-HIDDEN_PREFIX = "_ros2cli"
-"""Of the nodes of commands; names that begin with _ are left out of lists."""
 _COMPLETE_S = 1.0
 """How long to wait for a watched graph to be complete [s], if somebody leaves in that moment."""
 
@@ -55,12 +55,12 @@ class TopicProcess:
         found = self.endpoints(name)
         if found:
             return found
-        hint = did_you_mean(name, self.graph.topics())
-        typer.echo(f"WARNING: topic [{name}] does not appear to be published yet{hint}", err=True)
+        hint = instead("topic", name, self.graph.topics())
+        typer.echo(f"WARNING: topic [{name}] does not appear to be published yet; {hint}", err=True)
         self.live.spin(lambda: bool(self.endpoints(name)), timeout_s)
         found = self.endpoints(name)
         if not found:
-            raise BridgeError(f"Could not determine the type for the passed topic {name}{hint}")
+            raise BridgeError(f"Could not determine the type for the passed topic {name}")
         return found
 
     def message_class(self, name: str, endpoints: Sequence[EndpointInfo]) -> type[Any]:
@@ -79,25 +79,14 @@ class TopicProcess:
 def open_topics(joining: Joining, *, node_name: str | None = None) -> Iterator[TopicProcess]:
     """Join a graph with one node, hidden unless it is named."""
     from twin.bridge.graph import Graph
-    from twin.bridge.node_options import BARE
 
     with joining.open() as live:
         # Zenoh answers at once from what it has when a watch begins: so look first, then wait for the same.
         there = set(Graph.snapshot(live.bus).endpoints)
-        node = live.bus.create_node(node_name or f"{HIDDEN_PREFIX}_{os.getpid()}", options=BARE)
+        node = tool_node(live.bus, str(os.getpid()), shown_as=node_name)
         graph = Graph.watch(live.bus)
         live.spin(lambda: there <= set(graph.endpoints), _COMPLETE_S)
         try:
             yield TopicProcess(live=live, node=node, graph=graph)
         finally:
             graph.close()
-
-
-def did_you_mean(name: str, known: Sequence[str] | dict[str, Any]) -> str:
-    """Return '; did you mean …?' with the nearest existing name, or nothing."""
-    import difflib
-
-    if len(known) > COMPARED:
-        return ""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f"; did you mean {close[0]}?" if close else ""

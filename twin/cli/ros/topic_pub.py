@@ -12,6 +12,7 @@ from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.option_groups import takes
 from twin.cli.ros.topic_options import NodeName, QosChoice, TopicName, publisher_qos
+from twin.cli.ros.yaml_values import text_of, values_of
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -96,9 +97,9 @@ def pub(
         str, typer.Argument(metavar="TYPE", help="Such as std_msgs/msg/String.", show_default=False)
     ],
     values: Annotated[
-        str,
+        str | None,
         typer.Argument(metavar="VALUES", help="YAML: '{linear: {x: 0.1}}'; a header may be 'auto'."),
-    ] = "{}",
+    ] = None,
     stdin: Annotated[bool, typer.Option("--stdin", help="Read the values from standard input.")] = False,
     *,
     plan: PublishPlan,
@@ -109,7 +110,7 @@ def pub(
     """Publish a message once, some times or at a rate."""
     from twin.cli.ros.topic_process import open_topics
 
-    given = _values(_read_stdin() if stdin else values)
+    given = values_of(text_of(values, stdin))
     with open_topics(joining, node_name=node_name) as process:
         name = process.topic(topic)
         cls = _message_class(process, name, message_type)
@@ -119,29 +120,6 @@ def pub(
         typer.echo("publisher: beginning loop")
         _publish(process, publisher, make, plan)
         process.live.spin(timeout_s=plan.keep_alive_s)
-
-
-def _values(text: str) -> dict[str, Any]:
-    import yaml
-
-    try:
-        values = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        reason = " ".join(str(getattr(error, "problem", None) or error).split())
-        raise BridgeError(
-            f"the values {text!r} are no YAML ({reason}); valid: such as '{{linear: {{x: 0.1}}}}'"
-        ) from error
-    if not isinstance(values, dict):
-        raise BridgeError(
-            f"The passed value needs to be a dictionary in YAML format, such as '{{data: 1}}', not {text!r}"
-        )
-    return values
-
-
-def _read_stdin() -> str:
-    import sys
-
-    return sys.stdin.read()
 
 
 def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]:
