@@ -112,9 +112,8 @@ class Mirror:
         tokens = f"@ros2_lv/{bus.domain_id}/{bus.session_id}/*/*/SS/**"
         liveliness = bus.session.liveliness()
         self._offers: Any = liveliness.declare_subscriber(tokens, direct(self._on_service))
-        for reply in liveliness.get(tokens):  # history=True would call back in another thread
-            if reply.ok is not None:
-                self._add_service(str(reply.ok.key_expr))
+        # Not history=True, which calls back in another thread; not a FIFO, which blocks when it is full.
+        liveliness.get(tokens, direct(self._on_known_service))
 
     def take(self) -> list[Any]:
         """Return what the process was sent since the last call, in order."""
@@ -253,6 +252,10 @@ class Mirror:
                 self._waiting.append(entry(Entry.UNDECLARE, 0, key))
         else:
             self._add_service(token)
+
+    def _on_known_service(self, reply: zenoh.Reply) -> None:
+        if reply.ok is not None and self._bus.in_own_thread():
+            self._add_service(str(reply.ok.key_expr))
 
     def _add_service(self, token: str) -> None:
         info = parse_token(token)
