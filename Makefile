@@ -32,10 +32,13 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a
 	$(BIN)/python -m tests.benchmarks.cdr_cost
 	$(BIN)/python -m tests.benchmarks.lockstep_cost
 
-oracle: $(VENV)/.ready  ## conversions against pinocchio, and the table in docs/fidelity.md
+oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
 	$(BIN)/python -m pytest tests/convert/test_pinocchio.py tests/models/test_kinematics.py
 	$(BIN)/python -m tests.oracles.example_robots
+	$(PYTHON) -m venv build/wire_oracle
+	build/wire_oracle/bin/python -m pip install --quiet --disable-pip-version-check zenoh-ros2-sdk==0.1.8 pamoja-ros2==0.2.0
+	TWIN_WIRE_ORACLE=build/wire_oracle/bin/python $(BIN)/python -m pytest tests/bridge/test_wire_oracles.py
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios

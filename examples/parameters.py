@@ -3,7 +3,7 @@
 from twin.bridge import live
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import SetParametersResult
-from twin.bridge.parameter_values import Parameter
+from twin.bridge.parameters.values import Parameter
 
 NAMES = ("robot_name", "max_speed", "camera_on")
 

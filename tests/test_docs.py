@@ -6,6 +6,7 @@ import importlib
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -34,14 +35,22 @@ PAGES = {
 }
 ALL_TEXT = "\n".join(page.read_text("utf-8") for page in PAGES.values())
 
-SLOW = {"README.md", "docs/getting-started.md", "docs/navigation.md", "docs/arenas.md"}
+SLOW = {
+    "README.md",
+    "docs/getting-started.md",
+    "docs/navigation.md",
+    "docs/arenas.md",
+    "docs/ros/commands.md",
+}
 """Pages whose commands take longer than some seconds."""
 
 NOT_RUN = {
     r"make (?P<target>\w+)": "sets up an environment of its own: only its recipe is looked at",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
+    r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
+    r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""
 
@@ -81,12 +90,14 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        shutil.copytree(ROOT / "scenarios", folder / "scenarios")
+        for name in ("scenarios", "examples"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = str(probe.getsockname()[1])
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        self.environment = {**os.environ, "PATH": path, "COLUMNS": "200"}
+        here = {"PATH": path, "COLUMNS": "200", "TWIN_CONNECT": f"tcp/127.0.0.1:{self.port}"}
+        self.environment = {**os.environ, **here}
         self.background: list[tuple[subprocess.Popen[str], list[str]]] = []
 
     def save(self, block: Block) -> None:
@@ -101,6 +112,8 @@ class Reader:
 
     def finish(self) -> None:
         for process, output in self.background:
+            if "examples/" in str(process.args):  # runs until it is stopped
+                process.send_signal(signal.SIGINT)
             self._judge("--listen", process, output)
 
     def _start(self, command: str) -> subprocess.Popen[str]:

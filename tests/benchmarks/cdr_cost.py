@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import (
     Clock,
     Image,
@@ -31,7 +31,7 @@ from twin.bridge.msgs import (
     Twist,
     new,
 )
-from twin.bridge.session import direct
+from twin.bridge.wire.session import direct
 
 ROUNDS, SECONDS = 5, 0.02
 

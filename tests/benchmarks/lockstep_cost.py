@@ -18,8 +18,8 @@ import zenoh
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.factory import create_nodes
 from twin.bridge.msgs import Odometry, Twist, new
+from twin.bridge.programs.factory import create_nodes
 from twin.runtime.outside import Lockstep
 from twin.scenario.outside import Outside
 

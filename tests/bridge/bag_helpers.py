@@ -10,7 +10,7 @@ import numpy as np
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.writer import BagConfig, BagWriter
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import LaserScan, String, TFMessage, header, new
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
 from twin.bridge.tf import transform_stamped

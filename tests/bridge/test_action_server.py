@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from twin.bridge.action_goal import uuid_msg
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import (
     ActionClient,
@@ -19,9 +18,10 @@ from twin.bridge.actions import (
     GoalHandle,
     GoalResponse,
 )
+from twin.bridge.actions.goal import uuid_msg
+from twin.bridge.actions.states import ACTIVE, NAMES, GoalEvent, transition
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.goal_states import ACTIVE, NAMES, GoalEvent, transition
 from twin.bridge.msgs import GoalStatus, GoalStatusArray
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import CancelGoal

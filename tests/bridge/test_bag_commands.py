@@ -18,7 +18,7 @@ import pytest
 from tests.bridge import bag_helpers as bags
 from twin.bridge import live
 from twin.bridge.bags.reader import BagReader
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import String
 from twin.bridge.qos import LATCHED, QoS
 from twin.cli.app import run_app

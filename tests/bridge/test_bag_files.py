@@ -11,7 +11,7 @@ from tests.bridge import bag_helpers as bags
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.writer import BagConfig, BagWriter
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import LaserScan
 from twin.errors import RecordingError
 

@@ -16,7 +16,7 @@ from twin.bridge.bags.player import Player, PlayerConfig
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.recorder import Recorder, RecorderConfig
 from twin.bridge.bags.topic_choice import TopicChoice
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import Clock, LaserScan, String, TFMessage, Twist, new, ns, stamp
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
@@ -283,3 +283,16 @@ def test_what_cannot_be_played_is_told(
 def test_no_regular_expression_is_told() -> None:
     with pytest.raises(RecordingError, match=r"'\(' is not a regular expression"):
         TopicChoice(regex="(")
+
+
+def test_what_was_said_before_a_silence_is_on_the_disk(both: Both, tmp_path: Path) -> None:
+    here, _ = both
+    here.bus.create_node("talker").create_publisher(String, "x", LATCHED).publish(String("only once"))
+    recording = Recording(both, tmp_path / "bag", RecorderConfig(topics=TopicChoice(topics=("/x",))))
+
+    def survives() -> bool:
+        with BagReader(tmp_path / "bag") as bag:  # as if the recorder had been killed
+            return bag.info.count == 1
+
+    recording.until(survives)
+    recording.recorder.close()

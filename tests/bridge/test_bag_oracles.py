@@ -16,7 +16,7 @@ from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.bags.writer import BagWriter
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 
 ALL = 2 * bags.COUNT + 1
 

@@ -22,7 +22,7 @@ from twin.bridge.bags.replay import replay
 from twin.bridge.bags.tap import BagTap
 from twin.bridge.bags.writer import BagConfig
 from twin.bridge.bus import Bus
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, stamp

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from twin.bridge import types
-from twin.bridge.cdr import codec, general_codec
+from twin.bridge.cdr.codec import codec, general_codec
 from twin.bridge.msgs import (
     Clock,
     Header,

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from twin.bridge import types
-from twin.bridge.cdr import _FAST, Codec, codec, general_codec
+from twin.bridge.cdr.codec import _FAST, Codec, codec, general_codec
 from twin.bridge.msgs import (
     DiagnosticStatus,
     Float64MultiArray,
@@ -31,8 +31,8 @@ from twin.bridge.msgs import (
     Twist,
     new,
 )
-from twin.bridge.type_bounds import INTEGERS, STRINGS
-from twin.bridge.type_fields import Field, fields_of
+from twin.bridge.types.bounds import INTEGERS, STRINGS
+from twin.bridge.types.fields import Field, fields_of
 from twin.errors import BridgeError
 
 types.add_folder(Path(__file__).parent / "data" / "test_msgs")
@@ -204,7 +204,7 @@ def test_bytes_after_the_message_are_an_error(cls: type[Any]) -> None:
 
 
 def test_lengths_of_joint_states_are_not_kept_for_ever() -> None:
-    from twin.bridge import cdr_packed
+    from twin.bridge.cdr import packed as cdr_packed
 
     for n in range(200):
         state = new(JointState, name=["j" * n])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.bridge.cdr import codec, general_codec
+from twin.bridge.cdr.codec import codec, general_codec
 from twin.bridge.msgs import (
     Header,
     Imu,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from twin.bridge import types
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import PoseStamped, new
 from twin.errors import BridgeError
 

@@ -8,7 +8,10 @@ import zenoh
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.keys import (
+from twin.bridge.msgs import Twist, new
+from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS, qos_string
+from twin.bridge.srvs import Trigger
+from twin.bridge.wire.keys import (
     EndpointKind,
     NodeToken,
     gid,
@@ -16,10 +19,7 @@ from twin.bridge.keys import (
     parse_attachment,
     topic_key,
 )
-from twin.bridge.msgs import Twist, new
-from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS, qos_string
-from twin.bridge.session import direct
-from twin.bridge.srvs import Trigger
+from twin.bridge.wire.session import direct
 
 TWIST = "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"
 TRIGGER = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from twin.bridge import types
-from twin.bridge.defaults import new
-from twin.bridge.message_repr import message_repr
-from twin.bridge.yaml_messages import message_from_dict
+from twin.bridge.messages.as_repr import message_repr
+from twin.bridge.messages.as_yaml import message_from_dict
+from twin.bridge.types.default_values import new
 
 
 @pytest.mark.parametrize(

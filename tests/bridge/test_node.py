@@ -8,7 +8,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Log, String
 from twin.bridge.names import Resolver, expand
-from twin.bridge.parameters import Parameter
+from twin.bridge.parameters.parameters import Parameter
 from twin.bridge.qos import LATCHED, QoS
 from twin.errors import BridgeError
 

@@ -14,7 +14,7 @@ from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.parameter_values import Parameter
+from twin.bridge.parameters.values import Parameter
 from twin.bridge.srvs import ListParameters, SetParameters
 
 

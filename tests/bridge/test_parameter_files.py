@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
-from twin.bridge import parameter_files, ros_args
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Log, String
 from twin.bridge.node_options import NodeOptions
+from twin.bridge.parameters import files as parameter_files
+from twin.bridge.programs import ros_args
 from twin.errors import BridgeError
 
 FILE = """\

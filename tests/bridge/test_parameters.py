@@ -8,17 +8,16 @@ import pytest
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.defaults import new
 from twin.bridge.msgs import ParameterDescriptor, ParameterEvent, SetParametersResult
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
-from twin.bridge.parameter_errors import (
+from twin.bridge.parameters.errors import (
     InvalidParameterValueException,
     ParameterImmutableException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
-from twin.bridge.parameter_values import Parameter, Type, from_value_msg, value_msg
+from twin.bridge.parameters.values import Parameter, Type, from_value_msg, value_msg
 from twin.bridge.srvs import (
     DescribeParameters,
     GetParameters,
@@ -27,7 +26,8 @@ from twin.bridge.srvs import (
     SetParameters,
     SetParametersAtomically,
 )
-from twin.bridge.type_description_service import GetTypeDescription
+from twin.bridge.types.default_values import new
+from twin.bridge.types.description_service import GetTypeDescription
 from twin.errors import BridgeError
 
 IntegerRange = types.get("rcl_interfaces/msg/IntegerRange")

@@ -24,7 +24,7 @@ from twin.bridge.tf import (
     TransformListener,
     transform_stamped,
 )
-from twin.bridge.tf_buffer import (
+from twin.bridge.tf.buffer import (
     DisconnectedFramesError,
     ExtrapolationError,
     TransformBuffer,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from twin.bridge.tf_buffer import (
+from twin.bridge.tf.buffer import (
     DisconnectedFramesError,
     ExtrapolationError,
     InvalidFrameError,

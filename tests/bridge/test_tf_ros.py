@@ -25,11 +25,11 @@ from twin.bridge.tf import (
     UnknownFrameError,
     transform_stamped,
 )
-from twin.bridge.tf_drawing import graphviz, svg
-from twin.bridge.tf_math import Rigid
-from twin.bridge.tf_report import frame_infos, text_tree
-from twin.bridge.tf_throttle import ThrottleConfig, TransformThrottle
-from twin.bridge.tf_walk import solve
+from twin.bridge.tf.drawing import graphviz, svg
+from twin.bridge.tf.report import frame_infos, text_tree
+from twin.bridge.tf.rigid import Rigid
+from twin.bridge.tf.throttle import ThrottleConfig, TransformThrottle
+from twin.bridge.tf.walk import solve
 from twin.errors import BridgeError
 from twin.geometry import Pose3
 

@@ -30,10 +30,10 @@ from twin.bridge.msgs import (
     header,
     new,
 )
-from twin.bridge.tf_buffer import ExtrapolationError, TransformBuffer
-from twin.bridge.tf_clouds import points_of
-from twin.bridge.tf_laser import project_laser
-from twin.bridge.tf_transforms import QuaternionStamped, do_transform
+from twin.bridge.tf.buffer import ExtrapolationError, TransformBuffer
+from twin.bridge.tf.clouds import points_of
+from twin.bridge.tf.laser import project_laser
+from twin.bridge.tf.transforms import QuaternionStamped, do_transform
 from twin.errors import BridgeError
 from twin.geometry import Pose3
 

@@ -9,8 +9,8 @@ from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
-from twin.bridge.topic_statistics import BandwidthStatistics, DelayStatistics, RateStatistics
-from twin.bridge.topic_tools import ByteThrottle, Drop, MessageThrottle, Relay, qos_for_all
+from twin.bridge.tools.relay import ByteThrottle, Drop, MessageThrottle, Relay, qos_for_all
+from twin.bridge.tools.statistics import BandwidthStatistics, DelayStatistics, RateStatistics
 from twin.errors import BridgeError
 
 S = 1_000_000_000

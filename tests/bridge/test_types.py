@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from twin.bridge import action_types, srvs, types
-from twin.bridge.cdr import general_codec
+from twin.bridge.cdr.codec import general_codec
 from twin.bridge.msgs import JointState, Quaternion, Time, Twist, duration, new, ns, stamp
 from twin.errors import BridgeError
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from twin.bridge import types
-from twin.bridge.cdr import general_codec
-from twin.bridge.defaults import new
-from twin.bridge.type_description import TypeDescription, describe, learn, sources
+from twin.bridge.cdr.codec import general_codec
+from twin.bridge.types.default_values import new
+from twin.bridge.types.description import TypeDescription, describe, learn, sources
 from twin.errors import BridgeError
 
 ACTION = """geometry_msgs/PoseStamped target

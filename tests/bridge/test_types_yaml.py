@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from twin.bridge import types
+from twin.bridge.messages.as_yaml import message_from_dict, message_to_csv, message_to_dict, message_to_yaml
 from twin.bridge.msgs import (
     DiagnosticStatus,
     Header,
@@ -22,7 +23,6 @@ from twin.bridge.msgs import (
     Vector3,
     new,
 )
-from twin.bridge.yaml_messages import message_from_dict, message_to_csv, message_to_dict, message_to_yaml
 from twin.errors import BridgeError
 
 SCAN = {"header": {"frame_id": "laser"}, "range_max": 12, "ranges": [0.1, 2, float("inf")]}

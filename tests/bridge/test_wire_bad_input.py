@@ -29,13 +29,13 @@ from tests.bridge.wire_peer import (
     wait_for,
 )
 from twin.bridge.bus import Bus
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
-from twin.bridge.external import ExternalQueue
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import LaserScan, OccupancyGrid, String, TFMessage, TransformStamped, new
 from twin.bridge.qos import QoS
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.wire.external import ExternalQueue
 
 CHATTER = f"{STRING}/{STRING_HASH}"
 

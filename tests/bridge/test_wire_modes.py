@@ -23,9 +23,9 @@ from tests.bridge.wire_peer import (
     wait_for,
 )
 from twin.bridge import live
-from twin.bridge.action_client import ActionClient
-from twin.bridge.action_server import ActionServer, GoalHandle
 from twin.bridge.action_types import Fibonacci
+from twin.bridge.actions.client import ActionClient
+from twin.bridge.actions.server import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph

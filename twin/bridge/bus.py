@@ -13,15 +13,16 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.external import Arrival, ExternalQueue
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_services import StandardServices
-from twin.bridge.session import SessionConfig, open_session
 from twin.bridge.topics import Sample
 from twin.bridge.wire import Wire
-from twin.bridge.wire_naming import Naming
-from twin.bridge.wire_ros2dds import bridge_token
+from twin.bridge.wire.external import Arrival, ExternalQueue
+from twin.bridge.wire.interrupts import guard
+from twin.bridge.wire.naming import Naming
+from twin.bridge.wire.ros2dds import bridge_token
+from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
 
 _EXTERNAL_DEPTH = 10_000
@@ -60,6 +61,7 @@ class Bus:
         if networked and naming.wire == "ros2dds":
             self._bridge = session.liveliness().declare_token(bridge_token(self.session_id))
         atexit.register(self.close)
+        self._guarded = guard.enter()
 
     @classmethod
     def open(
@@ -146,6 +148,8 @@ class Bus:
 
     def admit(self) -> int:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
+        if guard.pending:
+            guard.deliver()
         arrivals = self.external.drain()
         for arrival in arrivals:
             for tap in self.arrival_taps:
@@ -155,6 +159,8 @@ class Bus:
 
     def spin(self) -> None:
         """Run every node once, in the order of creation."""
+        if guard.pending:
+            guard.deliver()
         for node in self.nodes:
             node.spin()
 
@@ -170,10 +176,15 @@ class Bus:
         atexit.unregister(self.close)
         if os.getpid() != self._process:
             return  # a fork has none of Zenoh's threads: closing would wait for them for ever
-        for node in reversed(self.nodes):
-            node.destroy()
-        self.external.report()
-        self.session.close()  # type: ignore[no-untyped-call]
+        try:
+            with guard.shield():
+                for node in reversed(self.nodes):
+                    node.destroy()
+                self.external.report()
+                self.session.close()  # type: ignore[no-untyped-call]
+        finally:
+            if self._guarded:
+                guard.leave()
 
     def in_own_thread(self) -> bool:
         """Whether the caller is the thread that opened the bus, not one of Zenoh's."""

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Self, cast, get_args
 
 import zenoh
 
-from twin.bridge import types, wire_ros2dds
-from twin.bridge.keys import EndpointKind, demangle, gid
+from twin.bridge import types
 from twin.bridge.qos import QoS, parse_qos
-from twin.bridge.session import direct
+from twin.bridge.wire import ros2dds as wire_ros2dds
+from twin.bridge.wire.keys import EndpointKind, demangle, gid
+from twin.bridge.wire.session import direct
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus

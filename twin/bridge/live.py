@@ -8,25 +8,26 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
-from twin.bridge import ros_args, types
+from twin.bridge import types
 from twin.bridge.bus import Bus
-from twin.bridge.cdr import codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
-from twin.bridge.console_log import show_log
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
 from twin.bridge.node_options import NodeOptions
-from twin.bridge.program_arguments import parser_of, split
-from twin.bridge.session import SessionConfig, direct, endpoints
+from twin.bridge.programs import ros_args
+from twin.bridge.programs.arguments import parser_of, split
+from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
-from twin.bridge.wire_entrance import Entrance
-from twin.bridge.wire_naming import Interface
+from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.naming import Interface
+from twin.bridge.wire.session import SessionConfig, direct, endpoints
 from twin.errors import BridgeError, TwinError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -121,7 +122,8 @@ def join(
     """Join a ROS graph, as a Zenoh client that opens no listener, and leave it at the end.
 
     Args:
-        connect: Endpoints of a run, a router or any rmw_zenoh peer; None: where rmw_zenoh expects a router.
+        connect: Endpoints of a run, a router or any rmw_zenoh peer; None: TWIN_CONNECT, or where rmw_zenoh
+            expects a router.
         listen: Endpoints where others may connect; then the process is a peer that needs nobody.
         config: Zenoh configuration file, as rmw_zenoh's ZENOH_SESSION_CONFIG_URI, which is the default.
         domain_id: Default: ROS_DOMAIN_ID, or 0.
@@ -137,7 +139,7 @@ def join(
         connect = (
             ()
             if listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
-            else (DEFAULT_ENDPOINT,)
+            else (os.environ.get("TWIN_CONNECT") or DEFAULT_ENDPOINT,)
         )
     session = SessionConfig(
         mode="peer" if listen else "client",
@@ -146,6 +148,7 @@ def join(
         connect=tuple(connect),
         file=file,
         timeout_s=timeout_s,
+        domain_id=domain_id_of(domain_id),
     )
     clock = Clock()
     with Bus.of(session, clock) as bus:
@@ -173,7 +176,8 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
             process.bus.node_options = NodeOptions(arguments=ros)
             steps = make(process.bus, **own)
             if isinstance(steps, Generator):
-                process.spin(lambda: bool(received) or next(steps, received) is received)
+                with closing(steps):
+                    process.spin(lambda: bool(received) or next(steps, received) is received)
             else:
                 process.spin(lambda: bool(received))
     except TwinError as fault:

@@ -12,7 +12,7 @@ from typing import Any
 from rosbags.typesys.stores import ros2_jazzy as ros
 
 from twin.bridge import types
-from twin.bridge.defaults import new
+from twin.bridge.types.default_values import new
 
 GoalInfo = ros.action_msgs__msg__GoalInfo
 GoalStatus = ros.action_msgs__msg__GoalStatus

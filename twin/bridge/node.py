@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.keys import NodeToken
 from twin.bridge.logger import Logger, Rosout, logger_name
 from twin.bridge.msgs import ParameterEvent
 from twin.bridge.node_graph import NodeGraph
 from twin.bridge.node_options import NodeOptions
-from twin.bridge.node_parameters import NodeParameters, start_parameters
+from twin.bridge.parameters.node_parameters import NodeParameters, start_parameters
 from twin.bridge.qos import QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
 from twin.bridge.tasks import Execution, Task
 from twin.bridge.timers import Rate, Timer
 from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types import ServiceType
+from twin.bridge.wire.keys import NodeToken
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:

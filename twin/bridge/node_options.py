@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from twin.bridge.ros_args import RosArguments
+from twin.bridge.programs.ros_args import RosArguments
 
 
 @dataclass(frozen=True, kw_only=True)

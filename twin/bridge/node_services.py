@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from twin.bridge import type_description_service
-from twin.bridge.parameter_services import ParameterServices
+from twin.bridge.parameters.services import ParameterServices
 from twin.bridge.types import ServiceType
+from twin.bridge.types import description_service as type_description_service
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import zenoh
 
-from twin.bridge import types, wire_ros2dds
-from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, parse_attachment
+from twin.bridge import types
 from twin.bridge.qos import QoS
-from twin.bridge.session import direct
 from twin.bridge.topics import declare_subscriber
-from twin.bridge.wire_entrance import nameless_source
-from twin.bridge.wire_naming import parse_key
+from twin.bridge.wire import ros2dds as wire_ros2dds
+from twin.bridge.wire.entrance import nameless_source
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment, parse_attachment
+from twin.bridge.wire.naming import parse_key
+from twin.bridge.wire.session import direct
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus

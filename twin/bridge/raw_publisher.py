@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge import types
-from twin.bridge.keys import gid, pack_attachment
 from twin.bridge.qos import QoS
 from twin.bridge.topics import declare_publisher
-from twin.bridge.wire_naming import Interface
+from twin.bridge.wire.keys import gid, pack_attachment
+from twin.bridge.wire.naming import Interface
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 
-from twin.bridge.cdr import codec
-from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, pack_attachment
+from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import QoS
-from twin.bridge.session import direct
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
-from twin.bridge.wire_entrance import Entrance
-from twin.bridge.wire_naming import parse_key
-from twin.bridge.wire_ros2dds import pack_request_id
+from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment, pack_attachment
+from twin.bridge.wire.naming import parse_key
+from twin.bridge.wire.ros2dds import pack_request_id
+from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:

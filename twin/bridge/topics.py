@@ -10,13 +10,13 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr import codec
-from twin.bridge.external import Arrival
-from twin.bridge.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
+from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import INFINITE_NS, QoS
-from twin.bridge.session import direct
-from twin.bridge.wire_entrance import Entrance
-from twin.bridge.wire_naming import Interface
+from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
+from twin.bridge.wire.naming import Interface
+from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from twin.cli.interrupted import ends_on_interrupt
+
 
 def main() -> None:
     """Run `twin`; a user's mistake ends as one sentence on stderr and exit code 2."""
-    import sys
-
-    try:
+    with ends_on_interrupt():
         from twin.cli.app import run_app
 
         run_app()
-    except KeyboardInterrupt:  # while something is imported, or an error is printed
-        sys.exit(130)

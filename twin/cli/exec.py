@@ -29,7 +29,7 @@ def execute(
 
     Without --lockstep they run as soon as something arrives, by the wall clock or by /clock.
     """
-    from twin.bridge.factory import create_nodes
+    from twin.bridge.programs.factory import create_nodes
     from twin.cli.log import show_warnings
 
     show_warnings()

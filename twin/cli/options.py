@@ -11,7 +11,7 @@ from twin.bridge.wire import Wire
 from twin.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from twin.bridge.session import SessionConfig
+    from twin.bridge.wire.session import SessionConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class RunOptions:
         """How the bus takes part in a network, None if it does not."""
         if not (self.listen or self.connect or self.zenoh_config):
             return None
-        from twin.bridge.session import SessionConfig
+        from twin.bridge.wire.session import SessionConfig
 
         return SessionConfig(
             mode="client" if self.connect and not self.listen else "peer",

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from typing import Any, TypeVar
 
-from twin.bridge.defaults import new
 from twin.bridge.msgs import ParameterDescriptor
 from twin.bridge.node import Node
-from twin.bridge.parameter_values import Parameter
+from twin.bridge.parameters.values import Parameter
+from twin.bridge.types.default_values import new
 from twin.errors import BridgeError
 
 C = TypeVar("C")

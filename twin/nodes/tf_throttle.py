@@ -8,7 +8,7 @@ from typing import Any
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import TFMessage, TransformStamped
 from twin.bridge.tf import TransformBuffer, TransformError, TransformListener
-from twin.bridge.tf_throttle import ThrottleConfig, TransformThrottle
+from twin.bridge.tf.throttle import ThrottleConfig, TransformThrottle
 
 
 class TfThrottleNode:

@@ -10,9 +10,9 @@ from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.factory import create_nodes
-from twin.bridge.session import SessionConfig
+from twin.bridge.programs.factory import create_nodes
 from twin.bridge.topics import Sample
+from twin.bridge.wire.session import SessionConfig
 from twin.convert import convert
 from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2

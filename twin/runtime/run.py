@@ -28,7 +28,7 @@ from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
-    from twin.bridge.session import SessionConfig
+    from twin.bridge.wire.session import SessionConfig
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5

@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 
 from twin.bridge import live, types
-from twin.bridge.action_server import ActionServer, GoalHandle
 from twin.bridge.action_types import Fibonacci
-from twin.bridge.defaults import new
+from twin.bridge.actions.server import ActionServer, GoalHandle
 from twin.bridge.msgs import ParameterDescriptor
 from twin.bridge.srvs import AddTwoInts, Empty, SetBool
+from twin.bridge.types.default_values import new
 
+types.register("lab_interfaces/srv/Weigh", "string what\nuint8 times 1\n---\nfloat64 grams\n")
+types.register("lab_interfaces/action/Count", "uint8 up_to\n---\nuint8 last\n---\nuint8 now\n")
+Weigh = types.ServiceType("lab_interfaces/srv/Weigh")
+Count = types.ActionType("lab_interfaces/action/Count")
 FloatingPointRange = types.get("rcl_interfaces/msg/FloatingPointRange")
 
 
@@ -33,6 +37,14 @@ def fibonacci(handle: GoalHandle) -> Generator[None, None, Any]:
     return Fibonacci.Result(np.array(sequence, np.int32))
 
 
+def count(handle: GoalHandle) -> Generator[None, None, Any]:
+    """Count, one number in each spin."""
+    for now in range(1, handle.request.up_to + 1):
+        handle.publish_feedback(Count.Feedback(now))
+        yield
+    return Count.Result(handle.request.up_to)
+
+
 with live.join([], listen=[sys.argv[1]]) as process:
     kept: list[Any] = []
     adder = process.bus.create_node("adder")
@@ -47,6 +59,9 @@ with live.join([], listen=[sys.argv[1]]) as process:
     acting = process.bus.create_node("fibonacci_action_server")
     ActionServer(acting, Fibonacci, "fibonacci", fibonacci, goal_callback=lambda goal: goal.order > 0)
 
+    lab = process.bus.create_node("lab")
+    lab.create_service(Weigh, "weigh", lambda r: Weigh.Response(2.5 * r.times))
+    ActionServer(lab, Count, "count", count)
     settings = process.bus.create_node("settings")
     for name, value in {
         "robot_name": "r2d2",

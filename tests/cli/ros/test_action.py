@@ -16,9 +16,11 @@ Twin = Callable[..., "CompletedProcess[str]"]
 
 
 def test_actions_are_listed_and_found(twin_here: Twin) -> None:
-    assert twin_here("action", "list").stdout == "/fibonacci\n"
-    assert twin_here("action", "list", "-t").stdout == "/fibonacci [example_interfaces/action/Fibonacci]\n"
-    assert twin_here("action", "list", "-c").stdout == "1\n"
+    assert twin_here("action", "list").stdout == "/count\n/fibonacci\n"
+    assert twin_here("action", "list", "-t").stdout.endswith(
+        "/fibonacci [example_interfaces/action/Fibonacci]\n"
+    )
+    assert twin_here("action", "list", "-c").stdout == "2\n"
     assert twin_here("action", "type", "/fibonacci").stdout == "example_interfaces/action/Fibonacci\n"
     assert twin_here("action", "find", "example_interfaces/action/Fibonacci").stdout == "/fibonacci\n"
 
@@ -38,7 +40,10 @@ def test_info_names_clients_and_servers(twin_here: Twin) -> None:
 def test_an_unknown_action_names_the_nearest(twin_here: Twin, command: str) -> None:
     done = twin_here("action", command, "/fibonaci")
     assert done.returncode == 2
-    assert done.stderr == "error: Unknown action '/fibonaci'; did you mean '/fibonacci'? Valid: /fibonacci\n"
+    assert (
+        done.stderr
+        == "error: Unknown action '/fibonaci'; did you mean '/fibonacci'? Valid: /count, /fibonacci\n"
+    )
 
 
 def test_a_goal_is_told_from_sending_to_its_result_as_by_ros2(twin_here: Twin) -> None:
@@ -60,6 +65,12 @@ def test_a_goal_without_feedback_and_one_that_is_rejected(twin_here: Twin) -> No
     rejected = twin_here("action", "send_goal", *FIBONACCI, "{order: 0}")
     assert rejected.returncode == 0
     assert rejected.stdout.endswith("     order: 0\n\nGoal was rejected.\n")
+
+
+def test_an_action_type_that_is_not_known_here_is_learnt_from_the_node(twin: Twin) -> None:
+    done = twin("action", "send_goal", "-f", "/count", "lab_interfaces/action/Count", "{up_to: 2}")
+    assert done.stderr == ""
+    assert "Feedback:\n    now: 1\n\nFeedback:\n    now: 2\n\nResult:\n    last: 2\n" in done.stdout
 
 
 def test_ctrl_c_cancels_the_goal(twin_here: Twin, endpoint: str) -> None:

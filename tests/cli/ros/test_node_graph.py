@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 from twin.bridge.graph import Graph
-from twin.bridge.keys import mangle
+from twin.bridge.wire.keys import mangle
 from twin.cli.ros.node_drawing import svg
 from twin.cli.ros.node_graph import GraphChoice, NodeGraph, Topic, graphviz, node_graph, text
 from twin.cli.ros.node_layout import GAP_Y, LINE_GAP, Edge, Layout, Size, lay_out

@@ -19,6 +19,7 @@ NAMES = [
     "names",
     "robot_name",
     "serial",
+    "start_type_description_service",
     "use_sim_time",
     "version",
     "wheels",
@@ -37,7 +38,7 @@ def test_the_parameters_of_a_node_are_listed(twin_here: Twin) -> None:
 def test_the_parameters_of_all_nodes_are_listed_below_their_names(twin_here: Twin) -> None:
     lines = twin_here("param", "list").stdout.splitlines()
     nodes = [line for line in lines if not line.startswith("  ")]
-    assert nodes == ["/adder:", "/fibonacci_action_server:", "/robot/base:", "/settings:"]
+    assert nodes == ["/adder:", "/fibonacci_action_server:", "/lab:", "/robot/base:", "/settings:"]
     assert lines[lines.index("/settings:") + 1 :] == [f"  {name}" for name in NAMES]
 
 

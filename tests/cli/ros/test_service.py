@@ -27,6 +27,7 @@ def test_services_are_listed_with_their_types(twin_here: Twin) -> None:
         "/add_two_ints [example_interfaces/srv/AddTwoInts]",
         "/never_answers [std_srvs/srv/Empty]",
         "/robot/stop [std_srvs/srv/SetBool]",
+        "/weigh [lab_interfaces/srv/Weigh]",
     ]
 
 
@@ -78,6 +79,13 @@ def test_a_call_prints_request_and_response_as_ros2_does(twin_here: Twin) -> Non
         "requester: making request: example_interfaces.srv.AddTwoInts_Request(a=2, b=3)\n\n"
         "response:\nexample_interfaces.srv.AddTwoInts_Response(sum=5)\n\n"
     )
+
+
+def test_a_type_that_is_not_known_here_is_learnt_from_the_node(twin: Twin) -> None:
+    done = twin("service", "call", "/weigh", "lab_interfaces/srv/Weigh", "{what: feather}")
+    assert done.stderr == ""
+    assert "lab_interfaces.srv.Weigh_Request(what='feather', times=1)\n" in done.stdout
+    assert "lab_interfaces.srv.Weigh_Response(grams=2.5)\n" in done.stdout
 
 
 def test_a_call_without_values_sends_defaults_and_takes_the_short_type(twin_here: Twin) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import re
 import signal
 import subprocess
@@ -292,10 +291,3 @@ def test_throttle_lets_fewer_pass(endpoint: str) -> None:
             texts = [line for line in lines(echo, 8) if line != "---"]
     numbers = [int(text.rpartition(" ")[2]) for text in texts]
     assert all(8 <= after - before <= 20 for before, after in itertools.pairwise(numbers))
-
-
-def test_nobody_there(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "twin.cli", "topic", "list", "--connect", "tcp/127.0.0.1:1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ})
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: nobody answers at tcp/127.0.0.1:1; start `twin run ")

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,8 @@ duration: 120 s
 robots:
   - model: diff_bot
 mission: {type: idle}
+checks:
+  - driven_distance: {max: 100 m}
 """
 TWIST = "{linear: {x: 0.1}, angular: {z: 0.5}}"
 RADIUS = 0.1 / 0.5
@@ -53,7 +56,7 @@ def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path) -> None:
         wait_for(endpoint)
         connect = ("--connect", endpoint)
         watch = ("topic", "echo", "/odom", "--field", "pose.pose.position", "--csv")
-        pub = ("topic", "pub", "-r", "10", "/cmd_vel", "geometry_msgs/msg/Twist", TWIST)
+        pub = ("topic", "pub", "-p", "0", "-r", "10", "/cmd_vel", "geometry_msgs/msg/Twist", TWIST)
         with twin(*watch, *connect) as echo, twin(*pub, *connect):
             track = []
             for x, y in positions(echo):
@@ -67,7 +70,10 @@ def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path) -> None:
 
 def wait_for(endpoint: str) -> None:
     host, port = endpoint.removeprefix("tcp/").split(":")
-    while True:
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
         with socket.socket() as probe:
             if probe.connect_ex((host, int(port))) == 0:
                 return
+        time.sleep(0.05)
+    raise AssertionError("the run does not listen")

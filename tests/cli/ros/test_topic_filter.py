@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from twin.bridge.defaults import new
 from twin.bridge.msgs import LaserScan, Point, PointStamped, String, Twist
-from twin.bridge.type_fields import fields_of
+from twin.bridge.types.default_values import new
+from twin.bridge.types.fields import fields_of
 from twin.cli.ros.topic_filter import compile_filter
 from twin.cli.ros.topic_values import value_text
 from twin.errors import BridgeError

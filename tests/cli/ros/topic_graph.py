@@ -10,10 +10,10 @@ import numpy as np
 from twin.bridge import live, types
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import ActionClient, ActionServer
-from twin.bridge.defaults import new
 from twin.bridge.msgs import LaserScan, PointStamped, String, Twist, stamp
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.types.default_values import new
 
 types.register("course_msgs/msg/Gps", "string name\nfloat64 x\nfloat64[2] position")
 Gps = types.get("course_msgs/msg/Gps")

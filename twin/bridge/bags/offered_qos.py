@@ -101,17 +101,20 @@ def parse(value: Any) -> tuple[OfferedQoS, ...]:
 def publisher_qos(profiles: Sequence[OfferedQoS]) -> QoS:
     """Return the QoS to play a topic with: latched if a publisher was, reliable unless none was.
 
-    The depth of a latched topic is the sum over its publishers: one player stands for all of them.
+    The depth of a latched topic is the sum over its publishers: one player stands for all of them. Deadline,
+    lifespan and liveliness are not promised: the rate of playing would break them.
     """
     if not profiles:
         return QoS(depth=_UNKNOWN_DEPTH)
     latched = [profile for profile in profiles if profile.latched]
     reliable = any(profile.reliability != "best_effort" for profile in profiles)
     depths = [profile.depth or 1 for profile in latched] or [profile.depth for profile in profiles]
+    keeps_all = all(profile.history == "keep_all" for profile in profiles)
     return QoS(
         depth=sum(depths) if latched else max(depths) or _UNKNOWN_DEPTH,
         reliability="reliable" if reliable else "best_effort",
         durability="transient_local" if latched else "volatile",
+        history="keep_all" if keeps_all else "keep_last",
     )
 
 

@@ -12,9 +12,9 @@ from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.origins import Origins
 from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.bridge.bus import Bus
-from twin.bridge.external import Arrival
 from twin.bridge.graph import Graph
 from twin.bridge.topics import Sample, Subscription
+from twin.bridge.wire.external import Arrival
 from twin.errors import RecordingError
 
 _OUTSIDE = -1

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.ros.joining import Joining
+from twin.cli.ros.service_call import know
 from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
-    from twin.bridge.action_client import ActionClient, ClientGoal
+    from twin.bridge.actions.client import ActionClient, ClientGoal
     from twin.bridge.live import LiveBus
 
 _STATUS = {1: "ACCEPTED", 2: "EXECUTING", 3: "CANCELING", 4: "SUCCEEDED", 5: "CANCELED", 6: "ABORTED"}
@@ -38,15 +39,16 @@ def send_goal(
     joining: Joining,
 ) -> None:
     """Send a goal and wait for its result; Ctrl-C cancels the goal."""
-    from twin.bridge.action_client import ActionClient
+    from twin.bridge.actions.client import ActionClient
     from twin.bridge.live import noted_signals
-    from twin.bridge.yaml_messages import message_to_yaml
+    from twin.bridge.messages.as_yaml import message_to_yaml
 
     text = text_of(goal, stdin)
     with joining.open() as process, noted_signals() as signals:
         kind = _action_type(action_type)
-        message = message_of(kind.Goal, text)
         node = tool_node(process.bus, f"send_goal_{kind.name.replace('/', '_')}")
+        know(process, node, _used(kind.name, f"{absolute(action)}/_action"))
+        message = message_of(kind.Goal, text)
         client = ActionClient(node, kind, absolute(action))
         typer.echo("Waiting for an action server to become available...")
         _wait_for_server(process, client, kind.name, timeout, signals)
@@ -81,7 +83,7 @@ def _follow(
     feedback: list[Any],
 ) -> None:
     """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
-    from twin.bridge.yaml_messages import message_to_yaml
+    from twin.bridge.messages.as_yaml import message_to_yaml
 
     def is_over() -> bool:
         while feedback:
@@ -132,12 +134,19 @@ def _refuse_other_type(process: LiveBus, name: str, typename: str) -> None:
             raise BridgeError(f"the action {name} is of type {offered}, not {typename}")
 
 
+def _used(typename: str, base: str) -> dict[str, tuple[str, str]]:
+    """Return the parts of an action's type, and what carries them."""
+    return {
+        f"{typename}_Goal": (f"{base}/send_goal", f"{typename}_SendGoal"),
+        f"{typename}_Result": (f"{base}/get_result", f"{typename}_GetResult"),
+        f"{typename}_Feedback": (f"{base}/feedback", f"{typename}_FeedbackMessage"),
+    }
+
+
 def _action_type(name: str) -> Any:
     from twin.bridge import types
 
     package, kind, tail = types.parts(name if name.count("/") != 1 else name.replace("/", "/action/"))
     if kind != "action":
         raise BridgeError(f"{name} is no action; valid is for example example_interfaces/action/Fibonacci")
-    action_type = types.ActionType(f"{package}/action/{tail}")
-    types.get(f"{action_type.name}_Goal")
-    return action_type
+    return types.ActionType(f"{package}/action/{tail}")

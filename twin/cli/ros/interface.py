@@ -11,7 +11,7 @@ import typer
 from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
-    from twin.bridge.interface_show import Comments
+    from twin.bridge.types.show import Comments
 
 app = typer.Typer(no_args_is_help=True, help="Types: list, show, prototypes; as `ros2 interface`.")
 
@@ -35,7 +35,7 @@ def show(
     """Show a definition, and those of the types that it uses, indented."""
     if all_comments and no_comments:
         raise typer.BadParameter("not together with --no-comments", param_hint="--all-comments")
-    from twin.bridge.interface_show import show_lines
+    from twin.bridge.types.show import show_lines
 
     add_interfaces(interfaces)
     comments: Comments = "all" if all_comments else "none" if no_comments else "own"
@@ -102,7 +102,7 @@ def proto(
     interfaces: Interfaces = None,
 ) -> None:
     """Show a message, a request or a goal with all its fields as YAML, to copy and fill in."""
-    from twin.bridge.interface_show import prototype
+    from twin.bridge.types.show import prototype
 
     add_interfaces(interfaces)
     text = prototype(_given(typename))

@@ -100,7 +100,7 @@ def get(
     joining: Joining,
 ) -> None:
     """Print the value of a parameter."""
-    from twin.bridge.parameter_values import value_to_python
+    from twin.bridge.parameters.values import value_to_python
 
     with joining.open() as process:
         client = ParameterClient(process, find_node(process, node, hidden, timeout))
@@ -133,7 +133,7 @@ def set_parameter(
     joining: Joining,
 ) -> None:
     """Change a parameter."""
-    from twin.bridge.parameter_values import Parameter
+    from twin.bridge.parameters.values import Parameter
 
     message = Parameter(name, value=value_of(value)).to_parameter_msg()
     with joining.open() as process:
@@ -150,7 +150,7 @@ def delete(
     node: Node, name: Name, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining
 ) -> None:
     """Delete a parameter, if the node allows it."""
-    from twin.bridge.parameter_values import Parameter
+    from twin.bridge.parameters.values import Parameter
 
     with joining.open() as process:
         client = ParameterClient(process, find_node(process, node, hidden, timeout))

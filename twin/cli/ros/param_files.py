@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 def dump(node: Node, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining) -> None:
     """Print the parameters of a node as a parameter file."""
-    from twin.bridge.parameter_files import KEY
-    from twin.bridge.parameter_values import value_to_python
+    from twin.bridge.parameters.files import KEY
+    from twin.bridge.parameters.values import value_to_python
 
     with joining.open() as process:
         client = ParameterClient(process, find_node(process, node, hidden, timeout))
@@ -46,7 +46,7 @@ def load(
     joining: Joining,
 ) -> None:
     """Set the parameters of a node to those of a parameter file."""
-    from twin.bridge.parameter_values import Parameter
+    from twin.bridge.parameters.values import Parameter
 
     with joining.open() as process:
         client = ParameterClient(process, find_node(process, node, hidden, timeout))
@@ -67,7 +67,7 @@ def _values_for(file: Path, node: str, use_wildcard: bool) -> dict[str, Any]:
     Raises:
         BridgeError: there are none.
     """
-    from twin.bridge.parameter_files import read, values_for
+    from twin.bridge.parameters.files import read, values_for
 
     sections = tuple(section for section in read(file) if use_wildcard or not section.is_pattern)
     values = values_for(sections, node)
@@ -94,7 +94,7 @@ def _yaml(values: dict[str, Any]) -> str:
     """Return YAML that reads back as the same types: text that looks like a number to ROS is quoted."""
     import yaml
 
-    from twin.bridge.parameter_files import scalar
+    from twin.bridge.parameters.files import scalar
 
     class Dumper(yaml.SafeDumper):
         """Quotes more than YAML needs."""

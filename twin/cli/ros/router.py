@@ -32,7 +32,7 @@ def router(
     ] = None,
 ) -> None:
     """Run a Zenoh router, as rmw_zenohd, until Ctrl-C."""
-    from twin.bridge.router import RouterConfig, run_router
+    from twin.bridge.wire.router import RouterConfig, run_router
 
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

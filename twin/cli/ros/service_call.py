@@ -14,6 +14,7 @@ from twin.errors import BridgeError
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.live import LiveBus
+    from twin.bridge.node import Node
     from twin.bridge.services import Client
 
 
@@ -40,13 +41,14 @@ def call(
     if rate is not None and not rate > 0.0:
         raise BridgeError(f"a rate of {rate} Hz; valid: rate must be greater than zero")
     text = text_of(values, stdin)
-    from twin.bridge.message_repr import message_repr
+    from twin.bridge.messages.as_repr import message_repr
 
     with joining.open() as process:
         srv_type = _service_type(service_type)
-        request = message_of(srv_type.Request, text)
         package, _, name = srv_type.name.split("/")
         node = tool_node(process.bus, f"requester_{package}_{name}")
+        know(process, node, {f"{srv_type.name}_Request": (absolute(service), srv_type.name)})
+        request = message_of(srv_type.Request, text)
         client = node.create_client(srv_type, absolute(service))
         due: list[None] = []
         if rate is not None:
@@ -116,6 +118,29 @@ def _service_type(name: str) -> Any:
     package, kind, tail = types.parts(name if name.count("/") != 1 else name.replace("/", "/srv/"))
     if kind != "srv":
         raise BridgeError(f"{name} is no service; valid is for example std_srvs/srv/Empty")
-    srv_type = types.ServiceType(f"{package}/srv/{tail}")
-    types.get(f"{srv_type.name}_Request")
-    return srv_type
+    return types.ServiceType(f"{package}/srv/{tail}")
+
+
+def know(process: LiveBus, node: Node, used: dict[str, tuple[str, str]]) -> None:
+    """Learn types that are not known here from the nodes that use them.
+
+    Args:
+        process: What the node runs in.
+        node: Asks.
+        used: Message type -> name and type of a service or topic that it is a part of.
+
+    Raises:
+        BridgeError: nobody tells an unknown type; says which names are near.
+    """
+    from twin.bridge import types
+    from twin.bridge.graph import Graph
+    from twin.bridge.tools.unknown_types import is_known, learn_type
+
+    unknown_types = [part for part in used if not is_known(part)]
+    endpoints = Graph.snapshot(process.bus).endpoints if unknown_types else ()
+    for part in unknown_types:
+        name, whole = used[part]
+        users = [e for e in endpoints if e.name == name and e.type == whole and e.kind in ("SS", "MP")]
+        if users:
+            learn_type(process, node, users)
+        types.get(part)

@@ -16,7 +16,7 @@ def message_of(cls: type[Any], text: str) -> Any:
     """
     import yaml
 
-    from twin.bridge.yaml_messages import message_from_dict
+    from twin.bridge.messages.as_yaml import message_from_dict
 
     try:
         values = yaml.safe_load(text)

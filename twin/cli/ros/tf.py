@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
     from twin.bridge.msgs import TransformStamped
     from twin.bridge.tf import TransformBuffer
-    from twin.bridge.tf_report import FrameInfo
+    from twin.bridge.tf.report import FrameInfo
 
 app = typer.Typer(
     no_args_is_help=True, help="Transforms: the tree, a frame in another, delays; as tf2_tools."
@@ -30,7 +30,7 @@ WaitTime = Annotated[float, typer.Option("--wait-time", "-t", min=0.0, help="How
 @joins
 def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
     """Show the frames as a tree, with broadcaster and rate."""
-    from twin.bridge.tf_report import text_tree
+    from twin.bridge.tf.report import text_tree
 
     with joining.open() as process:
         infos, _ = _listen(process, wait_time)
@@ -51,7 +51,7 @@ def frames(
     """Draw the tree: Graphviz text as view_frames writes it, or SVG, which needs no Graphviz."""
     if output is not None and output.suffix not in (".gv", ".svg"):
         raise BridgeError(f"--output {output}: must end in .gv or .svg")
-    from twin.bridge.tf_drawing import graphviz, svg
+    from twin.bridge.tf.drawing import graphviz, svg
     from twin.scenario.verdict import write_atomically
 
     with joining.open() as process:
@@ -106,7 +106,7 @@ def monitor(
     if (source_frame is None) != (target_frame is None):
         raise BridgeError("tf monitor takes two frames, or none for all")
     from twin.bridge.tf import TransformBuffer, TransformListener
-    from twin.bridge.tf_monitor import TransformStatistics, net_delay
+    from twin.bridge.tf.monitor import TransformStatistics, net_delay
 
     with joining.open() as process:
         buffer, statistics = TransformBuffer(), TransformStatistics()
@@ -139,7 +139,7 @@ def monitor(
 def _listen(process: LiveBus, wait_time_s: float) -> tuple[tuple[FrameInfo, ...], int]:
     """Return what is known of the frames after a while, and the time then [ns]."""
     from twin.bridge.tf import TransformBuffer, TransformListener
-    from twin.bridge.tf_report import frame_infos
+    from twin.bridge.tf.report import frame_infos
 
     buffer = TransformBuffer()
     TransformListener(buffer, process.bus.create_node("view_frames"))

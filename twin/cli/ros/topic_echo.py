@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo
     from twin.bridge.qos import QoS
     from twin.bridge.raw import RawSample
-    from twin.bridge.type_fields import Field
+    from twin.bridge.types.fields import Field
     from twin.cli.ros.topic_process import TopicProcess
 
 TRUNCATE_LENGTH = 128
@@ -137,7 +137,7 @@ def chosen_qos(choice: QosChoice, publishers: tuple[EndpointInfo, ...]) -> QoS:
     """Return what is asked for, or what all publishers offer."""
     from dataclasses import replace
 
-    from twin.bridge.topic_tools import qos_for_all
+    from twin.bridge.tools.relay import qos_for_all
 
     qos = choice.qos()
     if choice.is_given or not publishers:
@@ -198,7 +198,7 @@ class EchoPrinter:
 
     def _selected(self, message: Any) -> tuple[Any, Field | None]:
         """Return the part that --field names; None as field if it is a whole message."""
-        from twin.bridge.type_fields import fields_of
+        from twin.bridge.types.fields import fields_of
 
         value, field = message, None
         for name in self._style.field:
@@ -214,7 +214,7 @@ class EchoPrinter:
         return value, None if _is_message(value) else field
 
     def _text(self, sample: RawSample, value: Any, field: Field | None) -> str:
-        from twin.bridge.yaml_messages import message_to_csv, message_to_yaml, to_yaml
+        from twin.bridge.messages.as_yaml import message_to_csv, message_to_yaml, to_yaml
         from twin.cli.ros.topic_values import value_text
 
         style = self._style

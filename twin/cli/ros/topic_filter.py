@@ -170,7 +170,7 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
 
 def _attribute(owner: Any, name: str) -> Any:
     """Return a field of a message."""
-    from twin.bridge.type_fields import fields_of
+    from twin.bridge.types.fields import fields_of
 
     if not hasattr(owner, "__msgtype__"):
         raise AttributeError(f"{type(owner).__name__} has no field {name!r}")

@@ -11,7 +11,7 @@ import typer
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
-    from twin.bridge.cdr import Codec
+    from twin.bridge.cdr.codec import Codec
     from twin.bridge.graph import EndpointInfo
     from twin.bridge.qos import QoS
     from twin.bridge.raw import RawSample
@@ -27,7 +27,7 @@ class Listener:
     def __init__(
         self, process: TopicProcess, name: str, typename: str, type_hash: str, cls: type[Any] | None
     ) -> None:
-        from twin.bridge.cdr import codec
+        from twin.bridge.cdr.codec import codec
 
         self.name = name
         self._process = process
@@ -40,7 +40,7 @@ class Listener:
         cls, process: TopicProcess, name: str, endpoints: Sequence[EndpointInfo], message: type[Any] | None
     ) -> Listener:
         """Listen to a topic that exists; without a class only to its bytes."""
-        from twin.bridge.topic_types import hash_of
+        from twin.bridge.tools.unknown_types import hash_of
 
         return cls(process, name, endpoints[0].type, hash_of(endpoints[0]), message)
 
@@ -66,7 +66,7 @@ class Listener:
     def listen(self, qos: QoS, callback: Callable[[RawSample], Any]) -> None:
         """Call back for every sample of the topic's type."""
         from twin.bridge.raw import RawSubscription
-        from twin.bridge.topic_tools import Presence
+        from twin.bridge.tools.relay import Presence
 
         node = self._process.node
         Presence(node, "MS", self.name, self._type, self._type_hash, qos)
@@ -88,7 +88,7 @@ class Listener:
             return None
 
     def _is_ours(self, sample: RawSample) -> bool:
-        from twin.bridge.topic_types import same_hash
+        from twin.bridge.tools.unknown_types import same_hash
 
         if sample.type == self._type and same_hash(sample.type_hash, self._type_hash):
             return True

@@ -15,7 +15,7 @@ from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.raw import RawSample
-    from twin.bridge.topic_statistics import Bandwidth, RateStatistics, Spread
+    from twin.bridge.tools.statistics import Bandwidth, RateStatistics, Spread
     from twin.cli.ros.topic_process import TopicProcess
 
 _SECOND_NS = 1_000_000_000
@@ -41,7 +41,7 @@ def hz(
     joining: Joining,
 ) -> None:
     """Print the average publishing rate, every second."""
-    from twin.bridge.topic_statistics import RateStatistics
+    from twin.bridge.tools.statistics import RateStatistics
     from twin.cli.ros.topic_filter import compile_filter
     from twin.cli.ros.topic_process import open_topics
 
@@ -70,7 +70,7 @@ def hz(
 @endless
 def bw(topic: TopicName, window: Window = 100, *, joining: Joining) -> None:
     """Print the bandwidth that a topic uses, every second."""
-    from twin.bridge.topic_statistics import BandwidthStatistics
+    from twin.bridge.tools.statistics import BandwidthStatistics
     from twin.cli.ros.topic_process import open_topics
 
     with open_topics(joining) as process:
@@ -95,8 +95,8 @@ def bw(topic: TopicName, window: Window = 100, *, joining: Joining) -> None:
 def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> None:
     """Print how old messages are by the stamps in their headers, every second."""
     from twin.bridge.msgs import ns
-    from twin.bridge.topic_statistics import DelayStatistics
-    from twin.bridge.type_fields import fields_of
+    from twin.bridge.tools.statistics import DelayStatistics
+    from twin.bridge.types.fields import fields_of
     from twin.cli.ros.topic_process import open_topics
 
     with open_topics(joining) as process:

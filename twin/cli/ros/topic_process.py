@@ -69,7 +69,7 @@ class TopicProcess:
         Raises:
             BridgeError: several types, an unknown one, or one with another definition than is known here.
         """
-        from twin.bridge import topic_types
+        from twin.bridge.tools import unknown_types as topic_types
 
         topic_types.only_type(name, endpoints)
         return topic_types.message_class(self.live, self.node, endpoints)

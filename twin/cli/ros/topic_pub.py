@@ -162,7 +162,7 @@ def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]
 
 def _maker(process: TopicProcess, cls: type[Any], values: dict[str, Any]) -> Callable[[], Any]:
     """Return what makes the next message: a new one only if it is stamped."""
-    from twin.bridge.yaml_messages import message_from_dict
+    from twin.bridge.messages.as_yaml import message_from_dict
 
     message = message_from_dict(cls, values, now_ns=process.now_ns)
     if not _is_stamped(values):
@@ -199,7 +199,7 @@ def _wait_for_subscriptions(process: TopicProcess, publisher: Publisher[Any], pl
 def _publish(
     process: TopicProcess, publisher: Publisher[Any], make: Callable[[], Any], plan: PublishPlan
 ) -> None:
-    from twin.bridge.message_repr import message_repr
+    from twin.bridge.messages.as_repr import message_repr
 
     count = 0
 

@@ -12,7 +12,7 @@ from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
-    from twin.bridge.topic_tools import Gate
+    from twin.bridge.tools.relay import Gate
     from twin.cli.ros.topic_process import TopicProcess
 
 Input = Annotated[str, typer.Argument(metavar="IN", help="Topic to take from.", show_default=False)]
@@ -43,7 +43,7 @@ def throttle_messages(
     joining: Joining,
 ) -> None:
     """Pass at most so many messages on in a second; OUT is IN_throttle unless named."""
-    from twin.bridge.topic_tools import MessageThrottle
+    from twin.bridge.tools.relay import MessageThrottle
 
     _run(
         _clock(joining, wall_time),
@@ -72,7 +72,7 @@ def throttle_bytes(
     joining: Joining,
 ) -> None:
     """Pass messages on until so many bytes went by in the window; OUT is IN_throttle unless named."""
-    from twin.bridge.topic_tools import ByteThrottle
+    from twin.bridge.tools.relay import ByteThrottle
 
     _run(
         _clock(joining, wall_time),
@@ -94,7 +94,7 @@ def drop(
     joining: Joining,
 ) -> None:
     """Of every Y messages drop X and pass the others on; OUT is IN_drop unless named."""
-    from twin.bridge.topic_tools import Drop
+    from twin.bridge.tools.relay import Drop
 
     if x > y:
         raise BridgeError(f"X is {x} and Y {y}: of {y} messages at most {y} can be dropped")
@@ -110,7 +110,7 @@ def _clock(joining: Joining, wall_time: bool) -> Joining:
 def _run(
     joining: Joining, node: str, source: str, target: str, gate: Callable[[TopicProcess], Gate] | None
 ) -> None:
-    from twin.bridge.topic_tools import Relay
+    from twin.bridge.tools.relay import Relay
     from twin.cli.ros.topic_process import open_topics
 
     with open_topics(joining, node_name=node) as process:

@@ -1,0 +1,188 @@
+"""Action clients: a goal that is polled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, Any
+
+import xxhash
+
+from twin.bridge.actions.goal import uuid_msg
+from twin.bridge.actions.states import ACTIVE
+from twin.bridge.msgs import GoalInfo, GoalStatus, GoalStatusArray, stamp
+from twin.bridge.qos import LATCHED
+from twin.bridge.services import Future
+from twin.bridge.srvs import CancelGoal
+from twin.bridge.types import ActionType
+
+if TYPE_CHECKING:
+    from twin.bridge.node import Node
+
+
+class ClientGoal:
+    """A goal as its client sees it; changes in spins of the client's node.
+
+    In executions and tasks `yield from goal` waits until it is done.
+    """
+
+    def __init__(self, client: ActionClient, goal_id: bytes) -> None:
+        self.goal_id = goal_id
+        """16 bytes."""
+        self.accepted: bool | None = None
+        """None until the server has answered."""
+        self.status: int = GoalStatus.STATUS_UNKNOWN
+        """A constant of action_msgs/GoalStatus, as the server last told."""
+        self.result: Any = None
+        """The result message once done; None if the goal was rejected or the server is gone."""
+        self.error: str | None = None
+        """Why there is no result."""
+        self.done = False
+        """Whether nothing will change any more: a result, a rejection or an error."""
+        self._client = client
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the goal ended with success."""
+        return self.status == GoalStatus.STATUS_SUCCEEDED
+
+    def cancel(self) -> Future:
+        """Ask the server to end the goal; the future's result is a CancelGoal response."""
+        return self._client.cancel(self)
+
+    def __iter__(self) -> Generator[None, None, ClientGoal]:
+        """Wait in an execution."""
+        while not self.done:
+            yield
+        return self
+
+
+class ActionClient:
+    """Sends goals to an action server."""
+
+    def __init__(self, node: Node, action_type: ActionType, name: str) -> None:
+        """Make a client of the action `name`.
+
+        Raises:
+            BridgeError: an invalid name.
+        """
+        self._type = action_type
+        self.name = node.resolve_name(name)
+        """Absolute name of the action."""
+        self._goals: dict[bytes, tuple[ClientGoal, Callable[[Any], None] | None]] = {}
+        self._count = 0
+        self._node = node
+        self._destroyed = False
+        node.action_clients += 1
+        # Not the gid: that depends on what other nodes have created before.
+        self._seed = f"{node.bus.session_id}{node.fully_qualified_name}#{node.action_clients}".encode()
+        base = f"{self.name}/_action"
+        self._send = node.create_client(action_type.SendGoal, f"{base}/send_goal")
+        self._cancel = node.create_client(CancelGoal, f"{base}/cancel_goal")
+        self._result = node.create_client(action_type.GetResult, f"{base}/get_result")
+        self._subscriptions = (
+            node.create_subscription(action_type.FeedbackMessage, f"{base}/feedback", self._on_feedback),
+            node.create_subscription(GoalStatusArray, f"{base}/status", self._on_status, LATCHED),
+        )
+
+    @property
+    def server_is_ready(self) -> bool:
+        """Whether somebody offers the action now."""
+        return self._send.service_is_ready
+
+    def wait_for_server(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
+        """Wait in an execution, as `Client.wait_for_service`."""
+        return (yield from self._send.wait_for_service(timeout_ns))
+
+    def send_goal(self, goal: Any, feedback_callback: Callable[[Any], None] | None = None) -> ClientGoal:
+        """Send a goal; the callback gets each Feedback message.
+
+        Raises:
+            TypeError: a goal of another type.
+        """
+        if type(goal) is not self._type.Goal:
+            raise TypeError(f"{self.name} takes {self._type.name}_Goal, not {type(goal).__name__}")
+        self._count += 1
+        # Unique like a random UUID, and the same in the same run.
+        goal_id = xxhash.xxh3_128_digest(self._seed + self._count.to_bytes(8, "little"))
+        client_goal = ClientGoal(self, goal_id)
+        self._goals[goal_id] = (client_goal, feedback_callback)
+        request = self._type.SendGoal.Request(uuid_msg(goal_id), goal)
+        self._send.call_async(request).add_done_callback(lambda f: self._on_accepted(client_goal, f))
+        return client_goal
+
+    def cancel(self, goal: ClientGoal) -> Future:
+        """Ask the server to end a goal."""
+        return self._ask_to_cancel(goal.goal_id, 0)
+
+    def cancel_all(self) -> Future:
+        """Ask the server to end all goals, those of other clients too."""
+        return self._ask_to_cancel(bytes(16), 0)
+
+    def cancel_before(self, time_ns: int) -> Future:
+        """Ask the server to end all goals accepted until a time [ns] above zero, of other clients too."""
+        return self._ask_to_cancel(bytes(16), time_ns)
+
+    def get_result(self, goal_id: bytes) -> Future:
+        """Ask for the result of any goal; the future's result is a GetResult response with status and result.
+
+        The status is UNKNOWN, and the result empty, if the server does not know the goal (any more).
+        """
+        return self._result.call_async(self._type.GetResult.Request(uuid_msg(goal_id)))
+
+    def destroy(self) -> None:
+        """Be a client no more: goals that are not done end with an error. Harmless when repeated."""
+        self._destroyed = True
+        for client in (self._send, self._cancel, self._result):
+            self._node.destroy_client(client)
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+
+    def _ask_to_cancel(self, goal_id: bytes, until_ns: int) -> Future:
+        return self._cancel.call_async(CancelGoal.Request(GoalInfo(uuid_msg(goal_id), stamp(until_ns))))
+
+    def _on_accepted(self, goal: ClientGoal, future: Future) -> None:
+        if future.error is not None:
+            goal.accepted = False
+            self._finish(
+                goal, self._why(f"no server of the action {self.name} answered; is its node running?")
+            )
+            return
+        goal.accepted = bool(future.result.accepted)
+        if not goal.accepted:
+            self._finish(goal, f"the action {self.name} rejected the goal")
+            return
+        if goal.status == GoalStatus.STATUS_UNKNOWN:
+            goal.status = GoalStatus.STATUS_ACCEPTED
+        self.get_result(goal.goal_id).add_done_callback(lambda f: self._on_result(goal, f))
+
+    def _on_result(self, goal: ClientGoal, future: Future) -> None:
+        if future.error is not None:
+            goal.status = GoalStatus.STATUS_UNKNOWN
+            why = f"the server of the action {self.name} went away before the goal had ended"
+            self._finish(goal, self._why(why))
+            return
+        goal.status = int(future.result.status)
+        if goal.status == GoalStatus.STATUS_UNKNOWN:
+            self._finish(goal, f"the server of the action {self.name} does not know the goal any more")
+            return
+        goal.result = future.result.result
+        self._finish(goal, None)
+
+    def _why(self, reason: str) -> str:
+        return f"the client of the action {self.name} was destroyed" if self._destroyed else reason
+
+    def _finish(self, goal: ClientGoal, error: str | None) -> None:
+        goal.error = error
+        goal.done = True
+        self._goals.pop(goal.goal_id, None)
+
+    def _on_feedback(self, message: Any) -> None:
+        _, callback = self._goals.get(bytes(message.goal_id.uuid), (None, None))
+        if callback is not None:
+            callback(message.feedback)
+
+    def _on_status(self, message: GoalStatusArray) -> None:
+        for entry in message.status_list:
+            goal, _ = self._goals.get(bytes(entry.goal_info.goal_id.uuid), (None, None))
+            if goal is not None and entry.status in ACTIVE:  # the end comes with the result
+                goal.status = int(entry.status)

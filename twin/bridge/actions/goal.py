@@ -1,0 +1,115 @@
+"""A goal as its action server's callbacks see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from twin.bridge.actions.states import ACTIVE, GoalEvent
+from twin.bridge.msgs import UUID, GoalInfo, GoalStatus, stamp
+
+if TYPE_CHECKING:
+    from twin.bridge.actions.server import ActionServer
+
+Execute = Callable[["GoalHandle"], Generator[None, None, Any]]
+"""Executes a goal: each yield waits for the next spin, the return value is the result message."""
+
+
+class _Answer:
+    """Enums are true whatever their value; rclpy's answers are not to be."""
+
+    value: int
+
+    def __bool__(self) -> bool:
+        return self.value == 2
+
+
+class GoalResponse(_Answer, Enum):
+    """What a goal callback answers; True and False do as well."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
+class CancelResponse(_Answer, Enum):
+    """What a cancel callback answers; True and False do as well."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
+class GoalHandle:
+    """An accepted goal."""
+
+    def __init__(self, server: ActionServer, goal_id: bytes, request: Any, accepted_ns: int) -> None:
+        self.request = request
+        """The goal message."""
+        self.goal_id = goal_id
+        """16 bytes."""
+        self.accepted_ns = accepted_ns
+        self.status: int = GoalStatus.STATUS_ACCEPTED
+        """A constant of action_msgs/GoalStatus."""
+        self._server = server
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the goal has not ended yet."""
+        return self.status in ACTIVE
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether a client wants the goal to end; answer with `canceled()` and return."""
+        return self.status == GoalStatus.STATUS_CANCELING
+
+    @property
+    def info(self) -> GoalInfo:
+        """Id and time of acceptance."""
+        return GoalInfo(uuid_msg(self.goal_id), stamp(self.accepted_ns))
+
+    def execute(self, execute: Execute | None = None) -> None:
+        """Start the execution; only for servers with a `handle_accepted_callback`.
+
+        Args:
+            execute: Instead of the server's.
+        """
+        self._server.execute_goal(self, execute)
+
+    def succeed(self) -> None:
+        """End with success; the result is what the execution returns. The default when it returns.
+
+        Raises:
+            BridgeError: the goal has ended before, or is not executed yet.
+        """
+        self._server.update(self, GoalEvent.SUCCEED)
+
+    def abort(self) -> None:
+        """End as failed; the result is what the execution returns.
+
+        Raises:
+            BridgeError: the goal has ended before, or is not executed yet.
+        """
+        self._server.update(self, GoalEvent.ABORT)
+
+    def canceled(self) -> None:
+        """End as cancelled; the result is what the execution returns.
+
+        Raises:
+            BridgeError: no client wants it, or the goal has ended before.
+        """
+        self._server.update(self, GoalEvent.CANCELED)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Tell the client how far it is; `feedback` is the action's Feedback message.
+
+        Raises:
+            TypeError: another message.
+        """
+        self._server.publish_feedback(self, feedback)
+
+
+def uuid_msg(goal_id: bytes) -> UUID:
+    """Return a goal's id as a message."""
+    return UUID(np.frombuffer(goal_id, np.uint8))

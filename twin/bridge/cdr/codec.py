@@ -1,0 +1,259 @@
+"""Messages to CDR bytes and back: rosbags' codec in general, packed structs for the hot types.
+
+A fast path gives the same bytes as the general one (tested); the general one reads big endian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import chain
+from struct import Struct, pack, unpack_from
+from typing import Any, Generic, TypeVar
+
+from twin.bridge import types
+from twin.bridge.cdr.packed import (
+    check_end,
+    decode_imu,
+    decode_joint_state,
+    decode_odometry,
+    encode_imu,
+    encode_joint_state,
+    encode_odometry,
+    read_text,
+)
+from twin.bridge.cdr.path import decode_path, encode_path
+from twin.bridge.cdr.wide import decode_wide, encode_wide, is_wide
+from twin.bridge.messages.from_values import checked
+from twin.bridge.msgs import (
+    Clock,
+    Header,
+    Imu,
+    JointState,
+    Odometry,
+    Path,
+    Point,
+    Pose,
+    PoseArray,
+    Quaternion,
+    TFMessage,
+    Time,
+    Transform,
+    TransformStamped,
+    Twist,
+    Vector3,
+)
+from twin.bridge.types.fields import array_types
+
+M = TypeVar("M")
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+"""The encapsulation header of plain CDR, little endian."""
+
+_TWIST = Struct("<4s6d")
+_CLOCK = Struct("<4siI")
+_STAMP = Struct("<iI")
+_TEXT_LENGTH = Struct("<I")
+_POSE = Struct("<7d")
+
+
+@dataclass(frozen=True)
+class Codec(Generic[M]):
+    """How one message type travels."""
+
+    msgtype: str
+    """package/msg/Name."""
+    cls: type[M]
+    encode: Callable[[M], bytes]
+    """Raises BridgeError, naming the field, if one has a value that it cannot hold."""
+    decode: Callable[[bytes], M]
+    """Raises on bytes that are not such a message; which exception is not specified. Takes no more memory
+    than some times the payload, whatever lengths the payload tells."""
+
+
+def codec(cls: type[M]) -> Codec[M]:
+    """Return the codec of a message class; rosbags generates its code now, not in the loop."""
+    general = general_codec(cls)
+    fast = _FAST.get(general.msgtype)
+    if fast is None:
+        return general
+    encode, decode = fast
+
+    def explained(message: M) -> bytes:
+        try:
+            return encode(message)
+        except Exception:
+            return general.encode(checked(message))
+
+    return Codec(general.msgtype, cls, explained, decode)
+
+
+def general_codec(cls: type[M]) -> Codec[M]:
+    """Return rosbags' codec of a message class."""
+    msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
+    if is_wide(msgtype):
+        return Codec(msgtype, cls, _explained(encode_wide), lambda payload: decode_wide(payload, msgtype))
+    types.store.get_msgdef(msgtype)
+    serialize, deserialize = types.store.serialize_cdr, types.store.deserialize_cdr
+    arrays = array_types(msgtype)
+
+    def encode(message: M) -> bytes:
+        for read, dtype in arrays:  # rosbags would send the bytes of another type of numbers as they are
+            if read(message).dtype != dtype:
+                message = checked(message)
+                break
+        return bytes(serialize(message, msgtype, little_endian=True))
+
+    def decode(payload: bytes) -> Any:
+        return deserialize(payload, msgtype)
+
+    return Codec(msgtype, cls, _explained(encode), decode)
+
+
+def _explained(encode: Callable[[M], bytes]) -> Callable[[M], bytes]:
+    """Return `encode` that repairs what it can, such as a list of numbers, and names the field otherwise."""
+
+    def explained(message: M) -> bytes:
+        try:
+            return encode(message)
+        except Exception:
+            return encode(checked(message))
+
+    return explained
+
+
+def _encode_twist(message: Twist) -> bytes:
+    v, w = message.linear, message.angular
+    return _TWIST.pack(LITTLE_ENDIAN, v.x, v.y, v.z, w.x, w.y, w.z)
+
+
+def _decode_twist(payload: bytes) -> Twist:
+    if payload[:4] != LITTLE_ENDIAN or len(payload) != _TWIST.size:
+        return general_codec(Twist).decode(payload)
+    _, vx, vy, vz, wx, wy, wz = _TWIST.unpack(payload)
+    return Twist(Vector3(vx, vy, vz), Vector3(wx, wy, wz))
+
+
+def _encode_clock(message: Clock) -> bytes:
+    return _CLOCK.pack(LITTLE_ENDIAN, message.clock.sec, message.clock.nanosec)
+
+
+def _decode_clock(payload: bytes) -> Clock:
+    if payload[:4] != LITTLE_ENDIAN or len(payload) != _CLOCK.size:
+        return general_codec(Clock).decode(payload)
+    _, sec, nanosec = _CLOCK.unpack(payload)
+    return Clock(Time(sec, nanosec))
+
+
+@lru_cache(maxsize=4096)
+def _transform_struct(phase: int, frame_id: str, child_frame_id: str) -> tuple[Struct, bytes, bytes]:
+    """Return the layout of a TransformStamped at `phase` bytes (mod 8) into the payload, and its texts."""
+    frame, child = frame_id.encode() + b"\0", child_frame_id.encode() + b"\0"
+    before = -phase % 4
+    end = phase + before + 8 + 4 + len(frame)
+    middle = -end % 4
+    end += middle + 4 + len(child)
+    after = -end % 8
+    return Struct(f"<{before}xiII{len(frame)}s{middle}xI{len(child)}s{after}x7d"), frame, child
+
+
+def _encode_tf(message: TFMessage) -> bytes:
+    chunks = [LITTLE_ENDIAN + _TEXT_LENGTH.pack(len(message.transforms))]
+    at = 4
+    for item in message.transforms:
+        head, t, q = item.header, item.transform.translation, item.transform.rotation
+        layout, frame, child = _transform_struct(at % 8, head.frame_id, item.child_frame_id)
+        time = head.stamp
+        chunks.append(
+            layout.pack(
+                time.sec,
+                time.nanosec,
+                len(frame),
+                frame,
+                len(child),
+                child,
+                t.x,
+                t.y,
+                t.z,
+                q.x,
+                q.y,
+                q.z,
+                q.w,
+            )
+        )
+        at += layout.size
+    return b"".join(chunks)
+
+
+def _decode_tf(payload: bytes) -> TFMessage:
+    if payload[:4] != LITTLE_ENDIAN:
+        return general_codec(TFMessage).decode(payload)
+    (count,) = _TEXT_LENGTH.unpack_from(payload, 4)
+    at = 8
+    transforms = []
+    for _ in range(count):
+        at += -at % 4
+        sec, nanosec = _STAMP.unpack_from(payload, at)
+        frame, at = read_text(payload, at + 8)
+        child, at = read_text(payload, at)
+        at += (4 - at) % 8  # the header's 4 bytes do not count for alignment
+        x, y, z, qx, qy, qz, qw = _POSE.unpack_from(payload, at)
+        at += _POSE.size
+        transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
+        transforms.append(TransformStamped(Header(Time(sec, nanosec), frame), child, transform))
+    check_end(payload, at)
+    return TFMessage(transforms)
+
+
+def _encode_poses(message: PoseArray) -> bytes:
+    frame = message.header.frame_id.encode() + b"\0"
+    time, n = message.header.stamp, len(message.poses)
+    to_count = -len(frame) % 4
+    to_poses = -(len(frame) + to_count) % 8 if n else 0  # the other 16 bytes since the header are aligned
+    values = [(p.position, p.orientation) for p in message.poses]
+    numbers = chain.from_iterable((t.x, t.y, t.z, q.x, q.y, q.z, q.w) for t, q in values)
+    layout = f"<4siII{len(frame)}s{to_count}xI{to_poses}x{7 * n}d"
+    return pack(layout, LITTLE_ENDIAN, time.sec, time.nanosec, len(frame), frame, n, *numbers)
+
+
+def _decode_poses(payload: bytes) -> PoseArray:
+    if payload[:4] != LITTLE_ENDIAN:
+        return general_codec(PoseArray).decode(payload)
+    sec, nanosec = _STAMP.unpack_from(payload, 4)
+    frame, at = read_text(payload, 12)
+    at += -at % 4
+    (n,) = _TEXT_LENGTH.unpack_from(payload, at)
+    at += 4
+    if n:
+        at += (4 - at) % 8
+    if n * _POSE.size > len(payload) - at:
+        raise ValueError(f"{n} poses do not fit")
+    check_end(payload, at + n * _POSE.size)
+    values = unpack_from(f"<{7 * n}d", payload, at)
+    poses = [
+        Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
+        for x, y, z, qx, qy, qz, qw in zip(*[iter(values)] * 7, strict=True)
+    ]
+    return PoseArray(Header(Time(sec, nanosec), frame), poses)
+
+
+def _little_endian(cls: type[M], decode: Callable[[bytes], M]) -> Callable[[bytes], M]:
+    """Return a decoder that leaves big-endian payloads to the general codec."""
+
+    def either(payload: bytes) -> M:
+        return decode(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).decode(payload)
+
+    return either
+
+
+_FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {
+    Twist.__msgtype__: (_encode_twist, _decode_twist),
+    Clock.__msgtype__: (_encode_clock, _decode_clock),
+    TFMessage.__msgtype__: (_encode_tf, _decode_tf),
+    PoseArray.__msgtype__: (_encode_poses, _decode_poses),
+    Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
+    Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
+    Path.__msgtype__: (encode_path, _little_endian(Path, decode_path)),
+    JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),
+}

@@ -1,0 +1,61 @@
+"""Packed codec of Path: many poses that mostly share one header."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from struct import Struct
+
+from twin.bridge.cdr.packed import check_end, read_text
+from twin.bridge.msgs import Header, Path, Point, Pose, PoseStamped, Quaternion, Time
+
+_MAGIC = b"\x00\x01\x00\x00"
+_U32 = Struct("<I")
+_STAMP = Struct("<iI")
+_POSE = Struct("<7d")
+
+
+@lru_cache(maxsize=256)
+def _pose_struct(phase: int, frame: str) -> tuple[Struct, bytes]:
+    """Return the layout of a PoseStamped that begins at `phase` (mod 8), and its frame's bytes."""
+    raw = frame.encode() + b"\0"
+    before = -phase % 4
+    end = phase + before + 12 + len(raw)
+    return Struct(f"<{before}xiII{len(raw)}s{-end % 8}x7d"), raw
+
+
+def encode_path(message: Path) -> bytes:
+    """Return a Path as CDR."""
+    stamp, raw = message.header.stamp, message.header.frame_id.encode() + b"\0"
+    head = _STAMP.pack(stamp.sec, stamp.nanosec) + _U32.pack(len(raw)) + raw
+    head += b"\0" * (-len(head) % 4) + _U32.pack(len(message.poses))
+    chunks, at = [_MAGIC, head], len(head)
+    for item in message.poses:
+        header, p, q = item.header, item.pose.position, item.pose.orientation
+        layout, raw = _pose_struct(at % 8, header.frame_id)
+        time = header.stamp
+        chunks.append(layout.pack(time.sec, time.nanosec, len(raw), raw, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        at += layout.size
+    return b"".join(chunks)
+
+
+def decode_path(payload: bytes) -> Path:
+    """Return a Path from little-endian CDR."""
+    stamp = Time(*_STAMP.unpack_from(payload, 4))
+    frame, at = read_text(payload, 12)
+    at += -at % 4
+    (count,) = _U32.unpack_from(payload, at)
+    at += 4
+    if count > len(payload):
+        raise ValueError(f"{count} poses do not fit")
+    poses = []
+    for _ in range(count):
+        at += -at % 4
+        time = Time(*_STAMP.unpack_from(payload, at))
+        pose_frame, at = read_text(payload, at + 8)
+        at += (4 - at) % 8  # the encapsulation's 4 bytes do not count for alignment
+        x, y, z, qx, qy, qz, qw = _POSE.unpack_from(payload, at)
+        at += _POSE.size
+        pose = Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
+        poses.append(PoseStamped(Header(time, pose_frame), pose))
+    check_end(payload, at)
+    return Path(Header(stamp, frame), poses)

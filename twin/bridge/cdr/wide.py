@@ -1,0 +1,117 @@
+"""Messages with wstrings, which rosbags cannot encode.
+
+On the wire a wstring is the number of its UTF-16 units and each of them as an uint32, without a terminator
+(rosidl_typesupport_fastrtps_cpp, serialization_helpers.hpp): the same bytes as an uint32[]. So such
+messages are encoded in a wire form in which every wstring is an uint32[].
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
+
+from twin.bridge import types
+from twin.bridge.types.fields import Field, fields_of
+
+_wire = get_typestore(Stores.EMPTY)
+_UNITS = "twin/msg/Units"
+_UINT32S: Any = (Nodetype.SEQUENCE, ((Nodetype.BASE, ("uint32", 0)), 0))
+_wire.register({_UNITS: ([], [("units", _UINT32S)])})
+
+
+@cache
+def is_wide(typename: str) -> bool:
+    """Say whether a message has a wstring, at any depth."""
+    return any(
+        field.base == "wstring" or (field.message != "" and is_wide(field.message))
+        for field in fields_of(typename)
+    )
+
+
+def encode_wide(message: Any) -> bytes:
+    """Return a message with wstrings as CDR.
+
+    Raises:
+        AttributeError, TypeError, ValueError, struct.error: a field of the wrong type.
+    """
+    name: str = message.__msgtype__
+    _register(name)
+    return bytes(_wire.serialize_cdr(_to_wire(message, name), name, little_endian=True))
+
+
+def decode_wide(payload: bytes, typename: str) -> Any:
+    """Return a message with wstrings from CDR.
+
+    Raises:
+        SerdeError, ValueError: no such message.
+    """
+    _register(typename)
+    return _from_wire(_wire.deserialize_cdr(payload, typename), typename)
+
+
+def _register(name: str) -> None:
+    if name in _wire.types:
+        return
+    constants, fields = types.store.fielddefs[name]
+    wire: Any = {name: (constants, [(field, _wire_type(description)) for field, description in fields])}
+    for field in fields_of(name):
+        if field.message:
+            _register(field.message)
+    _wire.register(wire)
+
+
+def _wire_type(description: Any) -> Any:
+    node, value = description
+    if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        wide = value[0][0] == Nodetype.BASE and value[0][1][0] == "wstring"
+        return node, ((Nodetype.NAME, _UNITS) if wide else value[0], value[1])
+    return _UINT32S if node == Nodetype.BASE and value[0] == "wstring" else description
+
+
+def _to_wire(message: Any, name: str) -> Any:
+    values = [_field_to_wire(getattr(message, field.attribute), field) for field in fields_of(name)]
+    return _wire.types[name](*values)
+
+
+def _field_to_wire(value: Any, field: Field) -> Any:
+    if field.base == "wstring":
+        if not field.many:
+            return _units(value)
+        return [_wire.types[_UNITS](_units(item)) for item in value]
+    if field.message and is_wide(field.message):
+        if not field.many:
+            return _to_wire(value, field.message)
+        return [_to_wire(item, field.message) for item in value]
+    return value
+
+
+def _from_wire(message: Any, name: str) -> Any:
+    values = [_field_from_wire(getattr(message, field.attribute), field) for field in fields_of(name)]
+    return types.get(name)(*values)
+
+
+def _field_from_wire(value: Any, field: Field) -> Any:
+    if field.base == "wstring":
+        return [_text(item.units) for item in value] if field.many else _text(value)
+    if field.message:
+        return (
+            [_from_wire(item, field.message) for item in value]
+            if field.many
+            else _from_wire(value, field.message)
+        )
+    return value
+
+
+def _units(text: str) -> NDArray[np.uint32]:
+    return np.frombuffer(text.encode("utf-16-le"), np.uint16).astype(np.uint32)
+
+
+def _text(units: NDArray[np.uint32]) -> str:
+    if units.size and int(units.max()) > 0xFFFF:
+        raise ValueError(f"{int(units.max())} is no UTF-16 unit")
+    return units.astype(np.uint16).tobytes().decode("utf-16-le")

@@ -1,0 +1,161 @@
+"""Nodes in a process of their own, in lock-step with a simulation: `twin run … --wait-for /controller`."""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
+from twin.bridge.live import DEFAULT_ENDPOINT, domain_id_of
+from twin.bridge.lockstep.protocol import STEP, node_token, requests, responses, run_token, step_key
+from twin.bridge.lockstep.recorder import Recorder
+from twin.bridge.msgs import ns
+from twin.bridge.node_services import StandardServices
+from twin.bridge.wire.keys import pack_attachment, parse_attachment
+from twin.bridge.wire.session import SessionConfig, direct, open_session
+from twin.errors import BridgeError
+
+_FIRST_ID = 1_000_000
+"""Entity ids of this process begin beyond those of the run, of which its nodes seem to be a part."""
+_IDS = 10_000
+_RETRY_S = 0.2
+_PATIENCE_S = 5.0
+_log = logging.getLogger("twin.lockstep")
+
+
+class LockstepProcess:
+    """Nodes that a run steps; see `join`."""
+
+    def __init__(self, bus: Bus, clock: Clock, network: zenoh.Session) -> None:
+        self.bus = bus
+        """Where to create nodes; it reaches nobody but the run, and does so in `spin`."""
+        self._clock = clock
+        self._network = network
+        self._recorder = Recorder(bus)
+        self._steps: queue.SimpleQueue[zenoh.Query | None] = queue.SimpleQueue()
+        self._declared: list[Any] = []
+        self._stepped = False
+
+    def spin(self) -> None:
+        """Run the nodes once in every tick of the run, until it is over.
+
+        Raises:
+            BridgeError: no node has been created.
+        """
+        while self.spin_once():
+            pass
+
+    def spin_once(self) -> bool:
+        """Wait for the next tick and run every node once; False if the run is over.
+
+        Raises:
+            BridgeError: no node has been created.
+        """
+        if not self._declared:
+            self._offer()
+        query = self._next()
+        if query is None:
+            return False
+        with query:
+            payload = query.payload.to_bytes() if query.payload else b""
+            source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)
+            if source is None:
+                return True  # not from a run
+            request = requests.decode(payload)
+            self._clock.now_ns = ns(request.now)
+            self._recorder.apply(request.received)
+            if request.tick == STEP.Request.JOIN:
+                self._recorder.joined()
+            else:
+                self.bus.spin()
+            response = responses.encode(STEP.Response(self._recorder.take()))
+            attachment = pack_attachment(source.sequence, self._clock.now_ns, source.gid)
+            query.reply(query.key_expr, response, attachment=attachment)
+        return True
+
+    def _next(self) -> zenoh.Query | None:
+        """Wait for a step; who has waited long for the first one is told why."""
+        if not self._stepped:
+            self._stepped = True
+            try:
+                return self._steps.get(timeout=_PATIENCE_S)
+            except queue.Empty:
+                name = self.bus.nodes[0].fully_qualified_name
+                _log.warning("no run steps %s yet; it is for: twin run SCENARIO --wait-for %s", name, name)
+        return self._steps.get()
+
+    def _offer(self) -> None:
+        """Tell the run which nodes there are, and whether the run still is."""
+        if not self.bus.nodes:
+            raise BridgeError("a process in lock-step needs a node: create it before the first spin")
+        session_id, domain_id = str(self._network.zid()), self.bus.domain_id
+        liveliness = self._network.liveliness()
+        for node in self.bus.nodes:
+            name = node.fully_qualified_name
+            handler = direct(self._steps.put)
+            self._declared.append(
+                self._network.declare_queryable(step_key(domain_id, name), handler, complete=True)
+            )
+            self._declared.append(liveliness.declare_token(node_token(domain_id, session_id, name)))
+        watch = liveliness.declare_subscriber(run_token(domain_id), direct(self._on_run), history=True)
+        self._declared.append(watch)
+
+    def _on_run(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._steps.put(None)
+
+
+@contextmanager
+def join(
+    connect: Sequence[str] | None = None,
+    *,
+    config: Path | None = None,
+    domain_id: int | None = None,
+    timeout_s: float = 60.0,
+) -> Iterator[LockstepProcess]:
+    """Take part in a run that waits for this process's nodes, and leave it at the end.
+
+    Args:
+        connect: Where the run listens; None: where rmw_zenoh expects a router.
+        config: Zenoh configuration file; default: ZENOH_SESSION_CONFIG_URI.
+        domain_id: Default: ROS_DOMAIN_ID, or 0.
+        timeout_s: How long to look for the run [s] of wall time.
+
+    Raises:
+        BridgeError: there is no run, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
+    """
+    uri = os.environ.get("ZENOH_SESSION_CONFIG_URI")
+    file = config or (Path(uri) if uri else None)
+    if connect is None:
+        connect = () if file else (DEFAULT_ENDPOINT,)
+    domain = domain_id_of(domain_id)
+    network = _connected(SessionConfig(mode="client", connect=tuple(connect), file=file), timeout_s)
+    try:
+        clock = Clock()
+        with Bus.open(clock, domain_id=domain) as bus:
+            bus.standard_services = StandardServices(at_once=True)  # others may want to ask
+            bus.skip_ids(_FIRST_ID + _IDS * os.getpid())
+            yield LockstepProcess(bus, clock, network)
+    finally:
+        network.close()  # type: ignore[no-untyped-call]
+
+
+def _connected(config: SessionConfig, timeout_s: float) -> zenoh.Session:
+    """Connect to a run that may have to start first."""
+    end = time.monotonic() + timeout_s
+    while True:
+        try:
+            return open_session(config)
+        except BridgeError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(_RETRY_S)

@@ -1,0 +1,1 @@
+"""Messages from and to plain values, YAML, CSV and text."""

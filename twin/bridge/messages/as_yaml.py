@@ -1,0 +1,159 @@
+"""Messages as `ros2 topic echo` prints them: YAML, comma-separated values, plain dicts.
+
+The forms are those of rosidl_runtime_py (convert.py); the way back is `message_from_dict`.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import yaml
+
+from twin.bridge.messages.from_values import message_from_dict
+from twin.bridge.types.fields import Field, fields_of
+
+TRUNCATE_LENGTH = 128
+"""The default of `ros2 topic echo --truncate-length`."""
+
+_IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+
+
+def message_to_dict(
+    message: Any, *, truncate_length: int | None = None, no_arr: bool = False, no_str: bool = False
+) -> dict[str, Any]:
+    """Return a message as dicts, lists, numbers and strings.
+
+    Args:
+        message: of any type.
+        truncate_length: cut sequences and strings to so many elements and add '...'; None for no cut.
+        no_arr: say only type and length of sequences.
+        no_str: say only the length of strings.
+    """
+    options = (truncate_length, no_arr, no_str)
+    return {
+        field.name: _plain(getattr(message, field.attribute), field, options)
+        for field in fields_of(message.__msgtype__)
+    }
+
+
+def message_to_yaml(
+    message: Any,
+    *,
+    truncate_length: int | None = None,
+    no_arr: bool = False,
+    no_str: bool = False,
+    flow_style: bool = False,
+) -> str:
+    """Return a message as YAML, as `ros2 topic echo` prints it; arguments as of `message_to_dict`.
+
+    `flow_style` writes sequences as [a, b], as the tool's `--flow-style`.
+    """
+    plain = message_to_dict(message, truncate_length=truncate_length, no_arr=no_arr, no_str=no_str)
+    return to_yaml(plain, flow_style=flow_style)
+
+
+def to_yaml(plain: Any, *, flow_style: bool = False) -> str:
+    """Return dicts and lists as `ros2` writes YAML: fields in order, long lines, flat sequences."""
+    return yaml.dump(
+        plain, Dumper=_Dumper, allow_unicode=True, width=sys.maxsize, default_flow_style=flow_style
+    )
+
+
+def message_to_csv(
+    message: Any, *, truncate_length: int | None = None, no_arr: bool = False, no_str: bool = False
+) -> str:
+    """Return a message as one line of values, as `ros2 topic echo --csv`; arguments of `message_to_dict`."""
+    options = (truncate_length, no_arr, no_str)
+    line = ""
+    for field in fields_of(message.__msgtype__):
+        text = _csv(getattr(message, field.attribute), field, options)
+        line += f",{text}" if line else text
+    return line
+
+
+_Options = tuple[int | None, bool, bool]
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes dicts in their own order, always as blocks."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+    def represent_block(self, data: dict[str, Any]) -> yaml.MappingNode:
+        items = [(self.represent_data(key), self.represent_data(value)) for key, value in data.items()]
+        return yaml.MappingNode("tag:yaml.org,2002:map", items)
+
+
+_Dumper.add_representer(dict, _Dumper.represent_block)
+
+
+def _plain(value: Any, field: Field, options: _Options) -> Any:
+    length, no_arr, _ = options
+    if not field.many:
+        return _plain_item(value, field, options)
+    if no_arr:
+        return _abbreviated(value, field)
+    if length is not None and len(value) > length:
+        return [*(_plain_item(item, field, options) for item in value[:length]), "..."]
+    if isinstance(value, np.ndarray) and field.base != "byte":
+        return value.tolist()
+    return [_plain_item(item, field, options) for item in value]
+
+
+def _plain_item(value: Any, field: Field, options: _Options) -> Any:
+    length, no_arr, no_str = options
+    if field.message:
+        return message_to_dict(value, truncate_length=length, no_arr=no_arr, no_str=no_str)
+    if field.base in ("byte", "octet"):
+        return chr(int(value) & 255)  # rclpy has bytes there, which the tool shows as text
+    if isinstance(value, str):
+        if no_str:
+            return f"<string length: <{len(value)}>>"
+        return value if length is None or len(value) <= length else value[:length] + "..."
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _csv(value: Any, field: Field, options: _Options) -> str:
+    length, no_arr, _ = options
+    if not field.many:
+        return _csv_item(value, field, options)
+    if no_arr:
+        return _abbreviated(value, field)
+    items = [_csv_item(item, field, options) for item in (value if length is None else value[:length])]
+    text = ""
+    for item in items if length is None or len(value) <= length else [*items, "..."]:
+        text += f",{item}" if text else item
+    return text
+
+
+def _csv_item(value: Any, field: Field, options: _Options) -> str:
+    length, no_arr, no_str = options
+    if field.message:
+        return message_to_csv(value, truncate_length=length, no_arr=no_arr, no_str=no_str)
+    if field.base in ("byte", "octet"):
+        return str(bytes([int(value) & 255]))
+    if isinstance(value, str):
+        return str(_plain_item(value, field, options))
+    # rclpy keeps arrays of fixed length in numpy, whose float32 has fewer digits.
+    return str(value if field.many == "array" or not isinstance(value, np.generic) else value.item())
+
+
+def _abbreviated(value: Any, field: Field) -> str:
+    name = field.message or _IDL_NAMES.get(field.base, field.base)
+    if field.many == "array":
+        return f"<array type: {name}[{field.size}]>"
+    bound = f"[{field.size}]" if field.many == "bounded" else ""
+    return f"<sequence type: {name}{bound}, length: {len(value)}>"
+
+
+__all__ = [
+    "TRUNCATE_LENGTH",
+    "message_from_dict",
+    "message_to_csv",
+    "message_to_dict",
+    "message_to_yaml",
+    "to_yaml",
+]

@@ -1,0 +1,1 @@
+"""A node's parameters, as in rclpy and rcl_interfaces."""

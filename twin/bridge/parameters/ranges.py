@@ -1,0 +1,73 @@
+"""Whether a value agrees with a parameter's descriptor, in rclpy's words (Node._apply_descriptor)."""
+
+from __future__ import annotations
+
+import math
+
+from twin.bridge.msgs import ParameterDescriptor
+from twin.bridge.parameters.values import Parameter, Type
+
+_RELATIVE_TOLERANCE = 1e-6  # rclpy's Node.PARAM_REL_TOL
+
+
+def objection(
+    parameter: Parameter, descriptor: ParameterDescriptor, *, declared: bool, check_read_only: bool
+) -> str:
+    """Return why a parameter cannot have this value; empty if it can.
+
+    Args:
+        parameter: The new value.
+        descriptor: Of the parameter; its type is looked at only without dynamic typing.
+        declared: Whether the parameter exists already.
+        check_read_only: Not when it is just being declared.
+    """
+    name, kind = parameter.name, parameter.kind
+    if check_read_only and descriptor.read_only:
+        return f"Trying to set a read-only parameter: {name}."
+    if not descriptor.dynamic_typing:
+        if kind is Type.NOT_SET:
+            return "Static parameter cannot be undeclared" if declared else ""
+        if kind.value != descriptor.type:
+            return f"Wrong parameter type, expected '{Type(descriptor.type)}' got '{kind}'"
+    if kind is Type.INTEGER and descriptor.integer_range:
+        return _outside_integers(name, parameter.value, descriptor.integer_range[0])
+    if kind is Type.DOUBLE and descriptor.floating_point_range:
+        return _outside_doubles(name, parameter.value, descriptor.floating_point_range[0])
+    return ""
+
+
+def _outside_integers(name: str, value: int, valid: object) -> str:
+    low, high, step = _limits(valid)
+    if value in (low, high):  # the edges are valid whatever the step
+        return ""
+    if not low < value < high:
+        return f"Parameter {name} out of range. Min: {low}, Max: {high}, value: {value}"
+    if step and (value - low) % step:
+        return (
+            f"The parameter value for {name} is not a valid step. "
+            f"Min: {low}, max: {high}, value: {value}, step: {step}"
+        )
+    return ""
+
+
+def _outside_doubles(name: str, value: float, valid: object) -> str:
+    low, high, step = _limits(valid)
+    if _near(value, low) or _near(value, high):
+        return ""
+    if not low < value < high:
+        return f"Parameter {name} out of range Min: {low}, Max: {high}, value: {value}"
+    if step and not _near(low + round((value - low) / step) * step, value):
+        return (
+            f"The parameter value for {name} is not close enough to a valid step. "
+            f"Min: {low}, max: {high}, value: {value}, step: {step}"
+        )
+    return ""
+
+
+def _limits(valid: object) -> tuple[float, float, float]:
+    first, last, step = valid.from_value, valid.to_value, valid.step  # type: ignore[attr-defined]
+    return min(first, last), max(first, last), step
+
+
+def _near(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=_RELATIVE_TOLERANCE)

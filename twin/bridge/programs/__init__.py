@@ -1,0 +1,1 @@
+"""Programs of one's own: their arguments, their nodes, their log."""

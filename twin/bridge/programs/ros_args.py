@@ -1,0 +1,123 @@
+"""ROS's arguments of a program: `--ros-args -r from:=to -p name:=value --params-file FILE --`.
+
+Source: rcl/arguments.h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from twin.bridge import names
+from twin.bridge.logger_levels import LEVELS
+from twin.bridge.parameters import files as parameter_files
+from twin.errors import BridgeError, nearest
+
+_WITH_VALUE = {
+    "-r": "remap",
+    "--remap": "remap",
+    "-p": "param",
+    "--param": "param",
+    "--params-file": "params_file",
+    "--log-level": "log_level",
+    "-e": "ignored",
+    "--enclave": "ignored",
+    "--log-config-file": "ignored",
+    "--log-file-name": "ignored",
+}
+_SWITCHES = {
+    f"--{verb}-{what}-logs" for verb in ("enable", "disable") for what in ("rosout", "stdout", "external-lib")
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosArguments:
+    """What the arguments of a program say to its nodes."""
+
+    remappings: tuple[names.RemapRule, ...] = ()
+    sections: tuple[parameter_files.Section, ...] = ()
+    """Of the parameter files."""
+    parameters: tuple[tuple[str, str, Any], ...] = ()
+    """Given by `-p`, and stronger than the files: node, empty for all; name; value."""
+    log_levels: tuple[tuple[str, int], ...] = ()
+    """Logger name, empty for all, and severity."""
+    rest: tuple[str, ...] = ()
+    """What is not for ROS, in order."""
+
+    def parameters_for(self, full_name: str) -> dict[str, Any]:
+        """Return the values for a node, by parameter name."""
+        found = parameter_files.values_for(self.sections, full_name)
+        for node, name, value in self.parameters:
+            if node in ("", full_name, full_name.rpartition("/")[2]):
+                found[name] = value
+        return found
+
+
+def parse(arguments: Sequence[str]) -> RosArguments:
+    """Read a program's arguments, `sys.argv[1:]`; what is between `--ros-args` and `--` is for ROS.
+
+    Raises:
+        BridgeError: an unknown or incomplete ROS argument, or a parameter file that cannot be read.
+    """
+    reader = _Reader()
+    return reader.read(iter(arguments))
+
+
+class _Reader:
+    def __init__(self) -> None:
+        self._remappings: list[names.RemapRule] = []
+        self._files: list[parameter_files.Section] = []
+        self._parameters: list[tuple[str, str, Any]] = []
+        self._levels: list[tuple[str, int]] = []
+
+    def read(self, arguments: Iterator[str]) -> RosArguments:
+        rest: list[str] = []
+        for argument in arguments:
+            if argument == "--ros-args":
+                self._read_ros(arguments)
+            else:
+                rest.append(argument)
+        return RosArguments(
+            remappings=tuple(self._remappings),
+            sections=tuple(self._files),
+            parameters=tuple(self._parameters),
+            log_levels=tuple(self._levels),
+            rest=tuple(rest),
+        )
+
+    def _read_ros(self, arguments: Iterator[str]) -> None:
+        actions: dict[str, Callable[[str], None]] = {
+            "remap": lambda text: self._remappings.append(names.RemapRule.parse(text)),
+            "param": self._param,
+            "params_file": lambda text: self._files.extend(parameter_files.read(Path(text))),
+            "log_level": self._log_level,
+            "ignored": lambda text: None,
+        }
+        for argument in arguments:
+            if argument == "--":
+                return
+            if argument in _SWITCHES or argument == "--ros-args":
+                continue
+            if argument not in _WITH_VALUE:
+                known = nearest(argument, [*_WITH_VALUE, *_SWITCHES])
+                raise BridgeError(f"{argument!r} after --ros-args is not known; {known}")
+            value = next(arguments, None)
+            if value is None:
+                raise BridgeError(f"nothing follows {argument} at the end of the arguments")
+            actions[_WITH_VALUE[argument]](value)
+
+    def _param(self, text: str) -> None:
+        left, found, value = text.partition(":=")
+        node, _, name = left.rpartition(":")
+        if not (found and name):
+            raise BridgeError(f"{text!r} is no parameter; valid: name:=value, node:name:=value")
+        self._parameters.append((node, name, parameter_files.scalar(value)))
+
+    def _log_level(self, text: str) -> None:
+        name, found, word = text.partition(":=")
+        level = LEVELS.get((word if found else text).upper())
+        if level is None:
+            raise BridgeError(f"{text!r} is no log level; valid: {', '.join(LEVELS)}, or logger:=LEVEL")
+        self._levels.append((name if found else "", level))

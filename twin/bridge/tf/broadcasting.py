@@ -1,0 +1,153 @@
+"""tf on the bus: broadcasters, and a listener that fills a buffer, as in tf2_ros."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from twin.bridge.conversions import transform_from_pose3
+from twin.bridge.graph import Graph
+from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
+from twin.bridge.qos import LATCHED, QoS
+from twin.bridge.tf.buffer import (
+    TransformBuffer,
+)
+from twin.bridge.tf.cache import UNKNOWN_AUTHORITY
+from twin.bridge.tf.wait import TransformFuture
+from twin.geometry import Pose3
+
+if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
+    from twin.bridge.node import Node
+
+# As in tf2_ros/qos.hpp
+_DYNAMIC = QoS(depth=100)
+_STATIC_LISTENER = QoS(depth=100, durability="transient_local")
+_EXPIRY_NS = 10_000_000
+"""How often waits are looked at that may have to be given up [ns]."""
+
+
+def transform_stamped(parent: str, child: str, time_ns: int, T_parent_child: Pose3) -> TransformStamped:
+    """Return a transform as a message."""
+    return TransformStamped(header(time_ns, parent), child, transform_from_pose3(T_parent_child))
+
+
+class TransformBroadcaster:
+    """Publishes transforms on /tf."""
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(TFMessage, "/tf", _DYNAMIC)
+
+    def send_transform(self, transforms: TransformStamped | Iterable[TransformStamped]) -> None:
+        """Publish one or more transforms in one message."""
+        self._publisher.publish(TFMessage(_as_list(transforms)))
+
+
+class StaticTransformBroadcaster:
+    """Publishes transforms that never change on /tf_static; who comes later gets all of them."""
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(TFMessage, "/tf_static", LATCHED)
+        self._sent: dict[str, TransformStamped] = {}
+
+    def send_transform(self, transforms: TransformStamped | Iterable[TransformStamped]) -> None:
+        """Publish one or more transforms, together with all sent before: the last message is what is kept."""
+        for transform in _as_list(transforms):
+            self._sent[transform.child_frame_id] = transform
+        self._publisher.publish(TFMessage(list(self._sent.values())))
+
+
+class TransformListener:
+    """Fills a buffer from /tf and /tf_static, in the node's spin."""
+
+    def __init__(self, buffer: TransformBuffer, node: Node) -> None:
+        self._buffer = buffer
+        self._node = node
+        self._refused: set[str] = set()
+        self._broadcasters: dict[bytes, Broadcaster] = {}
+        self._expires = False
+        self.on_message: list[Callable[[TFMessage, object], None]] = []
+        """Called with every message and its broadcaster, whose `str` is its name."""
+        for topic, qos, static in (("/tf", _DYNAMIC, False), ("/tf_static", _STATIC_LISTENER, True)):
+            self._subscribe(topic, qos, static)
+
+    def wait_for_transform_async(
+        self,
+        target_frame: str,
+        source_frame: str,
+        time_ns: int | None = None,
+        timeout_ns: int | None = None,
+    ) -> TransformFuture:
+        """Return a future that a spin of the node completes as soon as a look-up succeeds.
+
+        Args:
+            target_frame: As in `TransformBuffer.lookup`.
+            source_frame: Likewise.
+            time_ns: Likewise [ns].
+            timeout_ns: How long to wait by the node's clock [ns]; then `result` raises TransformTimeoutError
+                with the reason. None: for ever.
+        """
+        deadline_ns = None if timeout_ns is None else self._node.now_ns + timeout_ns
+        future = self._buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
+        if deadline_ns is not None and not self._expires:
+            self._expires = True
+            self._node.create_timer(_EXPIRY_NS, self._expire)
+        return future
+
+    def _subscribe(self, topic: str, qos: QoS, static: bool) -> None:
+        def on_message(message: TFMessage) -> None:
+            source = subscription.source
+            self._on_message(message, static, None if source is None else source.gid)
+
+        subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
+
+    def _expire(self) -> None:
+        self._buffer.waiting.expire(self._node.now_ns)
+
+    def _on_message(self, message: TFMessage, static: bool, gid: bytes | None) -> None:
+        authority = self._broadcaster(gid)
+        for callback in self.on_message:
+            callback(message, authority)
+        for item in message.transforms:
+            try:
+                t, q = item.transform.translation, item.transform.rotation
+                self._buffer.set_rigid(
+                    item.header.frame_id,
+                    item.child_frame_id,
+                    ns(item.header.stamp),
+                    (t.x, t.y, t.z, q.w, q.x, q.y, q.z),
+                    static=static,
+                    authority=authority,
+                )
+            except ValueError as error:
+                if item.child_frame_id not in self._refused:
+                    self._refused.add(item.child_frame_id)
+                    self._node.get_logger().warn(f"a transform was ignored (said once): {error}")
+
+    def _broadcaster(self, gid: bytes | None) -> object:
+        if gid is None:
+            return UNKNOWN_AUTHORITY
+        known = self._broadcasters.get(gid)
+        if known is None:
+            known = self._broadcasters[gid] = Broadcaster(self._node.bus, gid)
+        return known
+
+
+class Broadcaster:
+    """Who publishes with a gid; the node's name is looked up in the graph when first asked for."""
+
+    def __init__(self, bus: Bus, gid: bytes) -> None:
+        self._bus = bus
+        self._gid = gid
+        self._name: str | None = None
+
+    def __str__(self) -> str:
+        if self._name is None:
+            endpoints = Graph.snapshot(self._bus).endpoints
+            names = (endpoint.node.full_name for endpoint in endpoints if endpoint.gid == self._gid)
+            self._name = next(names, UNKNOWN_AUTHORITY)
+        return self._name
+
+
+def _as_list(transforms: TransformStamped | Iterable[TransformStamped]) -> list[TransformStamped]:
+    return [transforms] if isinstance(transforms, TransformStamped) else list(transforms)

@@ -1,0 +1,147 @@
+"""The transform buffer of a node: tf2_ros's Buffer, over `BufferCore`."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from twin.bridge.msgs import (
+    LaserScan,
+    Quaternion,
+    Time,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+    ns,
+)
+from twin.bridge.tf.core import BufferCore
+from twin.bridge.tf.errors import (
+    DisconnectedFramesError,
+    ExtrapolationError,
+    InvalidFrameError,
+    TransformError,
+    TransformTimeoutError,
+    UnknownFrameError,
+)
+from twin.bridge.tf.laser import transform_laser_scan
+from twin.bridge.tf.report import frame_infos, frames_as_string, frames_as_yaml
+from twin.bridge.tf.rigid import Rigid
+from twin.bridge.tf.transforms import do_transform
+from twin.bridge.tf.wait import TransformFuture, Waiting
+from twin.errors import BridgeError
+
+__all__ = [
+    "DisconnectedFramesError",
+    "ExtrapolationError",
+    "InvalidFrameError",
+    "TransformBuffer",
+    "TransformError",
+    "TransformTimeoutError",
+    "UnknownFrameError",
+]
+
+M = TypeVar("M")
+AnyTime = int | Time | None
+"""[ns], or a stamp; None or 0 is the latest time that all transforms between have."""
+
+
+class TransformBuffer(BufferCore):
+    """Stores T_parent_child of every frame for some time; looks up, transforms messages, waits.
+
+    A look-up is of where `source` is in `target`: it takes coordinates in `source` to `target`.
+    """
+
+    def __init__(self, cache_ns: int = 10_000_000_000) -> None:
+        super().__init__(cache_ns)
+        self.waiting = Waiting(self)
+
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: AnyTime = None
+    ) -> TransformStamped:
+        """Return `lookup` as a message, stamped with the time that it is of.
+
+        Raises:
+            TransformError: as `lookup`.
+        """
+        found = self.lookup_stamped(target_frame, source_frame, _ns(time))
+        return _message(target_frame, source_frame, *found)
+
+    def lookup_transform_full(
+        self,
+        target_frame: str,
+        target_time: AnyTime,
+        source_frame: str,
+        source_time: AnyTime,
+        fixed_frame: str,
+    ) -> TransformStamped:
+        """Return `lookup_full` as a message.
+
+        Raises:
+            TransformError: as `lookup`.
+        """
+        found = self.lookup_full(target_frame, _ns(target_time), source_frame, _ns(source_time), fixed_frame)
+        return _message(target_frame, source_frame, *found)
+
+    def transform(self, message: M, target_frame: str) -> M:
+        """Return a stamped message in another frame, by the transform at its stamp.
+
+        Raises:
+            TransformError: as `lookup`.
+            BridgeError: messages of this type cannot be transformed.
+        """
+        stamped: Any = message
+        if not hasattr(message, "header"):
+            raise BridgeError(f"a {type(message).__name__} has no header that tells its frame and time")
+        if isinstance(message, LaserScan):
+            raise BridgeError("a LaserScan becomes a cloud in another frame: use transform_laser_scan")
+        here = self.lookup_transform(target_frame, stamped.header.frame_id, stamped.header.stamp)
+        transformed: M = do_transform(message, here)
+        return transformed
+
+    def transform_full(self, message: M, target_frame: str, target_time: AnyTime, fixed_frame: str) -> M:
+        """Return a stamped message as seen from a frame at another time, while `fixed_frame` did not move.
+
+        Raises:
+            TransformError: as `lookup`.
+            BridgeError: messages of this type cannot be transformed.
+        """
+        stamped: Any = message
+        source = stamped.header
+        transformed: M = do_transform(
+            message,
+            self.lookup_transform_full(target_frame, target_time, source.frame_id, source.stamp, fixed_frame),
+        )
+        return transformed
+
+    def transform_laser_scan(self, scan: LaserScan, target_frame: str, *, range_cutoff: float = -1.0) -> Any:
+        """Return a scan as a PointCloud2 in another frame; see `tf_laser.transform_laser_scan`.
+
+        Raises:
+            TransformError: no transform for the first or the last ray.
+        """
+        return transform_laser_scan(self, target_frame, scan, range_cutoff=range_cutoff)
+
+    def wait_for_transform_async(
+        self, target_frame: str, source_frame: str, time: AnyTime = None
+    ) -> TransformFuture:
+        """Return a future that is done as soon as a look-up succeeds; for a time-out ask the listener."""
+        return self.waiting.add(target_frame, source_frame, _ns(time), None)
+
+    def all_frames_as_yaml(self, now_ns: int = 0) -> str:
+        """Return parent, broadcaster, rate, stamps and length of every frame, as tf2 writes it."""
+        return frames_as_yaml(frame_infos(self), now_ns)
+
+    def all_frames_as_string(self) -> str:
+        """Return a line for every frame, as tf2 writes it."""
+        return frames_as_string(frame_infos(self))
+
+
+def _ns(time: AnyTime) -> int | None:
+    return ns(time) if isinstance(time, Time) else time
+
+
+def _message(target: str, source: str, value: Rigid, time_ns: int) -> TransformStamped:
+    x, y, z, w, i, j, k = value
+    return TransformStamped(
+        header(time_ns, target), source, Transform(Vector3(x, y, z), Quaternion(i, j, k, w))
+    )

@@ -1,0 +1,110 @@
+"""Messages in another frame, as tf2_geometry_msgs, tf2_sensor_msgs and laser_geometry make them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from twin.bridge import types
+from twin.bridge.conversions import pose3_from_pose, pose3_from_transform, pose_from_pose3
+from twin.bridge.msgs import (
+    Header,
+    Odometry,
+    Path,
+    Point,
+    PointCloud2,
+    PointStamped,
+    Pose,
+    PoseArray,
+    PoseStamped,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+    Vector3Stamped,
+)
+from twin.bridge.tf.clouds import moved
+from twin.errors import BridgeError, nearest
+from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, multiply_wxyz, rotate_wxyz
+
+QuaternionStamped: Any = types.get("geometry_msgs/msg/QuaternionStamped")
+
+
+def do_transform(message: Any, transform: TransformStamped) -> Any:
+    """Return a message in the frame that a transform leads to; its header becomes the transform's.
+
+    One without a header, such as a `Pose`, is taken to be in the transform's child frame.
+
+    Raises:
+        BridgeError: messages of this type have no frame, or this one is not well-formed.
+    """
+    function = _FUNCTIONS.get(type(message))
+    if function is None:
+        name = getattr(type(message), "__msgtype__", type(message).__name__)
+        known = [str(getattr(cls, "__msgtype__", cls)) for cls in _FUNCTIONS]
+        raise BridgeError(f"a {name} cannot be transformed; {nearest(name, known)}")
+    return function(message, pose3_from_transform(transform.transform), transform.header)
+
+
+def rotated_covariance(covariance: Array, quat_wxyz: Array) -> Array:
+    """Return the covariance, shape (36,), of x, y, z, roll, pitch, yaw in the axes of another frame."""
+    rotation = np.kron(np.eye(2), matrix_from_quat_wxyz(quat_wxyz))
+    return (rotation @ np.asarray(covariance, dtype=np.float64).reshape(6, 6) @ rotation.T).ravel()
+
+
+def _point(message: Point, T: Pose3, _: Header | None = None) -> Point:
+    x, y, z = (rotate_wxyz(T.quat_wxyz, (message.x, message.y, message.z)) + T.xyz).tolist()
+    return Point(x, y, z)
+
+
+def _vector3(message: Vector3, T: Pose3, _: Header | None = None) -> Vector3:
+    x, y, z = rotate_wxyz(T.quat_wxyz, (message.x, message.y, message.z)).tolist()
+    return Vector3(x, y, z)
+
+
+def _quaternion(message: Quaternion, T: Pose3, _: Header | None = None) -> Quaternion:
+    w, x, y, z = multiply_wxyz(T.quat_wxyz, (message.w, message.x, message.y, message.z)).tolist()
+    return Quaternion(x, y, z, w)
+
+
+def _pose(message: Pose, T: Pose3, _: Header | None = None) -> Pose:
+    return pose_from_pose3(T @ pose3_from_pose(message))
+
+
+def _with_covariance(message: PoseWithCovariance, T: Pose3, _: Header | None = None) -> PoseWithCovariance:
+    return PoseWithCovariance(_pose(message.pose, T), rotated_covariance(message.covariance, T.quat_wxyz))
+
+
+def _path(message: Path, T: Pose3, header: Header) -> Path:
+    """Every pose is taken to be in the path's frame, as planners publish it; their stamps are kept."""
+    poses = [
+        PoseStamped(Header(pose.header.stamp, header.frame_id), _pose(pose.pose, T)) for pose in message.poses
+    ]
+    return Path(header, poses)
+
+
+def _cloud(message: PointCloud2, T: Pose3, header: Header) -> PointCloud2:
+    return replace(moved(message, T), header=header)
+
+
+_FUNCTIONS: dict[type, Callable[[Any, Pose3, Header], Any]] = {
+    Point: _point,
+    Vector3: _vector3,
+    Quaternion: _quaternion,
+    Pose: _pose,
+    PoseWithCovariance: _with_covariance,
+    PointStamped: lambda m, T, h: PointStamped(h, _point(m.point, T)),
+    Vector3Stamped: lambda m, T, h: Vector3Stamped(h, _vector3(m.vector, T)),
+    QuaternionStamped: lambda m, T, h: QuaternionStamped(h, _quaternion(m.quaternion, T)),
+    PoseStamped: lambda m, T, h: PoseStamped(h, _pose(m.pose, T)),
+    PoseWithCovarianceStamped: lambda m, T, h: PoseWithCovarianceStamped(h, _with_covariance(m.pose, T)),
+    PoseArray: lambda m, T, h: PoseArray(h, [_pose(pose, T) for pose in m.poses]),
+    Path: _path,
+    # The twist is in the child frame, which stays what it is.
+    Odometry: lambda m, T, h: Odometry(h, m.child_frame_id, _with_covariance(m.pose, T), m.twist),
+    PointCloud2: _cloud,
+}

@@ -1,0 +1,1 @@
+"""What the topic commands are made of: statistics, relays, types that are not known here."""

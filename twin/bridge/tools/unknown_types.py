@@ -1,0 +1,111 @@
+"""Which type a topic has, and what to do if it is not known here: ask the node that uses it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from twin.bridge import types
+from twin.bridge.wire.naming import HUMBLE_HASH
+from twin.errors import BridgeError
+
+if TYPE_CHECKING:
+    from twin.bridge.graph import EndpointInfo
+    from twin.bridge.live import LiveBus
+    from twin.bridge.node import Node
+
+_TIMEOUT_S = 3.0
+_UNTOLD = ("", HUMBLE_HASH)
+"""What stands for a hash where a wire knows none."""
+
+
+def only_type(name: str, endpoints: Sequence[EndpointInfo]) -> str:
+    """Return the type of a topic's endpoints.
+
+    Raises:
+        BridgeError: they have several.
+    """
+    found = sorted({endpoint.type for endpoint in endpoints})
+    if len(found) > 1:
+        raise BridgeError(
+            f"Cannot echo topic '{name}', as it contains more than one type: [{', '.join(found)}]"
+        )
+    return found[0]
+
+
+def message_class(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> type[Any]:
+    """Return the class of what endpoints of one topic exchange; an unknown type is learnt from their nodes.
+
+    Args:
+        process: what the node runs in; it spins while a node is asked.
+        node: asks.
+        endpoints: of one topic and type, those whose definition matters first.
+
+    Raises:
+        BridgeError: no node tells an unknown type, or it is known here with another definition.
+    """
+    typename = endpoints[0].type
+    if not is_known(typename):
+        learn_type(process, node, endpoints)
+    cls = types.get(typename)
+    ours, theirs = types.rihs01(typename), endpoints[0].type_hash
+    if not same_hash(ours, theirs):
+        raise BridgeError(
+            f"{endpoints[0].name}: {endpoints[0].node.full_name} has another definition of {typename} "
+            f"({theirs}) than is known here ({ours}); give its files with --interfaces DIR"
+        )
+    return cls
+
+
+def hash_of(endpoint: EndpointInfo) -> str:
+    """Return the hash with which an endpoint's type is sent, also if Humble or a bridge does not tell it."""
+    if endpoint.type_hash not in _UNTOLD:
+        return endpoint.type_hash
+    return types.rihs01(endpoint.type) if is_known(endpoint.type) else HUMBLE_HASH
+
+
+def same_hash(one: str, other: str) -> bool:
+    """Return whether two hashes may be those of one definition: who tells none may mean any."""
+    return one == other or one in _UNTOLD or other in _UNTOLD
+
+
+def is_known(typename: str) -> bool:
+    """Return whether a type's definition is known here."""
+    try:
+        types.get(typename)
+    except BridgeError:
+        return False
+    return True
+
+
+def learn_type(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> None:
+    """Ask the nodes of endpoints of one type for it, one by one (`~/get_type_description`, REP-2016).
+
+    Raises:
+        BridgeError: no node tells it.
+    """
+    from twin.bridge.types import description as type_description
+
+    service = types.ServiceType("type_description_interfaces/srv/GetTypeDescription")
+    reasons = []
+    for endpoint in endpoints:
+        client = node.create_client(service, f"{endpoint.node.full_name}/get_type_description")
+        request = service.Request(
+            type_name=endpoint.type, type_hash=endpoint.type_hash, include_type_sources=False
+        )
+        process.spin(lambda client=client: client.service_is_ready, timeout_s=0.5)  # type: ignore[misc]
+        future = client.call_async(request)
+        process.spin(lambda future=future: future.done, timeout_s=_TIMEOUT_S)  # type: ignore[misc]
+        if not future.done:
+            reasons.append(f"{endpoint.node.full_name} does not answer")
+        elif future.error is not None:
+            reasons.append(f"{endpoint.node.full_name} has no service get_type_description")
+        elif not future.result.successful:
+            reasons.append(f"{endpoint.node.full_name}: {future.result.failure_reason}")
+        else:
+            type_description.learn(future.result.type_description, endpoint.type_hash)
+            return
+    raise BridgeError(
+        f"the type {endpoints[0].type} of {endpoints[0].name} is not known here, and its nodes do not tell "
+        f"it ({'; '.join(dict.fromkeys(reasons))}); give its files with --interfaces DIR"
+    )

@@ -1,0 +1,72 @@
+"""Messages with ROS's default values: zero, empty, or as the definition says (a quaternion's w is 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeVar
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
+
+from twin.bridge import types
+from twin.bridge.types.bounds import STRINGS
+from twin.bridge.types.literals import Value
+
+M = TypeVar("M")
+
+
+def new(cls: type[M], **fields: Any) -> M:
+    """Return a message with the fields given and ROS's default for all others.
+
+    Raises:
+        TypeError: a field that the message does not have.
+
+    >>> from twin.bridge.msgs import Quaternion
+    >>> new(Quaternion, z=0.5).w
+    1.0
+    """
+    makers = _makers(cls.__msgtype__)  # type: ignore[attr-defined]
+    values = {name: fields[name] if name in fields else make() for name, make in makers.items()}
+    return cls(**{**values, **fields})
+
+
+@cache
+@cache
+def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
+    """Return what makes each field's default."""
+    values = types.defaults(msgtype)
+    fields = types.store.fielddefs[msgtype][1]
+    return {normalize_fieldname(name): _maker(description, values.get(name)) for name, description in fields}
+
+
+def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
+    node, value = description
+    if node == Nodetype.NAME:
+        cls = types.get(value)
+        return lambda: new(cls)
+    if node == Nodetype.BASE:
+        constant = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
+        return lambda: constant
+    (inner, element), length = value
+    count = length if node == Nodetype.ARRAY else 0
+    if inner == Nodetype.NAME:
+        cls = types.get(element)
+        return lambda: [new(cls) for _ in range(count)]
+    if element[0] in STRINGS:
+        texts = [""] * count if default is None else default
+        return lambda: list(texts)  # type: ignore[arg-type]
+    dtype = types.dtype_of(element[0])
+    numbers = np.zeros(count, dtype) if default is None else np.array(_signed(element[0], default), dtype)
+    return lambda: numbers.copy()
+
+
+def _signed(base: str, value: Any) -> Any:
+    """Return a value as rosbags has it, for which a byte is a signed number."""
+    if base != "byte":
+        return value
+    return [_signed(base, item) for item in value] if isinstance(value, list) else (value + 128) % 256 - 128
+
+
+_ZEROS: dict[str, Value] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}

@@ -1,0 +1,51 @@
+"""Definitions as `ros2 interface show` and `proto` print them (ros2cli, ros2interface/verb)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from twin.bridge import types
+from twin.bridge.messages.as_yaml import message_to_yaml
+from twin.bridge.types.default_values import new
+from twin.bridge.types.literals import without_comment
+from twin.bridge.types.parser import Definition
+from twin.bridge.types.type_names import whole
+from twin.errors import BridgeError
+
+Comments = Literal["own", "all", "none"]
+"""Of which definitions the comments are shown: the one that was asked for, nested ones too, or none."""
+
+_PROTOTYPES = {"msg": "", "srv": "_Request", "action": "_Goal"}
+
+
+def show_lines(typename: str, comments: Comments = "own", depth: int = 0) -> Iterator[str]:
+    """Yield the lines of a definition; below each field of a message type its definition, a tab further in.
+
+    Raises:
+        BridgeError: an unknown type, or a part of a service or an action.
+    """
+    name = "/".join(types.parts(typename))
+    text = types.text_of(name)
+    if text is None:
+        raise BridgeError(f"{name} has no definition of its own; valid: {whole(name)}")
+    sections, _ = Definition(name, text).read()
+    nested = {reference.line: reference.typename for section in sections for reference in section.references}
+    for number, raw in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
+        line = without_comment(raw).strip() if comments == "none" else raw.rstrip()
+        if line:
+            yield "\t" * depth + line
+        elif comments != "none":
+            yield ""
+        if number in nested:
+            yield from show_lines(nested[number], "all" if comments == "all" else "none", depth + 1)
+
+
+def prototype(typename: str) -> str:
+    """Return a message, a service's request or an action's goal with its defaults as YAML.
+
+    Raises:
+        BridgeError: an unknown type.
+    """
+    parts = types.parts(typename)
+    return message_to_yaml(new(types.get("/".join(parts) + _PROTOTYPES[parts.kind])))
