@@ -132,6 +132,21 @@ def _announced_parts(announced: wire_ros2dds.Announced) -> list[tuple[EndpointKi
     ]
 
 
+def alive(bus: Bus, key: str) -> list[str]:
+    """Return the liveliness tokens that match a key expression now, this process's included."""
+    found: list[str] = []
+    done = threading.Event()
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            found.append(str(reply.ok.key_expr))
+
+    # Zenoh's default handler is a queue of 256: with more tokens of its own a process would wait for itself.
+    bus.session.liveliness().get(key, direct(on_reply, done.set), timeout=_TIMEOUT_S)
+    done.wait(_TIMEOUT_S + 1.0)
+    return found
+
+
 class Graph:
     """The nodes and endpoints that are alive, sorted by name."""
 
@@ -147,9 +162,7 @@ class Graph:
     @classmethod
     def snapshot(cls, bus: Bus) -> Self:
         """Return the graph as it is now, the bus's own nodes included."""
-        liveliness = bus.session.liveliness()
-        queries = [liveliness.get(key, timeout=_TIMEOUT_S) for key in _tokens(bus)]
-        return cls(str(reply.ok.key_expr) for replies in queries for reply in replies if reply.ok is not None)
+        return cls(token for key in _tokens(bus) for token in alive(bus, key))
 
     @classmethod
     def watch(cls, bus: Bus) -> Self:

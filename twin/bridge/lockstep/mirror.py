@@ -15,7 +15,7 @@ import zenoh
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import Codec, codec
-from twin.bridge.graph import EndpointInfo, NodeInfo, parse_token
+from twin.bridge.graph import EndpointInfo, NodeInfo, alive, parse_token
 from twin.bridge.lockstep.protocol import Entry, entry
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
@@ -110,11 +110,9 @@ class Mirror:
         self.nodes: list[str] = []
         """Full names, in order of creation."""
         tokens = f"@ros2_lv/{bus.domain_id}/{bus.session_id}/*/*/SS/**"
-        liveliness = bus.session.liveliness()
-        self._offers: Any = liveliness.declare_subscriber(tokens, direct(self._on_service))
-        for reply in liveliness.get(tokens):  # history=True would call back in another thread
-            if reply.ok is not None:
-                self._add_service(str(reply.ok.key_expr))
+        self._offers: Any = bus.session.liveliness().declare_subscriber(tokens, direct(self._on_service))
+        for token in sorted(alive(bus, tokens)):  # history=True would call back in another thread
+            self._add_service(token)
 
     def take(self) -> list[Any]:
         """Return what the process was sent since the last call, in order."""
