@@ -38,6 +38,8 @@ from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
 from twin.warehouse.map_files import map_of_arena, named_map
 
+INPROC = SessionConfig()
+"""No network: nobody else takes part."""
 _OBSTACLE_RGBA = (0.85, 0.33, 0.10, 1.0)
 
 
@@ -58,9 +60,8 @@ def build(
     scenario: Scenario,
     *,
     taps: Sequence[Callable[[Sample[Any]], None]] = (),
-    listen: Sequence[str] = (),
+    network: SessionConfig = INPROC,
     outside: Outside = ALONE,
-    network: SessionConfig | None = None,
     crash_folder: Path | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
@@ -68,9 +69,8 @@ def build(
     Args:
         scenario: What to build.
         taps: Called for every sample, from the first one on that a node publishes while it is made.
-        listen: Endpoints for other processes.
+        network: How other processes may take part.
         outside: The user's own nodes, and how the run keeps time with other processes.
-        network: How else the bus takes part in a network, instead of `listen`.
         crash_folder: Where the last states go if the physics diverges.
 
     Raises:
@@ -92,7 +92,6 @@ def build(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
     )
     clock = Clock()
-    network = network or SessionConfig(listen=tuple(listen))
     name = outside.session if network.networked else "twin"
     bus = Bus.of(replace(network, name=name), clock)
     for tap in taps:

@@ -6,6 +6,7 @@ import gc
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 from twin.bridge.bags.tap import BagTap
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
+from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError, ScenarioError
 from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
@@ -27,8 +29,6 @@ from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
-    from twin.bridge.bus import Bus
-    from twin.bridge.wire.session import SessionConfig
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
@@ -184,28 +184,28 @@ def run(
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
     """
-    if network is None:
-        listen = outside.endpoints(listen)
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
-    taps = [digest.on_sample] if sink is None else [digest.on_sample, sink.on_sample]
     bag_tap = None if bag is None else BagTap(bag)
-    bag_taps = [] if bag_tap is None else [bag_tap.on_sample]
-    simulation = None
     parts = build(
         scenario,
-        taps=[*taps, *bag_taps],
-        listen=listen,
-        network=network,
+        taps=[digest.on_sample, *(tap.on_sample for tap in (sink, bag_tap) if tap is not None)],
+        network=network or SessionConfig(listen=outside.endpoints(listen)),
         outside=outside,
         crash_folder=out,
     )
-    try:
+    with ExitStack() as ending:
+        ending.callback(parts.bus.close)
         if bag_tap is not None:
+            ending.callback(bag_tap.close)
             parts.bus.arrival_taps.append(bag_tap.on_arrival)
+        if sink is not None:
+            ending.callback(sink.close)
         if save_model is not None:
             _save_model(parts, save_model)
         simulation = Run(scenario, parts, sink, outside)
+        if simulation.lockstep is not None:
+            ending.callback(simulation.lockstep.close)
         if sink is not None:
             sink.declare(parts.world)
         warm_up()
@@ -214,14 +214,6 @@ def run(
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict
-    finally:
-        if sink is not None:
-            sink.close()
-        if simulation is not None and simulation.lockstep is not None:
-            simulation.lockstep.close()
-        if bag_tap is not None:
-            bag_tap.close()
-        parts.bus.close()
 
 
 def _save_model(parts: Parts, folder: Path) -> None:
@@ -273,16 +265,12 @@ def _loop(
     return elapsed
 
 
-def _refused(bus: Bus) -> dict[str, float]:
-    """Return how much from outside was not delivered, by reason; nothing without a network."""
-    return {f"refused_{reason.replace(' ', '_')}": float(n) for reason, n in sorted(bus.refused.items())}
-
-
 def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock: ClockMode) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
         stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None
     ]
+    refused = sorted(simulation.bus.refused.items())  # of what came from outside; none without a network
     return Verdict(
         scenario=simulation.scenario.name,
         seed=simulation.scenario.seed,
@@ -293,7 +281,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock:
             "cpu_time_s": cpu,
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
-            **_refused(simulation.bus),
+            **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=clock != "free" and not (simulation.lockstep and simulation.lockstep.surplus),
