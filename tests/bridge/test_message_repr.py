@@ -5,7 +5,7 @@ import pytest
 
 from twin.bridge import types
 from twin.bridge.messages.as_repr import message_repr
-from twin.bridge.messages.as_yaml import message_from_dict
+from twin.bridge.messages.from_values import message_from_dict
 from twin.bridge.types.default_values import new
 
 

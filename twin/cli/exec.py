@@ -29,8 +29,8 @@ def execute(
 
     Without --lockstep they run as soon as something arrives, by the wall clock or by /clock.
     """
+    from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.programs.factory import create_nodes
-    from twin.cli.log import show_warnings
 
     show_warnings()
     if not lockstep:

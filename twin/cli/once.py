@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
-    from twin.cli.log import show_warnings
+    from twin.bridge.programs.console_log import show_warnings
     from twin.scenario import schema
     from twin.scenario.outside import Outside
     from twin.scenario.verdict import Verdict

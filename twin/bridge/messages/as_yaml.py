@@ -1,6 +1,6 @@
 """Messages as `ros2 topic echo` prints them: YAML, comma-separated values, plain dicts.
 
-The forms are those of rosidl_runtime_py (convert.py); the way back is `message_from_dict`.
+The forms are those of rosidl_runtime_py (convert.py); the way back is `from_values.message_from_dict`.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from twin.bridge.messages.from_values import message_from_dict
+from twin.bridge import types
+from twin.bridge.types.default_values import new
 from twin.bridge.types.fields import Field, fields_of
 
 TRUNCATE_LENGTH = 128
 """The default of `ros2 topic echo --truncate-length`."""
 
 _IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+_PROTOTYPES = {"msg": "", "srv": "_Request", "action": "_Goal"}
 
 
 def message_to_dict(
@@ -52,6 +54,16 @@ def message_to_yaml(
     """
     plain = message_to_dict(message, truncate_length=truncate_length, no_arr=no_arr, no_str=no_str)
     return to_yaml(plain, flow_style=flow_style)
+
+
+def prototype(typename: str) -> str:
+    """Return a message, a service's request or an action's goal with its defaults as YAML.
+
+    Raises:
+        BridgeError: an unknown type.
+    """
+    parts = types.parts(typename)
+    return message_to_yaml(new(types.get("/".join(parts) + _PROTOTYPES[parts.kind])))
 
 
 def to_yaml(plain: Any, *, flow_style: bool = False) -> str:
@@ -147,13 +159,3 @@ def _abbreviated(value: Any, field: Field) -> str:
         return f"<array type: {name}[{field.size}]>"
     bound = f"[{field.size}]" if field.many == "bounded" else ""
     return f"<sequence type: {name}{bound}, length: {len(value)}>"
-
-
-__all__ = [
-    "TRUNCATE_LENGTH",
-    "message_from_dict",
-    "message_to_csv",
-    "message_to_dict",
-    "message_to_yaml",
-    "to_yaml",
-]

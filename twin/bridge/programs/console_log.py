@@ -9,19 +9,33 @@ _LEVELS = {logging.WARNING: "WARN", logging.CRITICAL: "FATAL"}
 
 
 class ConsoleLog(logging.Handler):
-    """Writes what nodes log; looks stderr up each time, as a test may take its place."""
+    """Writes what nodes log; looks stderr up each time, as a test or a progress bar may take its place."""
+
+    def __init__(self, level: int, *, times: bool) -> None:
+        super().__init__(level)
+        self._times = times
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line. Source of its form: rcutils' RCUTILS_CONSOLE_OUTPUT_FORMAT."""
         level = _LEVELS.get(record.levelno, record.levelname)
+        time = f"[{record.created:.9f}] " if self._times else ""
         name = record.name.removeprefix("twin.")
-        sys.stderr.write(f"[{level}] [{record.created:.9f}] [{name}]: {record.getMessage()}\n")
+        sys.stderr.write(f"[{level}] {time}[{name}]: {record.getMessage()}\n")
 
 
 def show_log() -> None:
-    """Print what nodes log from now on, debug messages left out."""
+    """Print what nodes log from now on, debug messages left out: for a program of nodes."""
+    logging.getLogger("twin").setLevel(logging.INFO)
+    _show(ConsoleLog(logging.INFO, times=True))
+
+
+def show_warnings() -> None:
+    """Print what nodes warn of from now on, without the wall time: for a run, which has its own."""
+    _show(ConsoleLog(logging.WARNING, times=False))
+
+
+def _show(handler: ConsoleLog) -> None:
     logger = logging.getLogger("twin")
-    if not any(isinstance(handler, ConsoleLog) for handler in logger.handlers):
-        logger.addHandler(ConsoleLog())
-    logger.setLevel(logging.INFO)
+    if not any(isinstance(other, ConsoleLog) for other in logger.handlers):
+        logger.addHandler(handler)
     logger.propagate = False

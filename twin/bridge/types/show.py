@@ -1,4 +1,4 @@
-"""Definitions as `ros2 interface show` and `proto` print them (ros2cli, ros2interface/verb)."""
+"""Definitions as `ros2 interface show` prints them (ros2cli, ros2interface/verb)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from typing import Literal
 
 from twin.bridge import types
-from twin.bridge.messages.as_yaml import message_to_yaml
-from twin.bridge.types.default_values import new
 from twin.bridge.types.literals import without_comment
 from twin.bridge.types.parser import Definition
 from twin.bridge.types.type_names import whole
@@ -15,8 +13,6 @@ from twin.errors import BridgeError
 
 Comments = Literal["own", "all", "none"]
 """Of which definitions the comments are shown: the one that was asked for, nested ones too, or none."""
-
-_PROTOTYPES = {"msg": "", "srv": "_Request", "action": "_Goal"}
 
 
 def show_lines(typename: str, comments: Comments = "own", depth: int = 0) -> Iterator[str]:
@@ -39,13 +35,3 @@ def show_lines(typename: str, comments: Comments = "own", depth: int = 0) -> Ite
             yield ""
         if number in nested:
             yield from show_lines(nested[number], "all" if comments == "all" else "none", depth + 1)
-
-
-def prototype(typename: str) -> str:
-    """Return a message, a service's request or an action's goal with its defaults as YAML.
-
-    Raises:
-        BridgeError: an unknown type.
-    """
-    parts = types.parts(typename)
-    return message_to_yaml(new(types.get("/".join(parts) + _PROTOTYPES[parts.kind])))

@@ -140,7 +140,7 @@ def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]
 
 def _maker(process: TopicProcess, cls: type[Any], values: dict[str, Any]) -> Callable[[], Any]:
     """Return what makes the next message: a new one only if it is stamped."""
-    from twin.bridge.messages.as_yaml import message_from_dict
+    from twin.bridge.messages.from_values import message_from_dict
 
     message = message_from_dict(cls, values, now_ns=process.now_ns)
     if not _is_stamped(values):

@@ -14,7 +14,7 @@ def message_of(cls: type[Any], text: str) -> Any:
     Raises:
         BridgeError: no mapping in YAML, an unknown field or a value that does not fit.
     """
-    from twin.bridge.messages.as_yaml import message_from_dict
+    from twin.bridge.messages.from_values import message_from_dict
 
     return message_from_dict(cls, values_of(text))
 
