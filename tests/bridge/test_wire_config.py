@@ -19,6 +19,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
+from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.router import RouterConfig, run_router
 from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
@@ -184,3 +185,16 @@ def test_a_file_that_is_no_configuration(tmp_path: Path) -> None:
     for act in (lambda: RouterConfig(file=file).session(), lambda: open_session(SessionConfig(file=file))):
         with pytest.raises(BridgeError, match=r"x\.json5: not a Zenoh configuration"):
             act()
+
+
+def test_where_a_process_joins_if_nobody_says_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In lock-step as beside a run: `twin exec` asks here in both cases."""
+    for name in ("TWIN_CONNECT", "ZENOH_SESSION_CONFIG_URI", "ROS_DOMAIN_ID"):
+        monkeypatch.delenv(name, raising=False)
+    assert session_to_join().connect == ("tcp/127.0.0.1:7447",)
+    monkeypatch.setenv("TWIN_CONNECT", "tcp/127.0.0.1:1")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    assert (session_to_join().connect, session_to_join().domain_id) == (("tcp/127.0.0.1:1",), 7)
+    assert session_to_join(["tcp/127.0.0.1:2"], domain_id=0).connect == ("tcp/127.0.0.1:2",)
+    listening = session_to_join(listen=["tcp/127.0.0.1:3"])
+    assert (listening.mode, listening.connect) == ("peer", ())

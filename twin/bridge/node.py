@@ -13,7 +13,7 @@ from twin.bridge.msgs import ParameterEvent
 from twin.bridge.node_graph import NodeGraph
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.parameters.node_parameters import NodeParameters, start_parameters
-from twin.bridge.qos import QoS, as_qos
+from twin.bridge.qos import PARAMETER_EVENTS, QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
 from twin.bridge.tasks import Execution, Task
 from twin.bridge.timers import Rate, Timer
@@ -37,9 +37,6 @@ class OwnedEndpoint(Protocol):
 
     def destroy(self) -> None:
         """Leave the graph. Harmless when repeated."""
-
-
-_PARAMETER_EVENTS_QOS = QoS(depth=1000)  # rmw_qos_profile_parameter_events
 
 
 class Node(NodeParameters, NodeGraph):
@@ -223,7 +220,7 @@ class Node(NodeParameters, NodeGraph):
         """Return the publisher of /parameter_events."""
         if self._parameter_events is None:
             self._parameter_events = self.create_publisher(
-                ParameterEvent, "/parameter_events", _PARAMETER_EVENTS_QOS
+                ParameterEvent, "/parameter_events", PARAMETER_EVENTS
             )
         return self._parameter_events
 

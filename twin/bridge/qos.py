@@ -53,6 +53,8 @@ SENSOR_DATA = QoS(depth=5, reliability="best_effort")
 """rclpy's qos_profile_sensor_data."""
 LATCHED = QoS(depth=1, durability="transient_local")
 """Maps, descriptions, static transforms, action status."""
+PARAMETER_EVENTS = QoS(depth=1000)
+"""rclpy's qos_profile_parameters and qos_profile_parameter_events."""
 SYSTEM_DEFAULT = QoS(depth=RMW_DEFAULT_DEPTH)
 """What rmw_zenoh makes of rclpy's qos_profile_system_default."""
 

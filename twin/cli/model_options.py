@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from twin.cli.option_groups import takes
 from twin.errors import ModelError
 from twin.models.options import ReadOptions
 
@@ -76,19 +75,8 @@ def _options(
 
 
 def reads_robot(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command whose last parameter is `read: ReadOptions` the options of which that is made."""
-    shared = inspect.signature(_options, eval_str=True).parameters
-    own = inspect.signature(command, eval_str=True)
-
-    @functools.wraps(command)
-    def wrapper(**given: Any) -> None:
-        read = _options(**{name: given.pop(name) for name in shared})
-        command(**given, read=read)
-
-    parameters = [*(own.parameters[name] for name in own.parameters if name != "read"), *shared.values()]
-    wrapper.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return wrapper
+    """Give a command with a parameter `read: ReadOptions` the options of which that is made."""
+    return takes("read", _options)(command)
 
 
 def _pairs(words: Sequence[str] | None, separator: str, option: str, valid: str) -> dict[str, str]:

@@ -84,28 +84,35 @@ def learn_type(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) 
     Raises:
         BridgeError: no node tells it.
     """
-    from twin.bridge.types import description as type_description
-
-    service = types.ServiceType("type_description_interfaces/srv/GetTypeDescription")
     reasons = []
     for endpoint in endpoints:
-        client = node.create_client(service, f"{endpoint.node.full_name}/get_type_description")
-        request = service.Request(
-            type_name=endpoint.type, type_hash=endpoint.type_hash, include_type_sources=False
-        )
-        process.spin(lambda client=client: client.service_is_ready, timeout_s=0.5)  # type: ignore[misc]
-        future = client.call_async(request)
-        process.spin(lambda future=future: future.done, timeout_s=_TIMEOUT_S)  # type: ignore[misc]
-        if not future.done:
-            reasons.append(f"{endpoint.node.full_name} does not answer")
-        elif future.error is not None:
-            reasons.append(f"{endpoint.node.full_name} has no service get_type_description")
-        elif not future.result.successful:
-            reasons.append(f"{endpoint.node.full_name}: {future.result.failure_reason}")
-        else:
-            type_description.learn(future.result.type_description, endpoint.type_hash)
+        reason = _ask(process, node, endpoint)
+        if reason is None:
             return
+        reasons.append(reason)
     raise BridgeError(
         f"the type {endpoints[0].type} of {endpoints[0].name} is not known here, and its nodes do not tell "
         f"it ({'; '.join(dict.fromkeys(reasons))}); give its files with --interfaces DIR"
     )
+
+
+def _ask(process: LiveBus, node: Node, endpoint: EndpointInfo) -> str | None:
+    """Learn an endpoint's type from its node; return why that was not possible."""
+    from twin.bridge.types import description as type_description
+
+    owner = endpoint.node.full_name
+    service = types.ServiceType("type_description_interfaces/srv/GetTypeDescription")
+    client = node.create_client(service, f"{owner}/get_type_description")
+    process.spin(lambda: client.service_is_ready, timeout_s=0.5)
+    future = client.call_async(
+        service.Request(type_name=endpoint.type, type_hash=endpoint.type_hash, include_type_sources=False)
+    )
+    process.spin(lambda: future.done, timeout_s=_TIMEOUT_S)
+    if not future.done:
+        return f"{owner} does not answer"
+    if future.error is not None:
+        return f"{owner} has no service get_type_description"
+    if not future.result.successful:
+        return f"{owner}: {future.result.failure_reason}"
+    type_description.learn(future.result.type_description, endpoint.type_hash)
+    return None

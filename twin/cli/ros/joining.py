@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.bridge.wire import Wire
+from twin.cli.option_groups import takes
 from twin.cli.ros.endings import quiet_pipe
-from twin.cli.ros.option_groups import takes
 from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.cli.option_groups import takes
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.option_groups import takes
 from twin.cli.ros.topic_options import (
     NodeName,
     QosChoice,

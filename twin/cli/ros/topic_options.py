@@ -74,14 +74,14 @@ class QosChoice:
 
     def qos(self) -> QoS:
         """Return the profile with what overrides it."""
-        from twin.bridge.qos import SENSOR_DATA, SYSTEM_DEFAULT, QoS
+        from twin.bridge.qos import LATCHED, PARAMETER_EVENTS, SENSOR_DATA, SYSTEM_DEFAULT, QoS
 
         presets = {
             Profile.SYSTEM_DEFAULT: SYSTEM_DEFAULT,
             Profile.SENSOR_DATA: SENSOR_DATA,
-            Profile.PARAMETERS: QoS(depth=1000),
-            Profile.PARAMETER_EVENTS: QoS(depth=1000),
-            Profile.ACTION_STATUS_DEFAULT: QoS(depth=1, durability="transient_local"),
+            Profile.PARAMETERS: PARAMETER_EVENTS,
+            Profile.PARAMETER_EVENTS: PARAMETER_EVENTS,
+            Profile.ACTION_STATUS_DEFAULT: LATCHED,
         }
         preset = presets.get(self.profile, QoS())
         best_effort, latched = preset.reliability == "best_effort", preset.durability == "transient_local"
