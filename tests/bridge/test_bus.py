@@ -169,6 +169,21 @@ def test_a_subscription_keeps_the_last_depth_messages(bus: Bus) -> None:
     assert got == ["c", "d", "e"]
 
 
+def test_a_subscription_does_not_deliver_what_outlived_its_lifespan(bus: Bus, clock: Clock) -> None:
+    node = bus.create_node("a")
+    got: list[str] = []
+    qos = QoS(depth=2, lifespan_ns=100)
+    subscription = node.create_subscription(String, "x", lambda m: got.append(m.data), qos)
+    publisher = node.create_publisher(String, "x")
+    for time_ns, text in ((0, "pushed out"), (99, "too old"), (100, "old enough")):
+        clock.now_ns = time_ns
+        publisher.publish(String(text))
+    clock.now_ns = 200
+    bus.spin()
+    assert got == ["old enough"]
+    assert subscription.dropped == 2
+
+
 def test_a_message_of_another_type_is_refused(bus: Bus) -> None:
     publisher = bus.create_node("a").create_publisher(Twist, "cmd_vel")
     with pytest.raises(TypeError, match="cmd_vel carries geometry_msgs/msg/Twist"):

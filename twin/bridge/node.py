@@ -245,8 +245,7 @@ class Node(NodeParameters, NodeGraph):
             for timer in tuple(self._timers):
                 timer.run(now_ns)
         for execution in tuple(self._executions):
-            execution.step()
-            if isinstance(execution, Task) and execution.done:
+            if execution.step():
                 self.remove_execution(execution)
 
     def destroy(self) -> None:

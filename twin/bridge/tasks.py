@@ -9,8 +9,8 @@ from typing import Any, Protocol
 class Execution(Protocol):
     """Something that a node advances once in every spin: an action server, a task."""
 
-    def step(self) -> None:
-        """Go on to the next yield."""
+    def step(self) -> bool:
+        """Go on to the next yield; return whether there is none any more."""
 
     def close(self) -> None:
         """End where it waits; the bus still works."""
@@ -26,16 +26,17 @@ class Task:
         """What it returned."""
         self._generator = generator
 
-    def step(self) -> None:
-        """Go on to the next yield."""
+    def step(self) -> bool:
+        """Go on to the next yield; return whether there is none any more."""
         if self.done:
-            return
+            return True
         try:
             next(self._generator)
         except StopIteration as end:
             self.done, self.result = True, end.value
         if self.done:  # cancelled by itself
             close(self._generator)
+        return self.done
 
     def cancel(self) -> None:
         """End it where it waits; its `finally` blocks run."""

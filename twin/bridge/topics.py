@@ -138,7 +138,11 @@ class Subscription(Endpoint, Generic[M]):
         self._origin: zenoh.Sample | Attachment | None = None
         self._callback = callback
         self._pending: deque[list[Any]] = deque()
+        self._inbox = node.inbox
         self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
+        self._lifespan_ns = None if qos.lifespan_ns == INFINITE_NS else qos.lifespan_ns
+        self._received_ns: deque[int] = deque()
+        """When what is pending came, if that matters."""
         bus = node.bus
         self._networked = bus.networked
         # ros2dds's keys tell no type: what comes even from here may be another one's.
@@ -161,18 +165,22 @@ class Subscription(Endpoint, Generic[M]):
         if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
             self.dropped += 1
+            if self._lifespan_ns is not None:
+                self._received_ns.popleft()
         entry: list[Any] = [self, data, external]
-        if self.qos.lifespan_ns != INFINITE_NS:
-            entry.append(self.node.now_ns + self.qos.lifespan_ns)
         self._pending.append(entry)
-        self.node.inbox.append(entry)
+        self._inbox.append(entry)
+        if self._lifespan_ns is not None:
+            self._received_ns.append(self.node.now_ns)
 
     def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Decode and call back."""
-        entry = self._pending.popleft()
-        if len(entry) > 3 and self.node.now_ns > entry[3]:
-            self.dropped += 1
-            return
+        self._pending.popleft()
+        if self._lifespan_ns is not None:
+            age_ns = self.node.now_ns - self._received_ns.popleft()
+            if age_ns > self._lifespan_ns:
+                self.dropped += 1
+                return
         payload, self._origin = data
         if external:
             try:
@@ -191,6 +199,7 @@ class Subscription(Endpoint, Generic[M]):
         for entry in self._pending:
             entry[0] = None
         self._pending.clear()
+        self._received_ns.clear()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         bus = self.node.bus

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from scipy.optimize import nnls
 
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.models.description import Inertial, RobotDescription
@@ -95,6 +94,8 @@ def nearest_possible(body: MassProperties) -> MassProperties:
     An inertia is possible if the second moments of mass along its principal axes are not negative; the
     nearest such moments are a non-negative least-squares problem.
     """
+    from scipy.optimize import nnls  # takes a third of a second to import, and few robots need it
+
     moments, axes = np.linalg.eigh(body.inertia)
     second, _ = nnls(_MOMENTS, moments)
     least = max(1e-9 * float(np.sum(second)), body.mass * LEAST_GYRATION**2)

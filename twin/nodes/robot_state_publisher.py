@@ -82,6 +82,7 @@ class RobotStatePublisherNode:
         node.declare_parameter("frame_prefix", "")
         node.declare_parameter("ignore_timestamp", False)
         self._check_frequency()
+        node.add_post_set_parameters_callback(lambda _: self._configure())
         self._tf = TransformBroadcaster(node)
         self._windows: dict[str, int] = {}
         self._warned = False
@@ -91,17 +92,22 @@ class RobotStatePublisherNode:
         self._followed = {*self._frames, *(mimic.joint for _, mimic in self._mimics)}
         description_publisher = node.create_publisher(String, "robot_description", LATCHED)
         description_publisher.publish(String(data=description.urdf))
-        prefix = self._prefix()
+        self._configure()
         StaticTransformBroadcaster(node).send_transform(
-            transform_stamped(prefix + joint.parent, prefix + joint.child, node.now_ns, joint.T_parent_joint)
+            transform_stamped(
+                self._prefix + joint.parent, self._prefix + joint.child, node.now_ns, joint.T_parent_joint
+            )
             for joint in joints
             if joint.type == "fixed"
         )
         node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
 
-    def _prefix(self) -> str:
-        prefix: str = self.node.get_parameter("frame_prefix").value
-        return prefix
+    def _configure(self) -> None:
+        """Take over the parameters: to ask for them at every joint state costs more than to publish."""
+        self._prefix: str = self.node.get_parameter("frame_prefix").value
+        self._ignores_stamps: bool = self.node.get_parameter("ignore_timestamp").value
+        frequency: float = self.node.get_parameter("publish_frequency").value
+        self._period_ns = round(1e9 / min(max(frequency, 1e-3), _MAX_HZ))
 
     def _check_frequency(self) -> None:
         frequency: float = self.node.get_parameter("publish_frequency").value
@@ -110,10 +116,6 @@ class RobotStatePublisherNode:
                 f"the parameter publish_frequency of {self.node.fully_qualified_name} is {frequency:g}; "
                 f"valid is more than 0 and at most {_MAX_HZ:g} Hz"
             )
-
-    def _period_ns(self) -> int:
-        frequency: float = self.node.get_parameter("publish_frequency").value
-        return round(1e9 / min(max(frequency, 1e-3), _MAX_HZ))
 
     def _on_joint_states(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
@@ -134,7 +136,7 @@ class RobotStatePublisherNode:
         for name, mimic in self._mimics:
             if mimic.joint in positions:
                 positions.setdefault(name, positions[mimic.joint] * mimic.multiplier + mimic.offset)
-        prefix, stamp = self._prefix(), message.header.stamp
+        prefix, stamp = self._prefix, message.header.stamp
         self._tf.send_transform(
             TransformStamped(
                 Header(stamp, prefix + frame.parent), prefix + frame.child, frame.at(positions[name])
@@ -149,9 +151,9 @@ class RobotStatePublisherNode:
         Periods begin at whole multiples, so that the times at which sensors sample are hit exactly. Each
         joint counts for itself, as several nodes may each publish some joints.
         """
-        window = time_ns // self._period_ns()
+        window = time_ns // self._period_ns
         windows = self._windows
         due = any(windows.get(name) != window for name in positions)
         if due:
             windows.update(dict.fromkeys(positions, window))
-        return due or (bool(positions) and self.node.get_parameter("ignore_timestamp").value)
+        return due or (bool(positions) and self._ignores_stamps)

@@ -240,7 +240,6 @@ def _loop(
     simulation: Run, pace: float | None, progress: Callable[[Progress], None] | None
 ) -> tuple[float, float]:
     """Tick to the end; return the wall and CPU time it took [s]. Pacing is the only use of the wall clock."""
-    gc.collect()
     gc.freeze()  # the model and the types stay; collections look only at what ticks make
     wall, cpu = time.perf_counter(), time.process_time()
     shown = wall

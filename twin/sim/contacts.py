@@ -22,6 +22,10 @@ class Contact(NamedTuple):
     """The touching geoms, body1's first."""
 
 
+_FLOOR = -2
+"""Stands for a robot's index."""
+
+
 class ContactReader:
     """Finds the few contacts that matter among all contacts of a world, by masks over geoms."""
 
@@ -37,6 +41,9 @@ class ContactReader:
         self._owners = tuple(owners)
         self._names = tuple(model.geom(i).name or f"geom {i}" for i in range(model.ngeom))
         self._robot = np.array(robot_of_geom, dtype=np.int32)
+        # By both geoms' robots; none and the floor, -1 and -2, are the last columns.
+        self._matters = ~np.eye(self._robot.max(initial=0) + 3, dtype=bool)
+        self._matters[_FLOOR, :] = self._matters[:, _FLOOR] = False
         self._force = np.zeros(6)
 
     def read(self, data: mujoco.MjData) -> list[Contact]:
@@ -45,8 +52,7 @@ class ContactReader:
             return []
         geoms = data.contact.geom
         robots = self._robot[geoms]
-        first, second = robots[:, 0], robots[:, 1]
-        kept = (first != second) & (np.minimum(first, second) != -2)
+        kept = self._matters[robots[:, 0], robots[:, 1]]
         if not kept.any():  # as on most ticks: wheels on the floor
             return []
         kept &= data.contact.efc_address >= 0

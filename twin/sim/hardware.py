@@ -148,7 +148,7 @@ class Hardware:
         self._servos.reset()
 
     def _count(self) -> Array:
-        return np.round(self._data.qpos[self._qpos] * self._scale / self._tick)
+        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick)
 
 
 class _WheelServos:
@@ -185,13 +185,18 @@ class _WheelServos:
         data, gain = self._data, self._gain
         position, speed = data.qpos[self._qpos], data.qvel[self._dof]
         owed = self._owed + self._command * (data.time - self._time) - (position - self._position)
-        command = np.clip(data.ctrl[self._actuators], -self._fastest, self._fastest)
+        command = _clip(data.ctrl[self._actuators], -self._fastest, self._fastest)
         low = np.maximum(speed - self._reach, -self._fastest) - command
         high = np.minimum(speed + self._reach, self._fastest) - command
         # Where the command alone is out of reach, nothing is owed.
-        self._owed = np.clip(owed, np.minimum(low, 0.0) / gain, np.maximum(high, 0.0) / gain)
+        self._owed = _clip(owed, np.minimum(low, 0.0) / gain, np.maximum(high, 0.0) / gain)
         self._command, self._position, self._time = command, position, float(data.time)
         data.ctrl[self._actuators] = command + gain * self._owed
+
+
+def _clip(values: Array, low: Array, high: Array) -> Array:
+    """Return what `np.clip` does, which for a few wheels costs three times as much."""
+    return np.minimum(np.maximum(values, low), high)
 
 
 def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:

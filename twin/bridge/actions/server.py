@@ -81,6 +81,7 @@ class ActionServer:
         self.name = node.resolve_name(name)
         """Absolute name of the action."""
         self._node, self._type, self._policy = node, action_type, policy
+        self._clock = node.get_clock()
         self._execute = execute
         self._goal_callback, self._cancel_callback = goal_callback, cancel_callback
         self._accepted_callback = handle_accepted_callback
@@ -115,8 +116,12 @@ class ActionServer:
     def _is_closed(self) -> bool:
         return self._closed or self._node.is_destroyed
 
-    def step(self) -> None:
-        """Advance every execution to its next yield; an exception in one is a bug and propagates."""
+    def step(self) -> bool:
+        """Advance every execution to its next yield; an exception in one is a bug and propagates.
+
+        Returns:
+            False: the server stays, whatever there is to do.
+        """
         for run in tuple(self._running):
             if run not in self._running:
                 continue
@@ -129,10 +134,11 @@ class ActionServer:
         if self._queue and not self._running:
             self._start(*self._queue.popleft())
         while self._ended:
-            goal_id = next(iter(self._ended))
-            if self._node.now_ns - self._ended[goal_id].time_ns <= self._result_timeout_ns:
+            goal_id, ended = next(iter(self._ended.items()))
+            if self._clock.now_ns - ended.time_ns <= self._result_timeout_ns:
                 break
             self._forget(goal_id)
+        return False
 
     def publish_feedback(self, handle: GoalHandle, feedback: Any) -> None:
         """Publish feedback of a goal; nothing after the server's end.

@@ -105,8 +105,9 @@ class BufferCore:
         cache.authority = authority
         if parent != was or child in self._irregular or excess > _EXACT_UNIT:
             self._note(cache, parent, excess)
-        for callback in tuple(self.on_change):
-            callback()
+        if self.on_change:
+            for callback in tuple(self.on_change):
+                callback()
         return True
 
     def clear(self) -> None:

@@ -39,7 +39,6 @@ class Waiting:
     def __init__(self, buffer: BufferCore) -> None:
         self._buffer = buffer
         self._futures: list[TransformFuture] = []
-        buffer.on_change.append(self._on_change)
 
     def add(self, target: str, source: str, time_ns: int | None, deadline_ns: int | None) -> TransformFuture:
         """Return a future, done at once if the transform is there."""
@@ -48,6 +47,8 @@ class Waiting:
         if self._buffer.can_transform(target, source, time_ns):
             future.finish(True)
         else:
+            if not self._futures:  # a buffer is told of every transform: only while somebody waits
+                self._buffer.on_change.append(self._on_change)
             self._futures.append(future)
         return future
 
@@ -55,18 +56,21 @@ class Waiting:
         """Fail those whose time is over."""
         for future in tuple(self._futures):
             if future.deadline_ns is not None and now_ns >= future.deadline_ns:
-                self._futures.remove(future)
+                self._remove(future)
                 future.finish(None, f"at {seconds(now_ns)} s the wait is over: {self._why(future)}")
 
     def _on_change(self) -> None:
-        if not self._futures:
-            return
         for future in tuple(self._futures):
             if future.done:  # given up by who waited
-                self._futures.remove(future)
+                self._remove(future)
             elif self._buffer.can_transform(future.target, future.source, future.time_ns):
-                self._futures.remove(future)
+                self._remove(future)
                 future.finish(True)
+
+    def _remove(self, future: TransformFuture) -> None:
+        self._futures.remove(future)
+        if not self._futures:
+            self._buffer.on_change.remove(self._on_change)
 
     def _why(self, future: TransformFuture) -> str:
         try:

@@ -84,6 +84,8 @@ class ExternalQueue:
 
     def drain(self) -> list[Arrival]:
         """Return what has arrived, sorted by (topic, source, sequence), and log what was refused."""
+        if not self._arrived.is_set() and not self._to_report:  # as in every tick of a run on its own
+            return []
         self._arrived.clear()
         with self._lock:
             waiting, self._waiting = self._waiting, {}
