@@ -1,4 +1,4 @@
-"""Definitions that are not known here, from the nodes that publish them (`~/get_type_description`, REP-2016)."""
+"""Definitions that are not known here, asked of who publishes them (`~/get_type_description`, REP-2016)."""
 
 from __future__ import annotations
 
