@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from twin.cli.ros.qos_text import qos_lines
+
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo
 
@@ -23,7 +25,6 @@ def print_endpoints(title: str, endpoints: Sequence[EndpointInfo], verbose: bool
 
 def endpoint_text(endpoint: EndpointInfo) -> str:
     """Return an endpoint as lines; source: rclpy's ServiceEndpointInfo (endpoint_info.py)."""
-    qos = endpoint.qos
     return "\n".join(
         (
             f"Node name: {endpoint.node.name}",
@@ -33,13 +34,6 @@ def endpoint_text(endpoint: EndpointInfo) -> str:
             f"Endpoint type: {_KINDS[endpoint.kind]}",
             "Endpoint count: 1",
             f"GID: {'.'.join(f'{byte:02x}' for byte in endpoint.gid)}",
-            "QoS profile:",
-            f"  Reliability: {qos.reliability.upper()}",
-            f"  History (Depth): KEEP_LAST ({qos.depth})",
-            f"  Durability: {qos.durability.upper()}",
-            "  Lifespan: Infinite",
-            "  Deadline: Infinite",
-            "  Liveliness: AUTOMATIC",
-            "  Liveliness lease duration: Infinite",
+            *qos_lines(endpoint.qos),
         )
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.qos_text import qos_lines
 from twin.cli.ros.topic_options import TopicName
 from twin.errors import BridgeError
 
@@ -131,7 +132,6 @@ def _table(
 
 def _described(endpoint: EndpointInfo) -> str:
     """Return an endpoint as rclpy's TopicEndpointInfo shows itself."""
-    qos = endpoint.qos
     return "\n".join(
         (
             f"Node name: {endpoint.node.name}",
@@ -140,19 +140,6 @@ def _described(endpoint: EndpointInfo) -> str:
             f"Topic type hash: {endpoint.type_hash}",
             f"Endpoint type: {'PUBLISHER' if endpoint.kind == 'MP' else 'SUBSCRIPTION'}",
             f"GID: {'.'.join(f'{byte:02x}' for byte in endpoint.gid)}",
-            "QoS profile:",
-            f"  Reliability: {qos.reliability.upper()}",
-            f"  History (Depth): {f'KEEP_LAST ({qos.depth})' if qos.history == 'keep_last' else 'KEEP_ALL'}",
-            f"  Durability: {qos.durability.upper()}",
-            f"  Lifespan: {_duration(qos.lifespan_ns)}",
-            f"  Deadline: {_duration(qos.deadline_ns)}",
-            f"  Liveliness: {qos.liveliness.upper()}",
-            f"  Liveliness lease duration: {_duration(qos.lease_ns)}",
+            *qos_lines(endpoint.qos),
         )
     )
-
-
-def _duration(nanoseconds: int) -> str:
-    from twin.bridge.qos import INFINITE_NS
-
-    return "Infinite" if nanoseconds == INFINITE_NS else f"{nanoseconds} nanoseconds"
