@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import queue
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,7 +26,6 @@ from twin.errors import BridgeError
 _FIRST_ID = 1_000_000
 """Entity ids of this process begin beyond those of the run, of which its nodes seem to be a part."""
 _IDS = 10_000
-_RETRY_S = 0.2
 _PATIENCE_S = 5.0
 _log = logging.getLogger("twin.lockstep")
 
@@ -138,7 +136,9 @@ def join(
     if connect is None:
         connect = () if file else (DEFAULT_ENDPOINT,)
     domain = domain_id_of(domain_id)
-    network = _connected(SessionConfig(mode="client", connect=tuple(connect), file=file), timeout_s)
+    network = open_session(
+        SessionConfig(mode="client", connect=tuple(connect), file=file, timeout_s=timeout_s)
+    )
     try:
         clock = Clock()
         with Bus.open(clock, domain_id=domain) as bus:
@@ -147,15 +147,3 @@ def join(
             yield LockstepProcess(bus, clock, network)
     finally:
         network.close()  # type: ignore[no-untyped-call]
-
-
-def _connected(config: SessionConfig, timeout_s: float) -> zenoh.Session:
-    """Connect to a run that may have to start first."""
-    end = time.monotonic() + timeout_s
-    while True:
-        try:
-            return open_session(config)
-        except BridgeError:
-            if time.monotonic() > end:
-                raise
-            time.sleep(_RETRY_S)
