@@ -14,7 +14,7 @@ class ConsoleLog(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line. Source of its form: rcutils' RCUTILS_CONSOLE_OUTPUT_FORMAT."""
         level = _LEVELS.get(record.levelno, record.levelname)
-        name = record.name.removeprefix("twin.")
+        name = getattr(record, "ros_name", record.name.removeprefix("twin."))
         sys.stderr.write(f"[{level}] [{record.created:.9f}] [{name}]: {record.getMessage()}\n")
 
 
