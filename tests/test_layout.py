@@ -34,10 +34,11 @@ WALL_CLOCK = {
     "twin/runtime/run.py": {"perf_counter", "process_time", "sleep"},  # pacing, and how long the run took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
-    "twin/bridge/lockstep/participant.py": {"monotonic", "sleep"},  # the run may start later
+    "twin/bridge/wire/session.py": {"monotonic", "sleep"},  # who is asked for may start later
     "twin/bridge/lockstep/stepper.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/lockstep/topic.py": {"monotonic", "sleep"},  # time-outs of other processes
     "twin/bridge/bags/recorder.py": {"time_ns", "monotonic"},  # when a message was received
+    "twin/bridge/bags/asked_definitions.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/bags/player.py": {"monotonic_ns"},  # when a message is due
     "twin/cli/folders.py": {"now"},  # the name of a run's folder
 }

@@ -18,13 +18,17 @@ import pytest
 from tests.bridge import bag_helpers as bags
 from tests.processes import wait_for
 from twin.bridge import live
+from twin.bridge.bags.metadata import BagMessage, BagTopic
+from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.reader import BagReader
+from twin.bridge.bags.writer import BagWriter
 from twin.bridge.cdr.codec import codec
-from twin.bridge.msgs import String
+from twin.bridge.msgs import LaserScan, String
 from twin.bridge.qos import LATCHED, QoS
 from twin.cli.app import run_app
 
 CLI = (sys.executable, "-m", "twin.cli", "bag")
+ROOT = Path(__file__).parents[2]
 PERIOD_NS = 10_000_000
 
 
@@ -66,7 +70,12 @@ def talker() -> Iterator[Talker]:
 
 def twin_bag(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [*CLI, *map(str, arguments)], capture_output=True, text=True, timeout=60, check=False
+        [*CLI, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},  # of this checkout, wherever a test works
     )
 
 
@@ -229,3 +238,71 @@ def test_mistakes_are_told(
     assert end.value.code == 2
     assert words in printed
     assert "Traceback" not in printed
+
+
+NODES = """
+from twin.bridge.msgs import LaserScan, String
+
+def nearest(bus):
+    node = bus.create_node("nearest")
+    bound = node.declare_parameter("bound", 3.0).value
+    publisher = node.create_publisher(String, "nearest")
+    node.create_subscription(
+        LaserScan, "scan", lambda m: publisher.publish(String(f"{max(bound, m.ranges.min()):.2f}"))
+    )
+    return node
+"""
+
+
+@pytest.fixture
+def lidar_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A bag as recorded from outside: scans, and what somebody published about them a moment later."""
+    path, qos = tmp_path / "lidar", (OfferedQoS.of(QoS()),)
+    with BagWriter(path) as writer:
+        writer.add_topic(BagTopic(name="/scan", type="sensor_msgs/msg/LaserScan", qos=qos))
+        writer.add_topic(BagTopic(name="/nearest", type="std_msgs/msg/String", qos=qos))
+        for number in range(1, 25):
+            at, answer = number * 10**8, String(f"{max(3.0, number):.2f}")
+            writer.write(BagMessage("/scan", codec(LaserScan).encode(bags.scan(number)), at, at, number))
+            writer.write(BagMessage("/nearest", codec(String).encode(answer), at + 99, at + 77, number))
+    (tmp_path / "nodes.py").write_text(NODES)
+    (tmp_path / "far.yaml").write_text("nearest: {ros__parameters: {bound: 5.0}}")
+    monkeypatch.chdir(tmp_path)
+    return path
+
+
+def test_nodes_say_the_same_again(lidar_bag: Path) -> None:
+    done = twin_bag("rerun", lidar_bag, "nodes.py:nearest")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "24 of 24 messages identical\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--outputs", "/nearest", "--topics", "/scan"], 0, "24 of 24 messages identical"),
+        (["--params-file", "far.yaml"], 1, "message 0 of 24, /nearest, differs: the payload"),
+        (["--outputs", "/near"], 2, "has no topic /near; did you mean '/nearest'"),
+        (["--outputs", "/scan"], 1, "0 messages instead of 24"),
+    ],
+)
+def test_rerun_with_options(
+    lidar_bag: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    arguments: list[str],
+    code: int,
+    words: str,
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["twin", "bag", "rerun", "lidar", "nodes.py:nearest", *arguments])
+    with pytest.raises(SystemExit) as end:
+        run_app()
+    printed = " ".join("".join(capfd.readouterr()).split())
+    assert end.value.code == code, printed
+    assert words in printed
+
+
+def test_rerun_of_nodes_that_took_no_part(lidar_bag: Path) -> None:
+    Path("nodes.py").write_text(NODES.replace('"nearest")', '"other")'))
+    done = twin_bag("rerun", lidar_bag, "nodes.py:nearest")
+    assert done.returncode == 2
+    assert "has nothing that the nodes of nodes.py:nearest had published" in " ".join(done.stderr.split())

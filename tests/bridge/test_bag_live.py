@@ -19,8 +19,12 @@ from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.cdr.codec import codec
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import Clock, LaserScan, String, TFMessage, Twist, new, ns, stamp
+from twin.bridge.node_options import BARE
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
+from twin.bridge.raw_publisher import RawPublisher
 from twin.bridge.types import ServiceType
+from twin.bridge.types.description import describe
+from twin.bridge.types.description_service import GetTypeDescription
 from twin.errors import RecordingError
 
 Both = tuple[LiveBus, LiveBus]
@@ -293,4 +297,25 @@ def test_what_was_said_before_a_silence_is_on_the_disk(both: Both, tmp_path: Pat
             return bag.info.count == 1
 
     recording.until(survives)
+    recording.recorder.close()
+
+
+@pytest.mark.parametrize("answer", ["none", "another type"])
+def test_a_type_that_nobody_tells_is_recorded_without_its_definition(
+    both: Both, tmp_path: Path, answer: str
+) -> None:
+    here, _ = both
+    node = here.bus.create_node("talker", options=BARE)
+    if answer == "another type":
+        description = describe("std_msgs/msg/String")
+        node.create_service(
+            GetTypeDescription,
+            "~/get_type_description",
+            lambda request: new(GetTypeDescription.Response, successful=True, type_description=description),
+        )
+    odd = RawPublisher(node, "/odd", "unheard_of_msgs/msg/Odd", "RIHS01_" + "0" * 64, LATCHED)
+    odd.publish(b"\0\1\0\0\1\0\0\0")
+    recording = Recording(both, tmp_path / "bag", RecorderConfig(topics=TopicChoice(topics=("/odd",))))
+    recording.until(lambda: recording.recorder.count == 1)
+    assert recording.recorder.undefined == ("/odd",)
     recording.recorder.close()

@@ -56,6 +56,7 @@ def test_a_nodes_values_come_from_wildcards_and_then_from_its_name(tmp_path: Pat
         "id": "12",
     }
     assert parameter_files.values_for(sections, "/robot/a/b")["deep"] == -7
+    assert "star" not in parameter_files.values_for(sections, "/a/robot/amcl")
     assert "deep" not in parameter_files.values_for(sections, "/robot2/a")
 
 
@@ -83,6 +84,24 @@ def test_scalars_are_read_as_rcl_reads_them(text: str, value: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("pattern", "matching", "others"),
+    [
+        ("/**", ["/a", "/a/b/c"], []),
+        ("/*", ["/a", "/b"], ["/a/b"]),
+        ("/**/amcl", ["/amcl", "/a/amcl", "/a/b/amcl"], ["/amcl2", "/a/xamcl", "/amcl/a"]),
+        ("/*/amcl", ["/a/amcl"], ["/amcl", "/a/b/amcl"]),
+        ("/a/**", ["/a/b", "/a/b/c"], ["/ab", "/b/a"]),
+        ("/a/*/c", ["/a/b/c"], ["/a/c", "/a/b/b/c"]),
+        ("/a/**/c", ["/a/c", "/a/b/c", "/a/b/b/c"], ["/ac", "/c"]),
+    ],
+)
+def test_wildcards_are_those_of_ros(pattern: str, matching: list[str], others: list[str]) -> None:
+    """As the regular expressions of rclcpp (parameter_map.cpp): * is one name, ** any number."""
+    section = parameter_files.Section(pattern, {})
+    assert [name for name in (*matching, *others) if section.matches(name)] == matching
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("a: [", r"params\.yaml:1: no YAML"),
@@ -94,6 +113,10 @@ def test_scalars_are_read_as_rcl_reads_them(text: str, value: Any) -> None:
         ("a: {ros__parameters: {x: 9223372036854775808}}", "64 bits"),
         ("a: &a {b: *a}", "nested deeper"),
         ("[a]", "the file is no mapping"),
+        (
+            "/**:\n  amc*:\n    ros__parameters: {x: 1}",
+            r"params\.yaml:3: /\*\*/amc\*: \* stands for one whole",
+        ),
     ],
 )
 def test_bad_files_are_told_by_line(tmp_path: Path, text: str, message: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from functools import partial
 
@@ -209,6 +210,26 @@ def test_drawings_of_any_tree() -> None:
         assert "No tf data received" in draw((), S)
     assert text_tree(frame_infos(loop)).count("\n") >= 2
     assert text_tree(()) == ""
+
+
+def test_a_loop_is_shown_beside_a_tree() -> None:
+    buffer = example()
+    for parent, child in (("x", "y"), ("y", "x"), ("y", "z")):
+        buffer.set_transform(parent, child, S, identity)
+    infos = frame_infos(buffer)
+    frames = [line.split("  (")[0] for line in text_tree(infos).splitlines()]
+    assert frames == ["odom", "└── base", '    └── the "laser"', "x", "└── y", "    ├── x", "    └── z"]
+    assert svg(infos, S).count("<rect") == 1 + 6
+
+
+def test_a_chain_may_be_deeper_than_python_calls() -> None:
+    buffer, depth = TransformBuffer(), 2 * sys.getrecursionlimit()
+    for number in range(depth):
+        buffer.set_transform(f"f{number}", f"f{number + 1}", S, identity, static=True)
+    infos = frame_infos(buffer)
+    assert text_tree(infos).count("\n") == depth + 1
+    assert svg(infos, S).count("<rect") == 1 + depth + 1
+    assert graphviz(infos, S).count("->") == depth + 1
 
 
 def at(x: float = 0.0, yaw: float = 0.0) -> Rigid:

@@ -74,6 +74,31 @@ def test_a_process_that_publishes_all_the_time() -> None:
             assert _interrupt(process, times * 0.002) == (130, "")
 
 
+_JOIN = """
+import sys
+try:
+    from twin.bridge import live
+    print("joins", flush=True)
+    with live.join([sys.argv[1]], timeout_s=60.0):
+        pass
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+def test_a_process_that_looks_for_somebody() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", _JOIN, free_endpoint()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "joins\n"
+        assert _interrupt(process, 0.3) == (130, "")
+
+
 @pytest.mark.slow
 def test_a_run_that_others_may_join(tmp_path: Path) -> None:
     """From its imports to its middle; a verdict is there whole or not at all."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from tests.nodes.conftest import Bench
-from twin.bridge.msgs import JointState, TFMessage, header, ns
+from twin.bridge.msgs import JointState, String, TFMessage, header, ns
 from twin.bridge.qos import LATCHED
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.errors import BridgeError
@@ -101,6 +103,48 @@ def test_a_frequency_that_makes_no_sense_is_refused(bench: Bench, frequency: flo
         BridgeError, match=r"publish_frequency of /robot_state_publisher is .* at most 1000 Hz"
     ):
         RobotStatePublisherNode(bench.bus, load("diff_bot"), parameters={"publish_frequency": frequency})
+
+
+def test_a_prefix_that_changes_is_that_of_fixed_frames_too(bench: Bench) -> None:
+    static = bench.listen(TFMessage, "/tf_static", LATCHED)
+    published = Published(bench)
+    robot = RobotStatePublisherNode(bench.bus, load("diff_bot"))
+    bench.tick()
+    robot.node.set_parameter("frame_prefix", "two/")
+    send(bench, joint_state(0, wheel_left_joint=0.1))
+    assert len(static) == 2
+    assert "two/lidar_link" in {item.child_frame_id for item in static[-1].transforms}
+    assert published.parents == {"two/wheel_left": "two/base_link"}
+
+
+def test_another_description_takes_the_place_of_the_first(bench: Bench) -> None:
+    static = bench.listen(TFMessage, "/tf_static", LATCHED)
+    texts = bench.listen(String, "/robot_description", LATCHED)
+    published = Published(bench)
+    robot = RobotStatePublisherNode(bench.bus, load("diff_bot"))
+    longer = load("diff_bot").urdf.replace('"lidar_link"', '"scanner"')
+    robot.node.set_parameter("robot_description", longer)
+    send(bench, joint_state(0, wheel_left_joint=0.1))
+    assert [text.data for text in texts][-1] == longer
+    assert "scanner" in {item.child_frame_id for item in static[-1].transforms}
+    assert set(published.parents) == {"wheel_left"}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("publish_frequency", 0.0, "at most 1000 Hz"),
+        ("publish_frequency", 2000.0, "at most 1000 Hz"),
+        ("robot_description", "<robot", "robot_description: .*not well-formed"),
+        ("robot_description", "", "robot_description: "),
+    ],
+)
+def test_what_cannot_be_is_refused_at_run_time(bench: Bench, name: str, value: Any, words: str) -> None:
+    robot = RobotStatePublisherNode(bench.bus, load("diff_bot"))
+    was = robot.node.get_parameter(name).value
+    with pytest.raises(BridgeError, match=words):
+        robot.node.set_parameter(name, value)
+    assert robot.node.get_parameter(name).value == was
 
 
 def test_a_chain_is_sent_again_when_it_has_moved(bench: Bench) -> None:

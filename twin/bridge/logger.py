@@ -69,6 +69,7 @@ class Logger:
         """'robot.amcl', and '.child' for children."""
         self._rosout = rosout
         self._python = logging.getLogger(f"twin.{name.removeprefix(_prefix(rosout.node))}")
+        self._shown = {"ros_name": name}
         self._places: dict[tuple[Any, int], _Place] = {}
 
     @property
@@ -137,7 +138,7 @@ class Logger:
             once, skip_first, round(throttle_duration_sec * 1e9)
         ):
             return False
-        self._python.log(_PYTHON_LEVELS[level], message)
+        self._python.log(_PYTHON_LEVELS[level], message, extra=self._shown)
         self._rosout.publish(level, self.name, message)
         return True
 

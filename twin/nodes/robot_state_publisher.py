@@ -17,11 +17,13 @@ from twin.bridge.msgs import (
     ns,
 )
 from twin.bridge.msgs import Transform as TransformMsg
+from twin.bridge.parameters.values import Parameter
 from twin.bridge.qos import LATCHED
 from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster, transform_stamped
-from twin.errors import BridgeError
+from twin.errors import BridgeError, ModelError
 from twin.geometry import rotate_wxyz
 from twin.models.description import Joint, RobotDescription
+from twin.models.loader import parse_urdf
 
 _MAX_HZ = 1000.0
 _MOVING = ("continuous", "revolute", "prismatic")
@@ -56,11 +58,23 @@ class _MovingFrame:
         return TransformMsg(Vector3(x, y, z), turned)
 
 
+class _Joints:
+    """What is published of a robot: frames of fixed joints, and of moving ones."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        joints = description.joints.values()
+        self.fixed = tuple(joint for joint in joints if joint.type == "fixed")
+        self.moving = {joint.name: _MovingFrame(joint) for joint in joints if joint.type in _MOVING}
+        self.mimics = [(j.name, j.mimic) for j in joints if j.type in _MOVING and j.mimic is not None]
+        self.followed = {*self.moving, *(mimic.joint for _, mimic in self.mimics)}
+        """Whose positions matter."""
+
+
 class RobotStatePublisherNode:
     """Subscribes to `joint_states`; publishes `tf`, `tf_static` and `robot_description`.
 
-    Parameters, as those of ROS's node of this name (robot_state_publisher.cpp):
-        robot_description: The robot file.
+    Parameters, as those of ROS's node of this name (robot_state_publisher.cpp); they may be set at any time:
+        robot_description: The robot file, URDF without xacro; one that cannot be read is refused.
         publish_frequency: At most so often is a joint's frame published [Hz]; up to 1000, default 20.
         frame_prefix: What every frame's name begins with, such as `robot/`.
         ignore_timestamp: Whether every joint state is published at once, whatever its stamp.
@@ -77,40 +91,66 @@ class RobotStatePublisherNode:
         parameters: Mapping[str, Any] | None = None,
     ) -> None:
         self.node = node = bus.create_node("robot_state_publisher", namespace, parameters)
+        self._source = description.source
+        self._joints = _Joints(description)
+        self._tf = TransformBroadcaster(node)
+        self._windows: dict[str, int] = {}
+        self._warned = False
         node.declare_parameter("robot_description", description.urdf)
         node.declare_parameter("publish_frequency", 20.0)
         node.declare_parameter("frame_prefix", "")
         node.declare_parameter("ignore_timestamp", False)
-        self._check_frequency()
-        node.add_post_set_parameters_callback(lambda _: self._configure())
-        self._tf = TransformBroadcaster(node)
-        self._windows: dict[str, int] = {}
-        self._warned = False
-        joints = description.joints.values()
-        self._frames = {joint.name: _MovingFrame(joint) for joint in joints if joint.type in _MOVING}
-        self._mimics = [(j.name, j.mimic) for j in joints if j.type in _MOVING and j.mimic is not None]
-        self._followed = {*self._frames, *(mimic.joint for _, mimic in self._mimics)}
-        description_publisher = node.create_publisher(String, "robot_description", LATCHED)
-        description_publisher.publish(String(data=description.urdf))
+        self._description = node.create_publisher(String, "robot_description", LATCHED)
+        self._static = StaticTransformBroadcaster(node)
+        self._check_frequency(node.get_parameter("publish_frequency").value)
         self._configure()
-        StaticTransformBroadcaster(node).send_transform(
-            transform_stamped(
-                self._prefix + joint.parent, self._prefix + joint.child, node.now_ns, joint.T_parent_joint
-            )
-            for joint in joints
-            if joint.type == "fixed"
-        )
+        self._publish_description()
+        self._publish_fixed()
         node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+        node.add_on_set_parameters_callback(self._on_set)
+        node.add_post_set_parameters_callback(self._on_changed)
+
+    def _on_set(self, parameters: list[Parameter]) -> None:
+        """Refuse what cannot be."""
+        for parameter in parameters:
+            if parameter.name == "publish_frequency":
+                self._check_frequency(parameter.value)
+            elif parameter.name == "robot_description":
+                self._read(parameter.value)
+
+    def _on_changed(self, parameters: list[Parameter]) -> None:
+        self._configure()
+        for parameter in parameters:
+            if parameter.name == "robot_description":
+                self._joints = self._read(parameter.value)
+                self._publish_description()
+        if {"robot_description", "frame_prefix"} & {parameter.name for parameter in parameters}:
+            self._publish_fixed()
+
+    def _read(self, urdf: str) -> _Joints:
+        try:
+            return _Joints(parse_urdf(urdf, self._source))
+        except ModelError as error:
+            raise BridgeError(f"robot_description: {error}") from error
+
+    def _publish_description(self) -> None:
+        self._description.publish(String(data=self.node.get_parameter("robot_description").value))
+
+    def _publish_fixed(self) -> None:
+        prefix, now_ns = self._prefix, self.node.now_ns
+        self._static.send_transform(
+            transform_stamped(prefix + joint.parent, prefix + joint.child, now_ns, joint.T_parent_joint)
+            for joint in self._joints.fixed
+        )
 
     def _configure(self) -> None:
         """Take over the parameters: to ask for them at every joint state costs more than to publish."""
         self._prefix: str = self.node.get_parameter("frame_prefix").value
         self._ignores_stamps: bool = self.node.get_parameter("ignore_timestamp").value
         frequency: float = self.node.get_parameter("publish_frequency").value
-        self._period_ns = round(1e9 / min(max(frequency, 1e-3), _MAX_HZ))
+        self._period_ns = round(1e9 / frequency)
 
-    def _check_frequency(self) -> None:
-        frequency: float = self.node.get_parameter("publish_frequency").value
+    def _check_frequency(self, frequency: float) -> None:
         if not 0.0 < frequency <= _MAX_HZ:
             raise BridgeError(
                 f"the parameter publish_frequency of {self.node.fully_qualified_name} is {frequency:g}; "
@@ -118,6 +158,7 @@ class RobotStatePublisherNode:
             )
 
     def _on_joint_states(self, message: JointState) -> None:
+        joints = self._joints
         if len(message.name) != len(message.position):
             if not self._warned:
                 self._warned = True
@@ -129,11 +170,11 @@ class RobotStatePublisherNode:
         positions = {
             name: position
             for name, position in zip(message.name, message.position.tolist(), strict=True)
-            if name in self._followed and math.isfinite(position)
+            if name in joints.followed and math.isfinite(position)
         }
         if not self._is_due(positions, ns(message.header.stamp)):
             return
-        for name, mimic in self._mimics:
+        for name, mimic in joints.mimics:
             if mimic.joint in positions:
                 positions.setdefault(name, positions[mimic.joint] * mimic.multiplier + mimic.offset)
         prefix, stamp = self._prefix, message.header.stamp
@@ -141,7 +182,7 @@ class RobotStatePublisherNode:
             TransformStamped(
                 Header(stamp, prefix + frame.parent), prefix + frame.child, frame.at(positions[name])
             )
-            for name, frame in self._frames.items()
+            for name, frame in joints.moving.items()
             if name in positions
         )
 

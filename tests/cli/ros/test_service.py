@@ -7,6 +7,9 @@ from collections.abc import Callable
 from subprocess import CompletedProcess
 
 import pytest
+from twin.cli.ros.service_endpoints import endpoint_text
+
+from twin.bridge.graph import EndpointInfo, parse_token
 
 GRAPH = "service_graph.py"
 ADD = ("/add_two_ints", "example_interfaces/srv/AddTwoInts")
@@ -61,6 +64,21 @@ def test_verbose_info_describes_each_of_them(twin_here: Twin) -> None:
     )
     assert "Endpoint type: SERVER" in server
     assert "QoS profile:\n  Reliability: RELIABLE\n  History (Depth): KEEP_LAST (10)\n" in server
+
+
+def test_verbose_info_of_a_foreign_server_tells_what_it_promised() -> None:
+    qos = "::2,:0,5:1,0:3,2,1"
+    typed = f"std_srvs::srv::dds_::Empty_/RIHS01_{'0' * 64}/{qos}"
+    server = parse_token(f"@ros2_lv/0/ab/1/2/SS/%/%/other/%reset/{typed}")
+    assert isinstance(server, EndpointInfo)
+    assert endpoint_text(server).endswith(
+        "  History (Depth): KEEP_ALL\n"
+        "  Durability: VOLATILE\n"
+        "  Lifespan: 1000000000 nanoseconds\n"
+        "  Deadline: 5 nanoseconds\n"
+        "  Liveliness: MANUAL_BY_TOPIC\n"
+        "  Liveliness lease duration: 2000000001 nanoseconds"
+    )
 
 
 @pytest.mark.parametrize("command", ["info", "type"])

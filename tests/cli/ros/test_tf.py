@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
+
+from tests.cli.ros.conftest import ROOT
+from tests.processes import free_endpoint
+from twin.bridge import live
+from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
+from twin.geometry import Pose3
 
 Twin = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -50,6 +58,38 @@ def test_echo_of_a_frame_that_is_not_there_says_what_it_waits_for(twin: Twin) ->
     assert done.returncode == 2
     assert "Waiting for transform odom ->  lasr: the frame 'lasr' is not in the transform tree" in done.stderr
     assert "no transform odom -> lasr within 1.2 s" in " ".join(done.stderr.split())
+
+
+def test_echo_waits_for_a_frame_that_appears_later(tmp_path: Path) -> None:
+    address, said = free_endpoint(), tmp_path / "said"
+    with live.join([], listen=[address], domain_id=0) as process:
+        broadcaster = StaticTransformBroadcaster(process.bus.create_node("mounts"))
+        pose = Pose3.from_xyz_rpy((1.0, 0.0, 0.0))
+        broadcaster.send_transform(transform_stamped("map", "odom", 0, pose))
+        command = [
+            sys.executable,
+            "-m",
+            "twin.cli",
+            "tf",
+            "echo",
+            "map",
+            "late",
+            "--once",
+            "--connect",
+            address,
+        ]
+        env = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_DOMAIN_ID": "0"}
+        with (
+            said.open("w") as errors,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, env=env) as echo,
+        ):
+            waiting = "the frame 'late' is not in the transform tree; it has: map, odom"
+            assert process.spin(lambda: waiting in " ".join(said.read_text().split()), timeout_s=20.0)
+            broadcaster.send_transform(transform_stamped("odom", "late", 0, pose))
+            assert process.spin(lambda: echo.poll() is not None, timeout_s=20.0)
+            assert echo.stdout is not None
+            assert "- Translation: [2.000, 0.000, 0.000]" in echo.stdout.read()
+    assert echo.returncode == 0
 
 
 def test_monitor(twin: Twin) -> None:

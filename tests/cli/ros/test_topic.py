@@ -102,6 +102,18 @@ def test_info(twin: Twin) -> None:
     )
 
 
+def test_info_tells_every_promise(twin: Twin) -> None:
+    assert (
+        "  Reliability: RELIABLE\n"
+        "  History (Depth): KEEP_ALL\n"
+        "  Durability: VOLATILE\n"
+        "  Lifespan: 3000000000 nanoseconds\n"
+        "  Deadline: 200000000 nanoseconds\n"
+        "  Liveliness: MANUAL_BY_TOPIC\n"
+        "  Liveliness lease duration: 1000000001 nanoseconds\n"
+    ) in twin("topic", "info", "-v", "/robot/promised").stdout
+
+
 def test_types_and_topics_of_a_type(twin: Twin) -> None:
     assert twin("topic", "type", "/robot/cmd_vel").stdout == "geometry_msgs/msg/Twist\n"
     assert twin("topic", "find", "geometry_msgs/msg/Twist").stdout == "/robot/cmd_vel\n/robot/heard\n"

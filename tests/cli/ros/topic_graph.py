@@ -39,6 +39,14 @@ with live.join([], listen=[sys.argv[1]]) as process:
     point = sensors.create_publisher(PointStamped, "point")
     gps = sensors.create_publisher(Gps, "gps")
     sensors.create_publisher(String, "mixed", QoS())
+    promised = QoS(
+        history="keep_all",
+        deadline_ns=200_000_000,
+        lifespan_ns=3_000_000_000,
+        liveliness="manual_by_topic",
+        lease_ns=1_000_000_001,
+    )
+    sensors.create_publisher(String, "promised", promised)
     bus.create_node("other").create_publisher(String, "/robot/mixed", SENSOR_DATA)
 
     def sense() -> None:

@@ -61,11 +61,13 @@ class BagReader:
         """
         unknown = sorted(set(topics or ()) - set(self.topics))
         if unknown:
-            raise RecordingError(
-                f"{self.path}: has no topic {unknown[0]}; {nearest(unknown[0], self.topics)}"
-            )
+            raise self.no_topic(unknown[0])
         wanted = frozenset(self.topics if topics is None else topics)
         yield from self._source.messages(wanted, start_ns, end_ns)
+
+    def no_topic(self, name: str) -> RecordingError:
+        """Return what to say of a topic that the bag does not have."""
+        return RecordingError(f"{self.path}: has no topic {name}; {nearest(name, self.topics)}")
 
     def attachment(self, name: str) -> bytes | None:
         """Return a file within the bag, None if there is none of this name."""

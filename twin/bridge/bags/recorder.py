@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from twin.bridge.bags.asked_definitions import AskedDefinitions, Kind
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.topic_choice import TopicChoice
@@ -65,11 +66,12 @@ class Recorder:
         self._lock = threading.Lock()
         self._waiting: deque[Received] = deque()
         self._waiting_bytes = 0
-        self._types: dict[str, tuple[str, str]] = {}
+        self._types: dict[str, Kind] = {}
         self._ears: dict[str, _Ear] = {}
         self._seen_changes = -1
         self._flushed = time.monotonic()
         self._node = bus.create_node("rosbag2_recorder")
+        self._asked = AskedDefinitions(self._node)
         self._graph = Graph.watch(bus)
         for topic in self.config.topics.topics:
             if topic in self.config.topics:
@@ -88,7 +90,7 @@ class Recorder:
 
     @property
     def undefined(self) -> tuple[str, ...]:
-        """Topics whose type's definition is not known here and so not in the bag."""
+        """Topics whose definition neither we nor their nodes know, and so not the bag."""
         return tuple(sorted(name for name, topic in self._writer.topics.items() if not topic.definition))
 
     def update(self) -> None:
@@ -100,6 +102,7 @@ class Recorder:
         if self._graph.changes != self._seen_changes:
             self._seen_changes = self._graph.changes
             self._discover()
+        self._asked.update()
         self._write_waiting()
         if time.monotonic() - self._flushed >= _FLUSH_S:
             self._writer.flush()
@@ -125,7 +128,7 @@ class Recorder:
         for ear in self._ears.values():
             ear.destroy()
         try:
-            self._write_waiting()
+            self._write_waiting(at_once=True)
         finally:
             self._writer.close()
 
@@ -135,15 +138,17 @@ class Recorder:
     def _discover(self) -> None:
         for endpoint in self._graph.endpoints:
             name = endpoint.name
-            if endpoint.kind != "MP" or name in self._ears or name not in self.config.topics:
+            if endpoint.kind != "MP" or name not in self.config.topics:
                 continue
             if self.config.hidden or not is_hidden(name) or name in self.config.topics.topics:
-                self._listen(name)
+                self._asked.ask([endpoint])
+                if name not in self._ears:
+                    self._listen(name)
 
     def _listen(self, topic: str) -> None:
         self._ears[topic] = _Ear(self, self._node, topic)
 
-    def _write_waiting(self) -> None:
+    def _write_waiting(self, *, at_once: bool = False) -> None:
         while True:
             with self._lock:
                 if not self._waiting:
@@ -152,19 +157,22 @@ class Recorder:
                 time_ns = time_ns or self._now_ns()
                 if not time_ns:
                     return  # simulated time has not begun: latched messages wait for it
+                if not at_once and self._asked.is_awaited(Kind(sample.type, sample.type_hash)):
+                    return  # the definition comes before the first message; the order is kept
                 self._waiting.popleft()
                 self._waiting_bytes -= len(sample.payload)
             self._write(sample, time_ns)
 
     def _write(self, sample: RawSample, time_ns: int) -> None:
-        kind = (sample.type, sample.type_hash)
+        kind = Kind(sample.type, sample.type_hash)
         if self._types.setdefault(sample.topic, kind) != kind:
             self.refused[sample.topic] += 1
             return
         if sample.topic not in self._writer.topics:
             offers = self._graph.publishers(sample.topic)
             qos = tuple(OfferedQoS.of(offer.qos) for offer in offers)
-            topic = BagTopic(name=sample.topic, type=sample.type, type_hash=sample.type_hash, qos=qos)
+            text = self._asked.text(kind)
+            topic = BagTopic(name=sample.topic, **kind._asdict(), qos=qos, definition=text)
             self._writer.add_topic(topic)
         source = sample.source
         self._writer.write(

@@ -17,11 +17,15 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.node import Node
 from twin.bridge.raw_publisher import RawPublisher
-from twin.bridge.topics import Sample
+from twin.bridge.topics import Publisher, Sample
 from twin.errors import BridgeError, RecordingError
 
 _CLOCK = "/clock"
 _PLAYER = "bag_replay"
+_EVERYBODYS = frozenset(("/rosout", "/parameter_events", _CLOCK))
+"""Topics that a node's code does not publish on by itself."""
+_Plain = tuple[str, int, bytes]
+"""Topic, time [ns], bytes."""
 
 
 @dataclass(kw_only=True)
@@ -30,23 +34,26 @@ class Replayed:
 
     published: list[BagMessage] = field(default_factory=list)
     recorded: list[BagMessage] = field(default_factory=list)
-    """Empty if the bag does not tell who published what and no outputs were named."""
+    """Empty if the bag does not tell who published what, and has none of the outputs."""
+    in_turns: bool = True
+    """Whether the bag tells when it was whose turn; otherwise times of publishing are not compared."""
 
     @property
     def identical(self) -> bool:
-        """Whether both are the same messages: topics, times and bytes."""
+        """Whether both are the same messages: topics, times, if the bag tells turns, and bytes."""
         return self.difference is None
 
     @property
     def difference(self) -> str | None:
         """The first difference as one clause, None if there is none."""
         again, before = _plain(self.published), _plain(self.recorded)
+        if not self.in_turns:
+            again, before = _by_topic(again), _by_topic(before)
         for number, (a, b) in enumerate(zip(again, before, strict=False)):
             if a != b:
-                what = (
-                    "the payload" if a[:2] == b[:2] else f"{a[0]} at {a[1]} ns instead of {b[0]} at {b[1]} ns"
-                )
-                return f"message {number} of {len(before)}, {b[0]} at {b[1]} ns, differs: {what}"
+                same = a[:2] == b[:2]
+                what = "the payload" if same else f"{_place(a)} instead of {_place(b)}"
+                return f"message {number} of {len(before)}, {_place(b)}, differs: {what}"
         if len(again) != len(before):
             return f"{len(again)} messages instead of {len(before)}"
         return None
@@ -62,13 +69,14 @@ def replay(
     """Run nodes on a bag, on simulated time that follows the bag.
 
     In a bag of `twin run --bag` each node gets its turn of each tick where it had it, and its own messages
-    are known as such. In any other bag nodes run after all messages of one time of publishing, and
-    `outputs` says what was theirs.
+    are known as such. In any other bag, and if they were outside of the run, nodes run after all messages of
+    one time of publishing, and `outputs` says what was theirs.
 
     Args:
         bag: What to replay.
         make: Makes the nodes on the bus, under their names of the run; topics are their only inputs.
-        outputs: Topics that only these nodes publish; needed for a bag that was recorded from outside.
+        outputs: Topics that only these nodes publish, where the bag does not tell; None is what they publish
+            and the bag has from one publisher.
         topics: The inputs; None is all of the bag. Topics of types that nobody knows are left out.
 
     Raises:
@@ -78,23 +86,25 @@ def replay(
     turns = Origins.parse(told) if told is not None else None
     clock = Clock(bag.info.start_ns)
     with Bus.open(clock) as bus:
-        session = _Session(bag, bus, clock, topics, outputs or ())
-        (_in_turns(session, turns, make) if turns else _by_time(session, make))
+        session = _Session(bag, bus, clock, topics)
+        session.make(make)
+        if turns and any(node.fully_qualified_name in turns.nodes for node in session.nodes):
+            _in_turns(session, turns)
+        else:
+            _by_time(session, outputs)
         return session.result
 
 
 class _Session:
     """The bus of a replay, its inputs and what comes of them."""
 
-    def __init__(
-        self, bag: BagReader, bus: Bus, clock: Clock, topics: Collection[str] | None, outputs: Collection[str]
-    ) -> None:
+    def __init__(self, bag: BagReader, bus: Bus, clock: Clock, topics: Collection[str] | None) -> None:
         self.bag, self.bus, self.clock = bag, bus, clock
         self.result = Replayed()
         self.nodes: list[Node] = []
         self._player = bus.create_node(_PLAYER)
-        self._inputs = frozenset(bag.topics if topics is None else topics) - frozenset(outputs)
-        self.outputs = frozenset(outputs)
+        self._inputs = frozenset(bag.topics if topics is None else topics)
+        self.outputs: frozenset[str] = frozenset()
         self._publishers: dict[str, RawPublisher | None] = {}
         bus.tap(self._on_sample)
 
@@ -102,6 +112,15 @@ class _Session:
         """Make the nodes."""
         factory(self.bus)
         self.nodes = [node for node in self.bus.nodes if node is not self._player]
+
+    def expect(self, outputs: Collection[str] | None) -> None:
+        """Take topics for the nodes' own; None: what they publish and the bag has from one publisher."""
+        if outputs is None:
+            names = {e.name for node in self.nodes for e in node.endpoints if isinstance(e, Publisher)}
+            known = {name: topic for name, topic in self.bag.topics.items() if name in names - _EVERYBODYS}
+            outputs = [name for name, topic in known.items() if len(topic.qos) <= 1]
+        self.outputs = frozenset(outputs)
+        self._inputs -= self.outputs
 
     def feed(self, message: BagMessage) -> None:
         """Publish a message of the bag, if it is an input."""
@@ -133,9 +152,10 @@ class _Session:
         self.result.published.append(BagMessage(sample.topic, sample.payload, time, time, sample.sequence))
 
 
-def _by_time(session: _Session, make: Callable[[Bus], Any]) -> None:
+def _by_time(session: _Session, outputs: Collection[str] | None) -> None:
     """Run every node after all messages of one time."""
-    session.make(make)
+    session.result.in_turns = False
+    session.expect(outputs)
     for message in sorted(session.bag.messages(), key=lambda m: m.publish_ns):
         if message.publish_ns > session.clock.now_ns:
             for node in session.nodes:
@@ -145,11 +165,13 @@ def _by_time(session: _Session, make: Callable[[Bus], Any]) -> None:
         session.feed(message)
     for node in session.nodes:
         node.spin()
+    if session.outputs:
+        result = session.result
+        result.published = [message for message in result.published if message.topic in session.outputs]
 
 
-def _in_turns(session: _Session, turns: Origins, make: Callable[[Bus], Any]) -> None:
+def _in_turns(session: _Session, turns: Origins) -> None:
     """Run every node in its turn: in each tick, which ends with `/clock`, between its neighbours."""
-    session.make(make)
     order = {name: number for number, name in enumerate(turns.nodes)}
     places = [(order.get(node.fully_qualified_name, len(order)), node) for node in session.nodes]
     places.sort(key=lambda place: place[0])
@@ -181,5 +203,14 @@ def _with_origins(bag: BagReader, turns: Origins) -> Iterator[tuple[BagMessage, 
     return zip(bag.messages(), turns.of_message, strict=True)
 
 
-def _plain(messages: list[BagMessage]) -> list[tuple[str, int, bytes]]:
+def _by_topic(messages: list[_Plain]) -> list[_Plain]:
+    return [(topic, 0, data) for topic, _, data in sorted(messages, key=lambda message: message[0])]
+
+
+def _place(message: _Plain) -> str:
+    topic, time_ns, _ = message
+    return f"{topic} at {time_ns} ns" if time_ns else topic
+
+
+def _plain(messages: list[BagMessage]) -> list[_Plain]:
     return [(message.topic, message.publish_ns, message.data) for message in messages]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import queue
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,13 +20,12 @@ from twin.bridge.msgs import ns
 from twin.bridge.node_services import StandardServices
 from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.keys import pack_attachment, parse_attachment
-from twin.bridge.wire.session import SessionConfig, direct, open_session
+from twin.bridge.wire.session import direct, open_session
 from twin.errors import BridgeError
 
 _FIRST_ID = 1_000_000
 """Entity ids of this process begin beyond those of the run, of which its nodes seem to be a part."""
 _IDS = 10_000
-_RETRY_S = 0.2
 _PATIENCE_S = 5.0
 _log = logging.getLogger("twin.lockstep")
 
@@ -133,8 +131,8 @@ def join(
     Raises:
         BridgeError: there is no run, or an endpoint, the file or ROS_DOMAIN_ID cannot be used.
     """
-    session = session_to_join(connect, config=config, domain_id=domain_id)
-    network = _connected(session, timeout_s)
+    session = session_to_join(connect, config=config, domain_id=domain_id, timeout_s=timeout_s)
+    network = open_session(session)
     try:
         clock = Clock()
         with Bus.open(clock, domain_id=session.domain_id) as bus:
@@ -143,15 +141,3 @@ def join(
             yield LockstepProcess(bus, clock, network)
     finally:
         network.close()  # type: ignore[no-untyped-call]
-
-
-def _connected(config: SessionConfig, timeout_s: float) -> zenoh.Session:
-    """Connect to a run that may have to start first."""
-    end = time.monotonic() + timeout_s
-    while True:
-        try:
-            return open_session(config)
-        except BridgeError:
-            if time.monotonic() > end:
-                raise
-            time.sleep(_RETRY_S)

@@ -43,8 +43,11 @@ class Section:
         return "*" in self.node
 
     def matches(self, full_name: str) -> bool:
-        """Return whether the values are for a node: `*` is one name, `**` any number of them."""
-        pattern = re.escape(self.node).replace(r"/\*\*", "(/.*)?").replace(r"\*", "[^/]*")
+        """Return whether the values are for a node: `*` is one name, `**` any number of them, also none.
+
+        Source: rclcpp/parameter_map.cpp.
+        """
+        pattern = re.escape(self.node).replace(r"/\*\*", "(/.*)?").replace(r"\*", "[^/]+")
         return re.fullmatch(pattern, full_name) is not None
 
 
@@ -108,6 +111,8 @@ class _Reader:
                     raise self._fault(
                         node, f"{KEY} is below no node name; valid: a name, or /** for all nodes"
                     )
+                if any("*" in part and part not in ("*", "**") for part in name.split("/")):
+                    raise self._fault(node, f"{name}: * stands for one whole name, ** for any number of them")
                 yield Section(name, dict(self._parameters(value, "", depth)))
             else:
                 below = f"{name}/{key.strip('/')}" if name else f"/{key.strip('/')}"

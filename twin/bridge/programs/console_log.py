@@ -19,7 +19,7 @@ class ConsoleLog(logging.Handler):
         """Write one line. Source of its form: rcutils' RCUTILS_CONSOLE_OUTPUT_FORMAT."""
         level = _LEVELS.get(record.levelno, record.levelname)
         time = f"[{record.created:.9f}] " if self._times else ""
-        name = record.name.removeprefix("twin.")
+        name = getattr(record, "ros_name", record.name.removeprefix("twin."))
         sys.stderr.write(f"[{level}] {time}[{name}]: {record.getMessage()}\n")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
-from twin.bridge.tf.report import FrameInfo
+from twin.bridge.tf.report import FrameInfo, children_of, roots
 
 _ROW, _MARGIN, _CHARACTER, _LINE, _GAP = 78.0, 20.0, 7.2, 14.0, 40.0
 """Height of a row, border, width of a character, height of a line, gap between columns [px]."""
@@ -24,7 +24,7 @@ def graphviz(infos: Sequence[FrameInfo], now_ns: int) -> str:
         ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";',
         f'"Recorded at time: {now_ns * 1e-9:.6f}"[ shape=plaintext ] ;',
     ]
-    lines += [f'}}->"{_escaped(_roots(infos)[0])}";', "}"]
+    lines += [f'}}->"{_escaped(roots(infos)[0])}";', "}"]
     return "\n".join(lines) + "\n"
 
 
@@ -73,42 +73,31 @@ def _label(info: FrameInfo) -> list[str]:
     ]
 
 
-def _roots(infos: Sequence[FrameInfo]) -> list[str]:
-    """Return the parents that have none; of frames that form loops only, the first one."""
-    known = {info.frame for info in infos}
-    roots = sorted({info.parent for info in infos} - known)
-    return roots or [infos[0].parent]
-
-
 def _layout(
     infos: Sequence[FrameInfo],
 ) -> tuple[dict[str, tuple[int, float]], dict[str, list[str]]]:
-    """Return column and row of every frame, and what is written in its box."""
-    children: dict[str, list[FrameInfo]] = {}
-    for info in sorted(infos, key=lambda info: info.frame):
-        children.setdefault(info.parent, []).append(info)
-    places: dict[str, tuple[int, float]] = {}
+    """Return column and row of every frame, and what is written in its box.
+
+    Leaves have a row each; a parent is in the middle of its first and last child.
+    """
+    children = children_of(infos)
+    columns: dict[str, int] = {}
     texts: dict[str, list[str]] = {}
-    leaves = 0.0
-
-    def place(frame: str, column: int, text: list[str]) -> float:
-        nonlocal leaves
-        places[frame], texts[frame] = (column, leaves), [frame, *text]
-        rows = [
-            place(info.frame, column + 1, _box(info))
-            for info in children.get(frame, ())
-            if info.frame not in places
-        ]
-        if not rows:
-            leaves += 1.0
-        row = (rows[0] + rows[-1]) / 2.0 if rows else places[frame][1]
-        places[frame] = column, row
-        return row
-
-    for root in [*_roots(infos), *(info.parent for info in infos)]:
-        if root not in places:
-            place(root, 0, [])
-    return places, texts
+    below: dict[str, list[str]] = {}
+    # Depth first, without calls: a chain may be deeper than Python can call.
+    waiting = [(root, 0, [root]) for root in reversed(roots(infos))]
+    while waiting:
+        frame, column, text = waiting.pop()
+        columns[frame], texts[frame] = column, text
+        next_ones = [info for info in children.get(frame, ()) if info.frame not in columns]
+        below[frame] = [info.frame for info in next_ones]
+        waiting += [(i.frame, column + 1, [i.frame, *_box(i)]) for i in reversed(next_ones)]
+    leaves = (frame for frame in columns if not below[frame])
+    rows: dict[str, float] = {frame: float(row) for row, frame in enumerate(leaves)}
+    for frame in reversed(columns):  # children come after their parents
+        own = [rows[child] for child in below[frame]]
+        rows[frame] = (own[0] + own[-1]) / 2.0 if own else rows[frame]
+    return {frame: (column, rows[frame]) for frame, column in columns.items()}, texts
 
 
 def _box(info: FrameInfo) -> list[str]:

@@ -79,27 +79,54 @@ def frames_as_string(infos: Iterable[FrameInfo]) -> str:
 
 def text_tree(infos: Sequence[FrameInfo]) -> str:
     """Return the frames as a tree, a line each: broadcaster, and rate or that it is static."""
-    children: dict[str, list[FrameInfo]] = {}
-    for info in infos:
-        children.setdefault(info.parent, []).append(info)
-    known = {info.frame for info in infos}
+    children = children_of(infos)
     lines: list[str] = []
-
-    def below(frame: str, indent: str, seen: frozenset[str]) -> None:
-        branch = sorted(children.get(frame, ()), key=lambda info: info.frame)
-        for number, info in enumerate(branch):
-            last = number == len(branch) - 1
-            lines.append(f"{indent}{'└── ' if last else '├── '}{info.frame}  {_described(info)}")
-            if info.frame not in seen:
-                below(info.frame, indent + ("    " if last else "│   "), seen | {info.frame})
-
-    roots = sorted(set(children) - known)
-    # Frames in a loop hang on none of the roots: the loop is shown from its first name on.
-    roots += sorted(known)[:1] if known and not roots else []
-    for root in roots:
+    tops = roots(infos)
+    shown = set(tops)
+    for root in tops:
         lines.append(root)
-        below(root, "", frozenset({root}))
+        # Frames to show, those that come next last: a chain may be deeper than Python can call.
+        waiting = _branch(children, root, "")
+        while waiting:
+            info, indent, last = waiting.pop()
+            lines.append(f"{indent}{'└── ' if last else '├── '}{info.frame}  {_described(info)}")
+            if info.frame not in shown:
+                shown.add(info.frame)
+                waiting += _branch(children, info.frame, indent + ("    " if last else "│   "))
     return "\n".join(lines) + "\n" if lines else ""
+
+
+def children_of(infos: Iterable[FrameInfo]) -> dict[str, list[FrameInfo]]:
+    """Return the children of each frame that has some, sorted by name."""
+    children: dict[str, list[FrameInfo]] = {}
+    for info in sorted(infos, key=lambda info: info.frame):
+        children.setdefault(info.parent, []).append(info)
+    return children
+
+
+def roots(infos: Iterable[FrameInfo]) -> list[str]:
+    """Return the frames that have no parent, sorted; then of each loop, which hangs on none, one frame."""
+    parents = {info.frame: info.parent for info in infos}
+    found = sorted(set(parents.values()) - set(parents))
+    reached: set[str] = set(found)
+    for frame in sorted(parents):
+        path: dict[str, None] = {}
+        while frame not in reached and frame not in path:
+            path[frame] = None
+            frame = parents[frame]
+        if frame in path:
+            ring = list(path)
+            found.append(min(ring[ring.index(frame) :]))
+        reached.update(path)
+    return found
+
+
+def _branch(
+    children: dict[str, list[FrameInfo]], frame: str, indent: str
+) -> list[tuple[FrameInfo, str, bool]]:
+    """Return a frame's children, the last one first, with their indent and whether they are the last."""
+    branch = children.get(frame, ())
+    return [(info, indent, number == 0) for number, info in enumerate(reversed(branch))]
 
 
 def _described(info: FrameInfo) -> str:

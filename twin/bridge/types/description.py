@@ -70,6 +70,23 @@ def learn(description: Any, type_hash: str | None = None) -> str:
         BridgeError: another hash, a description that describes nothing, or a type that is already known
             with other fields.
     """
+    name, definitions = read(description, type_hash)
+    items = [description.type_description, *description.referenced_type_descriptions]
+    defaults = {item.type_name: _defaults(item, definitions[item.type_name][1]) for item in items}
+    types.add_definitions(definitions, defaults)
+    return name
+
+
+def read(description: Any, type_hash: str | None = None) -> tuple[str, FieldDefs]:
+    """Return the type that a TypeDescription describes, and the fields of it and of all that it uses.
+
+    Args:
+        description: type_description_interfaces/msg/TypeDescription.
+        type_hash: the RIHS01 that it must have.
+
+    Raises:
+        BridgeError: another hash, or a description that describes nothing.
+    """
     items = [description.type_description, *description.referenced_type_descriptions]
     name: str = description.type_description.type_name
     definitions: FieldDefs = {
@@ -79,9 +96,7 @@ def learn(description: Any, type_hash: str | None = None) -> str:
     found = rihs01_of(name, definitions)
     if type_hash is not None and found != type_hash:
         raise BridgeError(f"the description of {name} has the hash {found}, not {type_hash}")
-    defaults = {item.type_name: _defaults(item, definitions[item.type_name][1]) for item in items}
-    types.add_definitions(definitions, defaults)
-    return name
+    return name, definitions
 
 
 def _individual(plain: dict[str, Any]) -> Any:

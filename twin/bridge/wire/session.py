@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,11 @@ from twin.errors import BridgeError
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 """rmw_zenoh's: 'key=value;key=value', values in JSON5 (zenoh_config.cpp)."""
+
+
+_RETRY_S = 0.1
+_ATTEMPT_S = 3.0
+"""How long somebody who lets us connect may take to answer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +64,7 @@ def open_session(config: SessionConfig) -> zenoh.Session:
     """
     settings = _zenoh_config(config)
     try:
-        return zenoh.open(settings)
+        return _opened(settings, config.timeout_s)
     except zenoh.ZError as error:
         where = ", ".join((*config.listen, *config.connect)) or str(config.file)
         if settings.get_json("mode") == '"client"':
@@ -69,6 +75,18 @@ def open_session(config: SessionConfig) -> zenoh.Session:
         raise BridgeError(
             f"the bus cannot use {where}: {_reason(error)}; is the port taken by another process? {_FORM}"
         ) from error
+
+
+def _opened(settings: zenoh.Config, timeout_s: float) -> zenoh.Session:
+    """Open; a client tries again and again, as nothing can interrupt Zenoh while it waits by itself."""
+    end = time.monotonic() + timeout_s * (settings.get_json("mode") == '"client"')
+    while True:
+        try:
+            return zenoh.open(settings)
+        except zenoh.ZError:
+            if time.monotonic() >= end:
+                raise
+        time.sleep(_RETRY_S)
 
 
 def endpoints(file: Path, key: Literal["listen", "connect"]) -> tuple[str, ...]:
@@ -141,11 +159,13 @@ def _settings(config: SessionConfig) -> dict[str, Any]:
         "listen/endpoints": list(config.listen),
         "listen/exit_on_failure": True,
         "connect/endpoints": list(config.connect),
-        "connect/timeout_ms": round(config.timeout_s * 1e3) if client else -1,
+        "connect/timeout_ms": 0 if client else -1,  # once; `_opened` tries again
         "connect/exit_on_failure": client,
         "timestamping/enabled": True,  # transient_local's history needs it
         "transport/shared_memory/enabled": False,
     }
+    if client:
+        settings["transport/unicast/open_timeout"] = round(min(config.timeout_s, _ATTEMPT_S) * 1e3)
     if config.name:
         # An id may not start with a zero digit.
         settings["id"] = "7" + xxhash.xxh3_128_hexdigest(config.name.encode())[1:]

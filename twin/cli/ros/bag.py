@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from twin.cli.ros.bag_rerun import rerun
 from twin.cli.ros.joining import Joining, joins
 
 app = typer.Typer(no_args_is_help=True, help="Bags: record, play, look, convert; as `ros2 bag`.")
@@ -19,6 +20,10 @@ Topics = Annotated[list[str] | None, typer.Option("--topics", metavar="TOPIC", h
 Regex = Annotated[str, typer.Option("--regex", "-e", help="Topics whose whole name matches.")]
 Exclude = Annotated[str, typer.Option("--exclude-regex", "-x", help="Not topics whose whole name matches.")]
 Compression = Annotated[str, typer.Option(help="none, zstd, or with mcap lz4.")]
+
+app.command(no_args_is_help=True, epilog="Example: [bold]twin bag rerun drive/bag nodes.py:make[/bold]")(
+    rerun
+)
 
 
 @app.command(no_args_is_help=True, epilog="Example: [bold]twin bag record -a -o drive[/bold]")
