@@ -14,7 +14,7 @@ from twin.bridge import types
 from twin.bridge.qos import QoS, parse_qos
 from twin.bridge.wire import ros2dds as wire_ros2dds
 from twin.bridge.wire.keys import EndpointKind, demangle, gid
-from twin.bridge.wire.session import direct
+from twin.bridge.wire.session import direct, tokens_alive
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -147,9 +147,7 @@ class Graph:
     @classmethod
     def snapshot(cls, bus: Bus) -> Self:
         """Return the graph as it is now, the bus's own nodes included."""
-        liveliness = bus.session.liveliness()
-        queries = [liveliness.get(key, timeout=_TIMEOUT_S) for key in _tokens(bus)]
-        return cls(str(reply.ok.key_expr) for replies in queries for reply in replies if reply.ok is not None)
+        return cls(tokens_alive(bus.session, _tokens(bus), _TIMEOUT_S))
 
     @classmethod
     def watch(cls, bus: Bus) -> Self:

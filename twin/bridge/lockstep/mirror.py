@@ -21,7 +21,7 @@ from twin.bridge.qos import QoS
 from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, NodeToken, gid, parse_attachment, topic_key
-from twin.bridge.wire.session import direct
+from twin.bridge.wire.session import direct, tokens_alive
 from twin.errors import BridgeError
 
 
@@ -112,9 +112,8 @@ class Mirror:
         tokens = f"@ros2_lv/{bus.domain_id}/{bus.session_id}/*/*/SS/**"
         liveliness = bus.session.liveliness()
         self._offers: Any = liveliness.declare_subscriber(tokens, direct(self._on_service))
-        for reply in liveliness.get(tokens):  # history=True would call back in another thread
-            if reply.ok is not None:
-                self._add_service(str(reply.ok.key_expr))
+        for token in tokens_alive(bus.session, [tokens], 10.0):  # history=True would come in another thread
+            self._add_service(token)
 
     def take(self) -> list[Any]:
         """Return what the process was sent since the last call, in order."""
