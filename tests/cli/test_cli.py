@@ -15,6 +15,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from rich.text import Text
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from twin.cli import app as app_module
@@ -114,13 +116,34 @@ def test_help_loads_nothing_heavy() -> None:
     assert "Run a scenario to its verdict" in done.stdout
 
 
-@pytest.mark.parametrize("command", [name for name, _, _ in app_module._COMMANDS])
+@pytest.mark.parametrize("command", [name for name, *_ in app_module._COMMANDS])
 def test_help_of_every_command_has_an_example_that_parses(command: str) -> None:
     result = CliRunner().invoke(app_module.app, [command, "--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     example = re.search(r"Example: (twin .*?)\s*$", result.output, re.MULTILINE)
     assert example is not None
     assert example[1].split()[1] == command
+
+
+def test_no_help_text_is_taken_for_markup() -> None:
+    """rich leaves '[s]' out, as if it were struck through."""
+    seen = []
+
+    def look(command: Any) -> None:
+        seen.append(command)
+        for text in [command.help, *(getattr(each, "help", None) for each in command.params)]:
+            assert text is None or Text.from_markup(text).plain == text, command.name
+        for each in getattr(command, "commands", {}).values():
+            look(each)
+
+    look(get_command(app_module.app))
+    assert len(seen) > 40
+
+
+def test_commands_are_grouped() -> None:
+    out = CliRunner().invoke(app_module.app, ["--help"], env={"COLUMNS": "120"}).output
+    panels = re.findall(r"^╭─ (\w.*?) ─", out, re.MULTILINE)
+    assert panels == ["Options", "Scenarios", "Robot files", "ROS 2 graph"]
 
 
 def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
