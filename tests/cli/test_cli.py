@@ -140,6 +140,23 @@ def test_no_help_text_is_taken_for_markup() -> None:
     assert len(seen) > 40
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["robots"], ["interface", "list"]])
+def test_a_full_disk_under_the_output_is_told(arguments: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "twin.cli", *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (
+        2,
+        "error: No space left on device: what is printed is not whole; make room\n",
+    )
+
+
+def test_a_closed_output_is_no_fault() -> None:
+    command = f"{sys.executable} -m twin.cli interface list >&-"
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_commands_are_grouped() -> None:
     out = CliRunner().invoke(app_module.app, ["--help"], env={"COLUMNS": "120"}).output
     panels = re.findall(r"^╭─ (\w.*?) ─", out, re.MULTILINE)

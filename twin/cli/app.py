@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 
 import typer
@@ -13,7 +15,7 @@ from twin.errors import TwinError
 
 app = typer.Typer(
     name="twin",
-    help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, a ROS 2 graph.",
+    help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, ROS 2.",
     epilog="Example: [bold]twin run scenarios/warehouse.yaml[/bold]",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -21,6 +23,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SCENARIOS, _ROBOTS, _GRAPH = "Scenarios", "Robot files", "ROS 2 graph"
 
 _COMMANDS = (
@@ -71,10 +74,25 @@ def _root() -> None:
 
 def run_app() -> None:
     """Run the command line and exit: 0 pass, 1 a check failed, 2 a user's mistake, 130 interrupted."""
+    if sys.stdout is None:  # started with `>&-`
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
     try:
         app()
     except TwinError as fault:
         print_error(fault)
         sys.exit(2)
+    except OSError as fault:
+        if fault.errno not in _FULL:
+            raise
+        print_error(
+            TwinError(f"{fault.strerror}: {fault.filename or 'what is printed'} is not whole; make room")
+        )
+        _discard_output()
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _discard_output() -> None:
+    """Let what is still buffered go nowhere; otherwise the interpreter complains at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -93,7 +93,8 @@ def play(
         float | None, typer.Option("--playback-duration", help="Play so many seconds of the bag.")
     ] = None,
     until: Annotated[
-        float | None, typer.Option("--playback-until-sec", help="Play until this time [s since the epoch].")
+        float | None,
+        typer.Option("--playback-until-sec", help="Play until this time, in seconds since the epoch."),
     ] = None,
     start_paused: Annotated[
         bool, typer.Option("--start-paused", "-p", help="Wait for ~/resume of /rosbag2_player.")

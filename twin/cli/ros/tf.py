@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
 
@@ -66,6 +67,7 @@ def frames(
 
 @app.command("echo", epilog="Example: [bold]twin tf echo map base_link --once[/bold]")
 @joins
+@endless
 def echo(
     source_frame: Annotated[str, typer.Argument(help="Frame in which the other one is shown.")],
     target_frame: Annotated[str, typer.Argument(help="Frame whose pose is shown.")],
@@ -96,6 +98,7 @@ def echo(
 
 @app.command("monitor", epilog="Example: [bold]twin tf monitor --once --duration 3[/bold]")
 @joins
+@endless
 def monitor(
     source_frame: Annotated[str | None, typer.Argument(help="First frame of a chain.")] = None,
     target_frame: Annotated[str | None, typer.Argument(help="Last frame of a chain.")] = None,
