@@ -195,6 +195,24 @@ def test_json_is_the_file(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> N
     assert runtime.calls[0]["pace"] == 1.0
 
 
+def test_a_bug_is_2_with_its_traceback_and_in_the_verdict(tmp_path: Path) -> None:
+    """1 would be a failed check: whoever reads the exit code only would look for it in the robot."""
+    (tmp_path / "demo.yaml").write_text(SCENARIO, encoding="utf-8")
+    (tmp_path / "bad.py").write_text(
+        "def make(bus):\n"
+        "    node = bus.create_node('bad')\n"
+        "    node.create_timer(20_000_000, lambda: 1 / 0)\n"
+        "    return node\n",
+        encoding="utf-8",
+    )
+    done = twin("run", "demo.yaml", "--node", "bad.py:make", "--no-record", "--out", "here", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith("ZeroDivisionError: division by zero\n")
+    assert "bad.py" in done.stderr
+    verdict = json.loads((tmp_path / "here" / "verdict.json").read_text(encoding="utf-8"))
+    assert (verdict["verdict"], verdict["error"]) == ("error", "ZeroDivisionError: division by zero")
+
+
 def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
     demo.write_text(SCENARIO.replace("energy", "enrgy").replace("1 s", "1 kg"), encoding="utf-8")
     code, out, err = invoke("run", str(demo))
@@ -220,11 +238,12 @@ def test_a_run_that_breaks_is_2_with_an_error_verdict(
     assert ElementTree.parse(demo.parent / "here" / "junit.xml").getroot().get("errors") == "1"
 
 
-def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
     runtime.fault = ZeroDivisionError("a bug")
-    monkeypatch.setattr(sys, "argv", ["twin", "run", str(demo)])
-    with pytest.raises(ZeroDivisionError):
-        app_module.run_app()
+    code, _, err = invoke("run", str(demo))
+    assert code == 2
+    assert err.startswith("Traceback")
+    assert err.endswith("ZeroDivisionError: a bug\n")
 
 
 def test_ctrl_c_is_130(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

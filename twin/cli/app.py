@@ -73,7 +73,7 @@ def _root() -> None:
 
 
 def run_app() -> None:
-    """Run the command line and exit: 0 pass, 1 a check failed, 2 a user's mistake, 130 interrupted."""
+    """Run the command line and exit: 0 pass, 1 a check failed, 2 a mistake or a bug, 130 interrupted."""
     if sys.stdout is None:  # started with `>&-`
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
     try:
@@ -81,18 +81,20 @@ def run_app() -> None:
     except TwinError as fault:
         print_error(fault)
         sys.exit(2)
-    except OSError as fault:
-        if fault.errno not in _FULL:
-            raise
-        print_error(
-            TwinError(f"{fault.strerror}: {fault.filename or 'what is printed'} is not whole; make room")
-        )
-        _discard_output()
-        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
+    except Exception as fault:
+        _tell(fault)
+        sys.exit(2)  # Python's own exit code for a bug, 1, means a failed check here
 
 
-def _discard_output() -> None:
-    """Let what is still buffered go nowhere; otherwise the interpreter complains at its end."""
+def _tell(fault: Exception) -> None:
+    """Tell of a full disk in a sentence; of a bug, in here or in a user's node, with its traceback."""
+    if not isinstance(fault, OSError) or fault.errno not in _FULL:
+        import traceback
+
+        traceback.print_exception(fault)
+        return
+    print_error(TwinError(f"{fault.strerror}: {fault.filename or 'what is printed'} is not whole; make room"))
+    # What is still buffered goes nowhere; otherwise the interpreter complains when it flushes at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

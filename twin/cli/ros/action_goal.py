@@ -8,7 +8,7 @@ import typer
 
 from twin.cli.ros.joining import Joining
 from twin.cli.ros.service_call import know
-from twin.cli.ros.service_values import absolute, message_of, text_of, unknown
+from twin.cli.ros.service_values import absolute, hint_at_nearest, message_of, text_of, unknown
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
@@ -61,13 +61,16 @@ def send_goal(
 def _wait_for_server(
     process: LiveBus, client: ActionClient, typename: str, timeout_s: float | None, signals: list[int]
 ) -> None:
+    from twin.bridge.graph import Graph
+
     _refuse_other_type(process, client.name, typename)
+    if not client.server_is_ready:
+        others = Graph.snapshot(process.bus).actions().keys() - {client.name}
+        hint_at_nearest("action", client.name, others)
     in_time = process.spin(lambda: client.server_is_ready or bool(signals), timeout_s)
     if signals:
         raise typer.Exit(_INTERRUPTED)
     if not in_time:
-        from twin.bridge.graph import Graph
-
         _refuse_other_type(process, client.name, typename)
         actions = [name for name in Graph.snapshot(process.bus).actions() if name != client.name]
         fault = unknown("action", client.name, actions)

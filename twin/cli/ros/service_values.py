@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from typing import Any
 
-from twin.errors import BridgeError, nearest
+import typer
+
+from twin.errors import COMPARED, BridgeError, nearest
 
 
 def message_of(cls: type[Any], text: str) -> Any:
@@ -42,6 +45,16 @@ def unknown(kind: str, name: str, known: object) -> BridgeError:
     names = [str(each) for each in known] if isinstance(known, (dict, list, tuple, set)) else []
     hint = nearest(name, names) if names else f"there are no {kind}s"
     return BridgeError(f"Unknown {kind} '{name}'; {hint}")
+
+
+def hint_at_nearest(kind: str, name: str, known: Iterable[str]) -> None:
+    """Say on stderr, before a wait that may last for ever, that something else has nearly this name."""
+    import difflib
+
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5) if len(names) <= COMPARED else []
+    if close:
+        typer.echo(f"WARNING: there is no {kind} {name} yet; did you mean {close[0]}?", err=True)
 
 
 def absolute(name: str) -> str:
