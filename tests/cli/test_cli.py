@@ -176,7 +176,7 @@ def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke
     assert ElementTree.parse(folder / "junit.xml").getroot().get("failures") == "0"
     (call,) = runtime.calls
     assert call["scenario"].checks[0].energy.max == 2.0
-    assert (call["record"], call["pace"], call["listen"], call["progress"]) == (False, None, (), None)
+    assert (call["record"], call["pace"], call["network"], call["progress"]) == (False, None, None, None)
 
 
 def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
@@ -266,27 +266,40 @@ def test_wrong_options_say_what_is_valid() -> None:
     assert (parse_pace("max"), parse_pace("0.5")) == (None, 0.5)
 
 
-def test_options_survive_the_way_to_a_child() -> None:
-    options = RunOptions(
-        scenario=Path("a.yaml"), overrides={"x": "1", "seed": "3"}, pace=0.5, listen=("tcp/1",), record=False
+@pytest.mark.parametrize(
+    "options",
+    [
+        RunOptions(scenario=Path("a.yaml")),
+        RunOptions(
+            scenario=Path("a.yaml"),
+            overrides={"x": "1", "seed": "3"},
+            pace=0.5,
+            listen=("tcp/1",),
+            nodes=("n.py:make",),
+            wait_for=("/cmd_vel", "/controller"),
+            wait_timeout=2.5,
+            free=True,
+            connect=("tcp/2", "tcp/3"),
+            wire="humble",
+            zenoh_config=Path(__file__),
+            domain_id=7,
+            record=False,
+            bag=True,
+            save_model=Path("model"),
+        ),
+    ],
+    ids=["none", "all"],
+)
+def test_options_survive_the_way_to_a_child(
+    options: RunOptions, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    understood: list[RunOptions] = []
+    monkeypatch.setattr(
+        "twin.cli.once.run_once", lambda options, out, as_json: understood.append(options) or 0
     )
-    words = options.arguments(Path("out"))
-    assert words == [
-        "run",
-        "a.yaml",
-        "--json",
-        "--out",
-        "out",
-        "--set",
-        "x=1",
-        "--set",
-        "seed=3",
-        "--pace",
-        "0.5",
-        "--listen",
-        "tcp/1",
-        "--no-record",
-    ]
+    code, _, err = invoke(*options.arguments(Path("out")))
+    assert (code, err) == (0, "")
+    assert understood == [options]
 
 
 def child(digests: Iterator[str | None], passed: bool = True) -> Callable[[RunOptions, Path], dict[str, Any]]:

@@ -14,7 +14,7 @@ from twin.bridge import types
 from twin.bridge.qos import QoS, parse_qos
 from twin.bridge.wire import ros2dds as wire_ros2dds
 from twin.bridge.wire.keys import EndpointKind, demangle, gid
-from twin.bridge.wire.session import direct, tokens_alive
+from twin.bridge.wire.session import direct
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -132,6 +132,21 @@ def _announced_parts(announced: wire_ros2dds.Announced) -> list[tuple[EndpointKi
     ]
 
 
+def alive(bus: Bus, key: str) -> list[str]:
+    """Return the liveliness tokens that match a key expression now, this process's included."""
+    found: list[str] = []
+    done = threading.Event()
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            found.append(str(reply.ok.key_expr))
+
+    # Zenoh's default handler is a queue of 256: with more tokens of its own a process would wait for itself.
+    bus.session.liveliness().get(key, direct(on_reply, done.set), timeout=_TIMEOUT_S)
+    done.wait(_TIMEOUT_S + 1.0)
+    return found
+
+
 class Graph:
     """The nodes and endpoints that are alive, sorted by name."""
 
@@ -147,7 +162,7 @@ class Graph:
     @classmethod
     def snapshot(cls, bus: Bus) -> Self:
         """Return the graph as it is now, the bus's own nodes included."""
-        return cls(tokens_alive(bus.session, _tokens(bus), _TIMEOUT_S))
+        return cls(token for key in _tokens(bus) for token in alive(bus, key))
 
     @classmethod
     def watch(cls, bus: Bus) -> Self:

@@ -15,13 +15,13 @@ import zenoh
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import Codec, codec
-from twin.bridge.graph import EndpointInfo, NodeInfo, parse_token
+from twin.bridge.graph import EndpointInfo, NodeInfo, alive, parse_token
 from twin.bridge.lockstep.protocol import Entry, entry
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, NodeToken, gid, parse_attachment, topic_key
-from twin.bridge.wire.session import direct, tokens_alive
+from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
 
@@ -110,9 +110,8 @@ class Mirror:
         self.nodes: list[str] = []
         """Full names, in order of creation."""
         tokens = f"@ros2_lv/{bus.domain_id}/{bus.session_id}/*/*/SS/**"
-        liveliness = bus.session.liveliness()
-        self._offers: Any = liveliness.declare_subscriber(tokens, direct(self._on_service))
-        for token in tokens_alive(bus.session, [tokens], 10.0):  # history=True would come in another thread
+        self._offers: Any = bus.session.liveliness().declare_subscriber(tokens, direct(self._on_service))
+        for token in sorted(alive(bus, tokens)):  # history=True would call back in another thread
             self._add_service(token)
 
     def take(self) -> list[Any]:

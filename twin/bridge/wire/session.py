@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any, Literal
 
 import xxhash
@@ -174,24 +171,3 @@ def direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = No
     if drop is not None:
         from_zenoh(drop)
     return zenoh.handlers.Callback(callback, drop, indirect=False)
-
-
-def tokens_alive(session: zenoh.Session, keys: Sequence[str], timeout_s: float) -> list[str]:
-    """Return the liveliness tokens that match, of all sessions within reach; waits at most so long [s].
-
-    Not through Zenoh's default channel, of 256 replies: the session's own tokens are replied in this thread,
-    which then would wait for itself to read them.
-    """
-    found: list[str] = []
-    ended: SimpleQueue[None] = SimpleQueue()
-
-    def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            found.append(str(reply.ok.key_expr))
-
-    for key in keys:
-        session.liveliness().get(key, direct(on_reply, partial(ended.put, None)), timeout=timeout_s)
-    with suppress(Empty):
-        for _ in keys:
-            ended.get(timeout=timeout_s)
-    return list(found)
