@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 import yaml
 
 from tests.bridge import bag_helpers as bags
+from twin.bridge.bags.convert import Target, convert
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.writer import BagConfig, BagWriter
@@ -233,6 +235,30 @@ def test_a_full_disk_leaves_a_bag_that_can_be_read(tmp_path: Path, monkeypatch: 
     assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size == before
     with BagReader(tmp_path / "bag") as bag:
         assert 0 < len(list(bag.messages())) < ALL
+
+
+@pytest.mark.parametrize("target", ["copy", "copy.bag"])
+def test_a_conversion_that_fails_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, target: str
+) -> None:
+    """What is left would be in the way of the next attempt."""
+    source = bags.make_bag(tmp_path / "bag")
+    read_on = BagReader.messages
+
+    def interrupted(self: BagReader, topics: set[str]) -> Iterator[BagMessage]:
+        yield next(read_on(self, topics))
+        raise KeyboardInterrupt
+
+    storage: Target = "rosbag1" if target.endswith(".bag") else "mcap"
+    with monkeypatch.context() as patch:
+        patch.setattr(BagReader, "messages", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            convert(source, tmp_path / target, storage=storage)
+    assert not (tmp_path / target).exists()
+    assert convert(source, tmp_path / target, storage=storage).messages == ALL
+    with pytest.raises(RecordingError, match="exists already"):
+        convert(source, tmp_path / target, storage=storage)
+    assert (tmp_path / target).exists()
 
 
 def test_types_come_with_the_bag(tmp_path: Path) -> None:

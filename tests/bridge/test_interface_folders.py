@@ -10,6 +10,7 @@ import pytest
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import PoseStamped, new
+from twin.bridge.types.show import show_lines
 from twin.errors import BridgeError
 
 Write = Callable[..., Path]
@@ -163,6 +164,12 @@ def test_a_type_that_contains_itself(write: Write, package: str) -> None:
     types.add_folder(write("B.msg", "A a\n"))
     with pytest.raises(BridgeError, match=rf"{package}/msg/A contains itself: .*A -> .*B -> .*A"):
         types.get(f"{package}/msg/A")
+
+
+def test_a_type_that_contains_itself_is_not_shown_for_ever(write: Write, package: str) -> None:
+    types.add_folder(write("Tree.msg", f"{package}/Tree[] branches\n"))
+    with pytest.raises(BridgeError, match=rf"{package}/msg/Tree contains itself: "):
+        list(show_lines(f"{package}/msg/Tree"))
 
 
 def test_two_definitions_of_a_name_are_an_error_that_names_both(

@@ -10,6 +10,7 @@ import pytest
 from tests.processes import wait_for
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.graph import Graph
 from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import AddTwoInts
@@ -120,6 +121,14 @@ def test_two_buses_meet(endpoint: str) -> None:
         wait_for(latched)
         assert got == ["hello", "the map"]
         assert here.session_id != there.session_id
+
+
+def test_a_graph_of_many_endpoints_is_seen_from_inside(open_bus: Bus) -> None:
+    """Zenoh's default channel holds 256 replies, and the own tokens are replied in the thread that asks."""
+    node = open_bus.create_node("much")
+    for number in range(300):
+        node.create_publisher(String, f"topic_{number}")
+    assert sum(name.startswith("/topic_") for name in Graph.snapshot(open_bus).topics()) == 300
 
 
 def test_a_port_in_use_is_named(open_bus: Bus, endpoint: str) -> None:

@@ -15,6 +15,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from rich.text import Text
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from twin.cli import app as app_module
@@ -114,13 +116,51 @@ def test_help_loads_nothing_heavy() -> None:
     assert "Run a scenario to its verdict" in done.stdout
 
 
-@pytest.mark.parametrize("command", [name for name, _, _ in app_module._COMMANDS])
+@pytest.mark.parametrize("command", [name for name, *_ in app_module._COMMANDS])
 def test_help_of_every_command_has_an_example_that_parses(command: str) -> None:
     result = CliRunner().invoke(app_module.app, [command, "--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     example = re.search(r"Example: (twin .*?)\s*$", result.output, re.MULTILINE)
     assert example is not None
     assert example[1].split()[1] == command
+
+
+def test_no_help_text_is_taken_for_markup() -> None:
+    """rich leaves '[s]' out, as if it were struck through."""
+    seen = []
+
+    def look(command: Any) -> None:
+        seen.append(command)
+        for text in [command.help, *(getattr(each, "help", None) for each in command.params)]:
+            assert text is None or Text.from_markup(text).plain == text, command.name
+        for each in getattr(command, "commands", {}).values():
+            look(each)
+
+    look(get_command(app_module.app))
+    assert len(seen) > 40
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["robots"], ["interface", "list"]])
+def test_a_full_disk_under_the_output_is_told(arguments: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "twin.cli", *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (
+        2,
+        "error: No space left on device: what is printed is not whole; make room\n",
+    )
+
+
+def test_a_closed_output_is_no_fault() -> None:
+    command = f"{sys.executable} -m twin.cli interface list >&-"
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_commands_are_grouped() -> None:
+    out = CliRunner().invoke(app_module.app, ["--help"], env={"COLUMNS": "120"}).output
+    panels = re.findall(r"^╭─ (\w.*?) ─", out, re.MULTILINE)
+    assert panels == ["Options", "Scenarios", "Robot files", "ROS 2 graph"]
 
 
 def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
@@ -155,6 +195,24 @@ def test_json_is_the_file(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> N
     assert runtime.calls[0]["pace"] == 1.0
 
 
+def test_a_bug_is_2_with_its_traceback_and_in_the_verdict(tmp_path: Path) -> None:
+    """1 would be a failed check: whoever reads the exit code only would look for it in the robot."""
+    (tmp_path / "demo.yaml").write_text(SCENARIO, encoding="utf-8")
+    (tmp_path / "bad.py").write_text(
+        "def make(bus):\n"
+        "    node = bus.create_node('bad')\n"
+        "    node.create_timer(20_000_000, lambda: 1 / 0)\n"
+        "    return node\n",
+        encoding="utf-8",
+    )
+    done = twin("run", "demo.yaml", "--node", "bad.py:make", "--no-record", "--out", "here", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith("ZeroDivisionError: division by zero\n")
+    assert "bad.py" in done.stderr
+    verdict = json.loads((tmp_path / "here" / "verdict.json").read_text(encoding="utf-8"))
+    assert (verdict["verdict"], verdict["error"]) == ("error", "ZeroDivisionError: division by zero")
+
+
 def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
     demo.write_text(SCENARIO.replace("energy", "enrgy").replace("1 s", "1 kg"), encoding="utf-8")
     code, out, err = invoke("run", str(demo))
@@ -180,11 +238,12 @@ def test_a_run_that_breaks_is_2_with_an_error_verdict(
     assert ElementTree.parse(demo.parent / "here" / "junit.xml").getroot().get("errors") == "1"
 
 
-def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
     runtime.fault = ZeroDivisionError("a bug")
-    monkeypatch.setattr(sys, "argv", ["twin", "run", str(demo)])
-    with pytest.raises(ZeroDivisionError):
-        app_module.run_app()
+    code, _, err = invoke("run", str(demo))
+    assert code == 2
+    assert err.startswith("Traceback")
+    assert err.endswith("ZeroDivisionError: a bug\n")
 
 
 def test_ctrl_c_is_130(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

@@ -85,6 +85,17 @@ def test_a_node_that_never_comes_is_an_error(twin: Twin, endpoint: str, tmp_path
     assert (verdict["verdict"], verdict["clock"], verdict["digest"]) == ("error", "lockstep", None)
 
 
+def test_a_misspelt_node_is_told_beside_what_has_joined(twin: Twin, endpoint: str) -> None:
+    node = twin("exec", f"{NODES}:controller", "--lockstep", "--connect", endpoint)
+    waits = ("--wait-for", "/controller", "--wait-for", "/controler", "--wait-timeout", "8")
+    run = twin("run", "driven.yaml", "--no-record", "--out", "o", "--listen", endpoint, *waits)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 2
+    assert errors.rstrip().endswith("; what has joined: /controller")
+    assert "error: no node /controler has joined within 8 s" in errors
+    node.wait(10)
+
+
 def test_free_running_is_labelled(twin: Twin, endpoint: str) -> None:
     run = twin("run", "driven.yaml", "--no-record", "--out", "o", "--free", "--listen", endpoint)
     node = twin("exec", f"{NODES}:controller", "--connect", endpoint, "--use-sim-time")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 
 import typer
@@ -13,7 +15,7 @@ from twin.errors import TwinError
 
 app = typer.Typer(
     name="twin",
-    help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts.",
+    help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, ROS 2.",
     epilog="Example: [bold]twin run scenarios/warehouse.yaml[/bold]",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -21,19 +23,22 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_SCENARIOS, _ROBOTS, _GRAPH = "Scenarios", "Robot files", "ROS 2 graph"
+
 _COMMANDS = (
-    ("run", run.run, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
-    ("exec", exec.execute, "twin exec my_controller.py:make_node --lockstep"),
-    ("test", batch.run_batch, "twin test scenarios --junit results.xml"),
-    ("play", play.play, "twin play runs/warehouse/20261121-101500"),
-    ("check", check.check, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
-    ("tree", tree.tree, "twin tree my_robot.urdf"),
-    ("graph", graph.graph, "twin graph my_robot.urdf -o my_robot.svg"),
-    ("convert", convert.convert, "twin convert my_robot.urdf -o my_robot"),
-    ("view", view.view, "twin view my_robot.urdf --joint lift_joint=0.5"),
-    ("schema", schema.schema, "twin schema -o scenario.schema.json"),
-    ("robots", robots.robots, "twin robots"),
-    ("router", router.router, "twin router --listen tcp/127.0.0.1:7447"),
+    ("run", run.run, _SCENARIOS, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
+    ("test", batch.run_batch, _SCENARIOS, "twin test scenarios --junit results.xml"),
+    ("play", play.play, _SCENARIOS, "twin play runs/warehouse/20261121-101500"),
+    ("schema", schema.schema, _SCENARIOS, "twin schema -o scenario.schema.json"),
+    ("robots", robots.robots, _ROBOTS, "twin robots"),
+    ("check", check.check, _ROBOTS, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
+    ("tree", tree.tree, _ROBOTS, "twin tree my_robot.urdf"),
+    ("graph", graph.graph, _ROBOTS, "twin graph my_robot.urdf -o my_robot.svg"),
+    ("convert", convert.convert, _ROBOTS, "twin convert my_robot.urdf -o my_robot"),
+    ("view", view.view, _ROBOTS, "twin view my_robot.urdf --joint lift_joint=0.5"),
+    ("router", router.router, _GRAPH, "twin router --listen tcp/127.0.0.1:7447"),
+    ("exec", exec.execute, _GRAPH, "twin exec my_controller.py:make_node --lockstep"),
 )
 
 _GROUPS = (
@@ -49,14 +54,17 @@ _GROUPS = (
 
 _NEED_ARGUMENTS = ("run", "exec", "play", "check", "tree", "graph", "convert", "view")
 
-for _name, _function, _example in _COMMANDS:
-    app.command(_name, epilog=f"Example: [bold]{_example}[/bold]", no_args_is_help=_name in _NEED_ARGUMENTS)(
-        _function
-    )
+for _name, _function, _panel, _example in _COMMANDS:
+    app.command(
+        _name,
+        epilog=f"Example: [bold]{_example}[/bold]",
+        no_args_is_help=_name in _NEED_ARGUMENTS,
+        rich_help_panel=_panel,
+    )(_function)
 
 
 for _name, _group in _GROUPS:
-    app.add_typer(_group, name=_name)
+    app.add_typer(_group, name=_name, rich_help_panel=_GRAPH)
 
 
 @app.callback()
@@ -65,7 +73,9 @@ def _root() -> None:
 
 
 def run_app() -> None:
-    """Run the command line and exit: 0 pass, 1 a check failed, 2 a user's mistake, 130 interrupted."""
+    """Run the command line and exit: 0 pass, 1 a check failed, 2 a mistake or a bug, 130 interrupted."""
+    if sys.stdout is None:  # started with `>&-`
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
     try:
         app()
     except TwinError as fault:
@@ -73,3 +83,18 @@ def run_app() -> None:
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
+    except Exception as fault:
+        _tell(fault)
+        sys.exit(2)  # Python's own exit code for a bug, 1, means a failed check here
+
+
+def _tell(fault: Exception) -> None:
+    """Tell of a full disk in a sentence; of a bug, in here or in a user's node, with its traceback."""
+    if not isinstance(fault, OSError) or fault.errno not in _FULL:
+        import traceback
+
+        traceback.print_exception(fault)
+        return
+    print_error(TwinError(f"{fault.strerror}: {fault.filename or 'what is printed'} is not whole; make room"))
+    # What is still buffered goes nowhere; otherwise the interpreter complains when it flushes at its end.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -60,6 +60,11 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         if as_json:
             sys.stdout.write(verdict.to_json())
         return verdict.exit_code
+    except Exception as bug:  # ours, or of a user's node: whoever reads the verdict learns of it, too
+        if folder is not None:
+            sentence = f"{type(bug).__name__}: {bug}"
+            Verdict(scenario=name, seed=seed, error=sentence, clock=clock).write(folder)
+        raise
     verdict.write(folder)
     if as_json:
         sys.stdout.write(verdict.to_json())

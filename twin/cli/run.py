@@ -10,6 +10,8 @@ import typer
 from twin.bridge.wire import Wire
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 
+_OTHERS = "Other processes"
+
 
 def run(
     scenario: Annotated[Path, typer.Argument(help="The scenario file.", show_default=False)],
@@ -30,7 +32,11 @@ def run(
     ] = None,
     listen: Annotated[
         list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Let others join the bus, e.g. tcp/127.0.0.1:7447.",
+            rich_help_panel=_OTHERS,
+        ),
     ] = None,
     node: Annotated[
         list[str] | None,
@@ -39,24 +45,52 @@ def run(
     wait_for: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME", help="Run in lock-step with a node or topic of another process, e.g. /cmd_vel."
+            metavar="NAME",
+            help="Run in lock-step with a node or topic of another process, e.g. /cmd_vel.",
+            rich_help_panel=_OTHERS,
         ),
     ] = None,
-    wait_timeout: Annotated[float, typer.Option(help="How long to wait for an answer [s].")] = 10.0,
+    wait_timeout: Annotated[
+        float, typer.Option(help="How many seconds to wait for an answer.", rich_help_panel=_OTHERS)
+    ] = 10.0,
     free: Annotated[
-        bool, typer.Option("--free", help="Let others take part at their own pace; not deterministic.")
+        bool,
+        typer.Option(
+            "--free",
+            help="Let others take part at their own pace; not deterministic.",
+            rich_help_panel=_OTHERS,
+        ),
     ] = False,
     connect: Annotated[
         list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Join the graph of a router, e.g. tcp/127.0.0.1:7447.",
+            rich_help_panel=_OTHERS,
+        ),
     ] = None,
     zenoh_config: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", exists=True, dir_okay=False, help="Join as a Zenoh configuration says."),
+        typer.Option(
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+            help="Join as a Zenoh configuration says.",
+            rich_help_panel=_OTHERS,
+        ),
     ] = None,
-    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    wire: Annotated[
+        Wire, typer.Option(help="How names are spelled; all are heard.", rich_help_panel=_OTHERS)
+    ] = "rmw_zenoh",
     domain: Annotated[
-        int, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain, if others may join.")
+        int,
+        typer.Option(
+            envvar="ROS_DOMAIN_ID",
+            min=0,
+            max=232,
+            help="ROS domain, if others may join.",
+            rich_help_panel=_OTHERS,
+        ),
     ] = 0,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")

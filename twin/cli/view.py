@@ -32,7 +32,7 @@ def view(
     joint: Annotated[
         list[str] | None,
         typer.Option(
-            "--joint", metavar="NAME=VALUE", help="Position of a joint [rad or m]; may be repeated."
+            "--joint", metavar="NAME=VALUE", help="Position of a joint, in rad or m; may be repeated."
         ),
     ] = None,
     show: Annotated[

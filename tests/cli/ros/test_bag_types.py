@@ -11,7 +11,8 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from tests.cli.ros.conftest import ROOT, wait_for
+from tests.cli.ros.conftest import ROOT
+from tests.processes import wait_for
 from twin.bridge.bags.reader import BagReader
 
 GRAPH = "topic_graph.py"

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from subprocess import CompletedProcess
 
 import pytest
-from twin.cli.ros.service_endpoints import endpoint_text
 
 from twin.bridge.graph import EndpointInfo, parse_token
+from twin.cli.ros.endpoint_text import endpoint_text
 
 GRAPH = "service_graph.py"
 ADD = ("/add_two_ints", "example_interfaces/srv/AddTwoInts")
@@ -147,7 +147,7 @@ def test_waiting_for_a_service_ends_with_the_time_out(twin_here: Twin) -> None:
     done = twin_here("service", "call", "/add_two", "std_srvs/srv/Empty", "--timeout", "0.3")
     assert done.stdout == "waiting for service to become available...\n"
     assert done.returncode == 2
-    assert done.stderr.startswith("error: Unknown service '/add_two'; did you mean '/add_two_ints'?")
+    assert "\nerror: Unknown service '/add_two'; did you mean '/add_two_ints'?" in done.stderr
 
 
 def test_a_rate_repeats_the_call_until_ctrl_c(endpoint: str) -> None:
@@ -163,3 +163,12 @@ def test_a_rate_repeats_the_call_until_ctrl_c(endpoint: str) -> None:
         _, errors = process.communicate(timeout=20)
     assert process.returncode == 130
     assert errors == ""
+
+
+def test_a_wait_for_a_misspelt_name_says_so(twin_here: Twin) -> None:
+    """It may come yet, so the command waits, as ros2's; but nobody should wait for a mistake unknowingly."""
+    called = twin_here("service", "call", "/add_two_int", ADD[1], "--timeout", "0.2")
+    assert "WARNING: there is no service /add_two_int yet; did you mean /add_two_ints?\n" in called.stderr
+    sent = twin_here("action", "send_goal", "/fibonaci", "example_interfaces/action/Fibonacci", "-t", "0.2")
+    assert "WARNING: there is no action /fibonaci yet; did you mean /fibonacci?\n" in sent.stderr
+    assert called.returncode == sent.returncode == 2

@@ -45,7 +45,7 @@ def test_the_rates_of_several_topics_are_a_table(endpoint: str) -> None:
 
 def test_echo_tells_how_many_messages_were_lost(endpoint: str) -> None:
     with started(endpoint, "topic", "echo", "/lossy") as process:
-        text = "\n".join(lines(process, 14))
+        text = "\n".join(lines(process, 18))
     lost = "A message was lost!!!\n\ttotal count change:1\n\ttotal count: {}---\n"
     assert lost.format(1) in text
     assert lost.format(2) in text
@@ -68,8 +68,6 @@ def test_throttle_by_bytes(endpoint: str) -> None:
         assert lines(process, 1) == ["/chatter -> /thin"]
         with started(endpoint, "topic", "echo", "/thin", "--csv") as echo:
             numbers = [int(line.strip("'")) for line in lines(echo, 25)]
-    gaps = [after - before for before, after in itertools.pairwise(numbers)]
-    longest = [index for index, gap in enumerate(gaps) if gap > 50]
-    assert longest, gaps
-    assert all(gap == 1 for gap in gaps if gap <= 50)
-    assert all(9 <= after - before <= 12 for before, after in itertools.pairwise(longest))
+    in_a_second = [sum(first <= number < first + 90 for number in numbers) for first in numbers]
+    assert max(in_a_second) <= 12
+    assert numbers[-1] - numbers[0] > 150  # of 100 in a second

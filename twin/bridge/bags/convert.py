@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol, cast, get_args
@@ -71,21 +73,38 @@ def convert(
         wanted = (topics or TopicChoice()).of(bag.topics)
         notices = list(bag.notices)
         writer = _open(target, storage, compression)
-        count, usable = 0, set()
         try:
-            for name in wanted:
-                try:
-                    writer.add_topic(bag.topics[name])
-                    usable.add(name)
-                except BridgeError as fault:
-                    left = bag.topics[name].count
-                    notices.append(f"{source}: {left} messages on {name} are left out: {fault}")
-            for message in bag.messages(usable):
-                writer.write(message)
-                count += 1
-        finally:
-            writer.close()
-    return Converted(messages=count, topics=len(usable), notices=tuple(notices))
+            count, usable = _copy(bag, wanted, writer, notices)
+        except BaseException:  # Ctrl-C too: half a bag would be in the way of the next attempt
+            with suppress(Exception):
+                writer.close()
+            _remove(target)
+            raise
+    return Converted(messages=count, topics=usable, notices=tuple(notices))
+
+
+def _copy(bag: BagReader, wanted: Iterable[str], writer: _Writer, notices: list[str]) -> tuple[int, int]:
+    """Write topics and their messages, and the end; return how many messages, and of how many topics."""
+    count, usable = 0, set()
+    for name in wanted:
+        try:
+            writer.add_topic(bag.topics[name])
+            usable.add(name)
+        except BridgeError as fault:
+            left = bag.topics[name].count
+            notices.append(f"{bag.path}: {left} messages on {name} are left out: {fault}")
+    for message in bag.messages(usable):
+        writer.write(message)
+        count += 1
+    writer.close()
+    return count, len(usable)
+
+
+def _remove(target: Path) -> None:
+    if target.is_dir():
+        shutil.rmtree(target, ignore_errors=True)
+    else:
+        target.unlink(missing_ok=True)
 
 
 def _open(target: Path, storage: Target, compression: Compression) -> _Writer:

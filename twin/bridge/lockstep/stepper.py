@@ -56,6 +56,12 @@ class Attendance:
         with self._lock:
             return sorted(session for session, name in self._present if name == node)
 
+    @property
+    def nodes(self) -> list[str]:
+        """The full names of the nodes that are offered, sorted."""
+        with self._lock:
+            return sorted({name for _, name in self._present})
+
     def wait(self, timeout_s: float) -> None:
         """Wait for a change, at most so long [s] of wall time."""
         self._changed.wait(timeout_s)
@@ -167,6 +173,10 @@ def await_node(bus: Bus, attendance: Attendance, name: str, timeout_s: float) ->
     return stepper
 
 
+def _others(attendance: Attendance) -> str:
+    return f"; what has joined: {', '.join(attendance.nodes)}" if attendance.nodes else ""
+
+
 def _session_of(attendance: Attendance, name: str, timeout_s: float) -> str:
     start, told = time.monotonic(), False
     while not (sessions := attendance.sessions(name)):
@@ -174,7 +184,7 @@ def _session_of(attendance: Attendance, name: str, timeout_s: float) -> str:
         if waited > timeout_s:
             raise BridgeError(
                 f"no node {name} has joined within {timeout_s:g} s; start its process, for example with "
-                f"twin exec FILE.py:FACTORY --lockstep"
+                f"twin exec FILE.py:FACTORY --lockstep{_others(attendance)}"
             )
         if waited > _PATIENCE_S and not told:
             told = True

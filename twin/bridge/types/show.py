@@ -15,13 +15,15 @@ Comments = Literal["own", "all", "none"]
 """Of which definitions the comments are shown: the one that was asked for, nested ones too, or none."""
 
 
-def show_lines(typename: str, comments: Comments = "own", depth: int = 0) -> Iterator[str]:
+def show_lines(typename: str, comments: Comments = "own", within: tuple[str, ...] = ()) -> Iterator[str]:
     """Yield the lines of a definition; below each field of a message type its definition, a tab further in.
 
     Raises:
-        BridgeError: an unknown type, or a part of a service or an action.
+        BridgeError: an unknown type, a part of a service or an action, or a type that contains itself.
     """
     name = "/".join(types.parts(typename))
+    if name in within:
+        raise BridgeError(f"{name} contains itself: {' -> '.join([*within, name])}")
     text = types.text_of(name)
     if text is None:
         raise BridgeError(f"{name} has no definition of its own; valid: {whole(name)}")
@@ -30,8 +32,8 @@ def show_lines(typename: str, comments: Comments = "own", depth: int = 0) -> Ite
     for number, raw in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
         line = without_comment(raw).strip() if comments == "none" else raw.rstrip()
         if line:
-            yield "\t" * depth + line
+            yield "\t" * len(within) + line
         elif comments != "none":
             yield ""
         if number in nested:
-            yield from show_lines(nested[number], "all" if comments == "all" else "none", depth + 1)
+            yield from show_lines(nested[number], "all" if comments == "all" else "none", (*within, name))

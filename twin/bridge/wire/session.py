@@ -173,8 +173,9 @@ def _settings(config: SessionConfig) -> dict[str, Any]:
 
 
 def _reason(error: zenoh.ZError) -> str:
-    """Return Zenoh's words without the place in its sources."""
-    return str(error).split(" at /")[0].strip().rstrip(".")
+    """Return Zenoh's words without the place in its sources, and without the names of its classes."""
+    words = str(error).split(" at /")[0].split('msg: "')[-1]
+    return words.strip().rstrip(".")
 
 
 def _listed(value: Any) -> str:

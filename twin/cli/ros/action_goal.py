@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
 from twin.cli.ros.joining import Joining
 from twin.cli.ros.service_call import know
 from twin.cli.ros.tool_node import tool_node
@@ -62,13 +62,16 @@ def send_goal(
 def _wait_for_server(
     process: LiveBus, client: ActionClient, typename: str, timeout_s: float | None, signals: list[int]
 ) -> None:
+    from twin.bridge.graph import Graph
+
     _refuse_other_type(process, client.name, typename)
+    if not client.server_is_ready:
+        others = Graph.snapshot(process.bus).actions().keys() - {client.name}
+        hint_at_nearest("action", client.name, others)
     in_time = process.spin(lambda: client.server_is_ready or bool(signals), timeout_s)
     if signals:
         raise typer.Exit(_INTERRUPTED)
     if not in_time:
-        from twin.bridge.graph import Graph
-
         _refuse_other_type(process, client.name, typename)
         actions = [name for name in Graph.snapshot(process.bus).actions() if name != client.name]
         fault = unknown("action", client.name, actions)

@@ -87,15 +87,18 @@ def play(
     ] = None,
     clock: Annotated[bool, typer.Option("--clock", help="Publish /clock from the bag's time.")] = False,
     clock_hz: Annotated[float, typer.Option("--clock-hz", help="How often.")] = 40.0,
-    delay: Annotated[float, typer.Option("--delay", "-d", help="Wait so long before each round [s].")] = 0.0,
+    delay: Annotated[
+        float, typer.Option("--delay", "-d", help="Wait so many seconds before each round.")
+    ] = 0.0,
     start_offset: Annotated[
-        float, typer.Option("--start-offset", help="Begin so far into the bag [s].")
+        float, typer.Option("--start-offset", help="Begin so many seconds into the bag.")
     ] = 0.0,
     duration: Annotated[
-        float | None, typer.Option("--playback-duration", help="Play so much of the bag [s].")
+        float | None, typer.Option("--playback-duration", help="Play so many seconds of the bag.")
     ] = None,
     until: Annotated[
-        float | None, typer.Option("--playback-until-sec", help="Play until this time [s since the epoch].")
+        float | None,
+        typer.Option("--playback-until-sec", help="Play until this time, in seconds since the epoch."),
     ] = None,
     start_paused: Annotated[
         bool, typer.Option("--start-paused", "-p", help="Wait for ~/resume of /rosbag2_player.")

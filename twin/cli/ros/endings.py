@@ -5,20 +5,27 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 
-def endless(command: Callable[..., None]) -> Callable[..., None]:
-    """Let Ctrl-C be the ordinary end of a command."""
+def _once(given: Mapping[str, Any]) -> bool:
+    return bool(given.get("once"))
+
+
+def endless(
+    command: Callable[..., None], ends_by_itself: Callable[[Mapping[str, Any]], bool] = _once
+) -> Callable[..., None]:
+    """Let Ctrl-C be the ordinary end of a command, unless its options say that it ends by itself."""
 
     @functools.wraps(command)
     def wrapper(**given: Any) -> None:
         try:
             command(**given)
         except KeyboardInterrupt:
-            return
+            if ends_by_itself(given):
+                raise
 
     return wrapper
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from twin.errors import BridgeError, nearest
+import typer
+
+from twin.errors import COMPARED, BridgeError, nearest
 
 
 def absolute(name: str) -> str:
@@ -21,3 +23,13 @@ def instead(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the nearest of the names that there are, and all of them."""
     names = list(known)
     return nearest(name, names) if names else f"there are no {kind}s"
+
+
+def hint_at_nearest(kind: str, name: str, known: Iterable[str]) -> None:
+    """Say on stderr, before a wait that may last for ever, that something else has nearly this name."""
+    import difflib
+
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5) if len(names) <= COMPARED else []
+    if close:
+        typer.echo(f"WARNING: there is no {kind} {name} yet; did you mean {close[0]}?", err=True)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
 
+PANEL = "Joining the graph"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Joining:
@@ -59,7 +61,8 @@ def _options(
         typer.Option(
             metavar="ENDPOINT",
             help="Where a run or a router listens.",
-            show_default="tcp/127.0.0.1:7447",
+            rich_help_panel=PANEL,
+            show_default="TWIN_CONNECT, else tcp/127.0.0.1:7447",
         ),
     ] = None,
     config: Annotated[
@@ -70,15 +73,19 @@ def _options(
             exists=True,
             dir_okay=False,
             help="Zenoh configuration.",
+            rich_help_panel=PANEL,
         ),
     ] = None,
     domain: Annotated[
-        int | None, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.")
+        int | None,
+        typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.", rich_help_panel=PANEL),
     ] = None,
     use_sim_time: Annotated[
-        bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.")
+        bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.", rich_help_panel=PANEL)
     ] = False,
-    wire: Annotated[Wire, typer.Option(help="How names are spelled; all are heard.")] = "rmw_zenoh",
+    wire: Annotated[
+        Wire, typer.Option(help="How names are spelled; all are heard.", rich_help_panel=PANEL)
+    ] = "rmw_zenoh",
     interfaces: Interfaces = None,
 ) -> Joining:
     add_interfaces(interfaces)

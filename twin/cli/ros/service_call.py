@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
 from twin.cli.ros.joining import Joining
 from twin.cli.ros.tool_node import tool_node
 from twin.cli.ros.yaml_values import message_of, text_of
@@ -83,7 +83,10 @@ def wait_for_service(process: LiveBus, client: Client, typename: str, timeout_s:
         BridgeError: nobody did in the time [s] given, or it is offered with another type.
     """
     if not _is_offered(process.bus, client.name, typename):
+        from twin.bridge.graph import Graph
+
         typer.echo("waiting for service to become available...")
+        hint_at_nearest("service", client.name, Graph.snapshot(process.bus).services())
     if not process.spin(lambda: client.service_is_ready, timeout_s):
         if _is_offered(process.bus, client.name, typename):
             raise BridgeError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.drawing_file import Output, check_ending, write_drawing
+from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
 
@@ -22,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True, help="Transforms: the tree, a frame in another, delays; as tf2_tools."
 )
 
-WaitTime = Annotated[float, typer.Option("--wait-time", "-t", min=0.0, help="How long to listen [s].")]
+WaitTime = Annotated[float, typer.Option("--wait-time", "-t", min=0.0, help="How many seconds to listen.")]
 
 
 @app.command("tree", epilog="Example: [bold]twin tf tree[/bold]")
@@ -55,14 +56,17 @@ def frames(
 
 @app.command("echo", epilog="Example: [bold]twin tf echo map base_link --once[/bold]")
 @joins
+@endless
 def echo(
     source_frame: Annotated[str, typer.Argument(help="Frame in which the other one is shown.")],
     target_frame: Annotated[str, typer.Argument(help="Frame whose pose is shown.")],
-    rate: Annotated[float, typer.Argument(min=1e-3, help="How often [Hz].")] = 1.0,
+    rate: Annotated[float, typer.Argument(min=1e-3, help="How often, in Hz.")] = 1.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first.")] = False,
     timeout: Annotated[
         float | None,
-        typer.Option("--timeout", min=0.0, help="End if there is none so long [s].", show_default="never"),
+        typer.Option(
+            "--timeout", min=0.0, help="End if there is none for so many seconds.", show_default="never"
+        ),
     ] = None,
     *,
     joining: Joining,
@@ -83,10 +87,11 @@ def echo(
 
 @app.command("monitor", epilog="Example: [bold]twin tf monitor --once --duration 3[/bold]")
 @joins
+@endless
 def monitor(
     source_frame: Annotated[str | None, typer.Argument(help="First frame of a chain.")] = None,
     target_frame: Annotated[str | None, typer.Argument(help="Last frame of a chain.")] = None,
-    duration: Annotated[float, typer.Option(min=0.01, help="Between two reports [s].")] = 10.0,
+    duration: Annotated[float, typer.Option(min=0.01, help="Seconds between two reports.")] = 10.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first report.")] = False,
     *,
     joining: Joining,

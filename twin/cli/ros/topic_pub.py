@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -90,7 +91,7 @@ def _plan(
 @joins
 @takes("plan", _plan)
 @takes("choice", publisher_qos)
-@endless
+@partial(endless, ends_by_itself=lambda given: given["plan"].times > 0)
 def pub(
     topic: TopicName,
     message_type: Annotated[
