@@ -62,12 +62,12 @@ def test_drop_leaves_out_x_of_y(endpoint: str) -> None:
 
 
 def test_throttle_by_bytes(endpoint: str) -> None:
-    """16 bytes each, 100 a second of simulated time: of 160 bytes in a second 11 messages pass."""
+    """At least 12 bytes each, 100 a second of simulated time: of 160 bytes in a second 13 messages pass."""
     arguments = ("topic", "throttle", "bytes", "/chatter", "160", "1.0", "/thin", "-s")
     with started(endpoint, *arguments) as process:
         assert lines(process, 1) == ["/chatter -> /thin"]
         with started(endpoint, "topic", "echo", "/thin", "--csv") as echo:
             numbers = [int(line.strip("'")) for line in lines(echo, 25)]
     in_a_second = [sum(first <= number < first + 90 for number in numbers) for first in numbers]
-    assert max(in_a_second) <= 12
-    assert numbers[-1] - numbers[0] > 150  # of 100 in a second
+    assert max(in_a_second) <= 14
+    assert numbers[-1] - numbers[0] > 100  # of 100 in a second
