@@ -203,7 +203,7 @@ def test_an_exception_in_the_node_is_seen_on_both_sides(
     with pytest.raises(BridgeError, match="/controller left the run without an answer to tick 25"):
         stepped(scenario(DRIVE), endpoint, "/controller")
     assert "ZeroDivisionError" in child.communicate()[1]
-    assert child.returncode == 1
+    assert child.returncode == 2
 
 
 def test_nobody_comes(scenario: Callable[[str], Scenario], endpoint: str) -> None:
