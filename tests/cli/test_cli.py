@@ -248,7 +248,9 @@ def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, invoke: Inv
 
 def test_ctrl_c_is_130(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
     runtime.fault = KeyboardInterrupt()  # type: ignore[assignment]
-    assert invoke("run", str(demo)) == (130, "", "")
+    assert invoke("run", str(demo), "--out", "here") == (130, "", "")
+    verdict = json.loads((demo.parent / "here" / "verdict.json").read_text(encoding="utf-8"))
+    assert (verdict["verdict"], verdict["error"]) == ("error", "interrupted")
 
 
 def test_two_runs_in_one_second_get_two_folders(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

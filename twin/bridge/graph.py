@@ -142,7 +142,8 @@ def alive(bus: Bus, key: str) -> list[str]:
             found.append(str(reply.ok.key_expr))
 
     # Zenoh's default handler is a queue of 256: with more tokens of its own a process would wait for itself.
-    bus.session.liveliness().get(key, direct(on_reply, done.set), timeout=_TIMEOUT_S)
+    # A function of our own: what Zenoh calls is marked, and `Event.set` is everybody's.
+    bus.session.liveliness().get(key, direct(on_reply, lambda: done.set()), timeout=_TIMEOUT_S)
     done.wait(_TIMEOUT_S + 1.0)
     return found
 

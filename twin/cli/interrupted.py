@@ -36,3 +36,9 @@ def ends_on_interrupt() -> Iterator[None]:
         # CPython: an interrupt inside of an exec, as of a namedtuple, lets the process die of SIGINT in the
         # end although it was handled; the next exec makes it forget (run_eval_code_obj in pythonrun.c).
         exec("")
+
+
+def sigterm_is_ctrl_c() -> None:
+    """Let SIGTERM, with which CI systems end a job that takes too long, end the command as Ctrl-C does."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
 from twin.cli.folders import make_folder, run_folder
+from twin.cli.interrupted import sigterm_is_ctrl_c
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
@@ -24,6 +25,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     from twin.scenario.verdict import Verdict
 
     show_warnings()
+    sigterm_is_ctrl_c()
     name, seed, folder = options.scenario.stem, 0, None
     clock: ClockMode = "inproc"
     try:
@@ -60,6 +62,10 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         if as_json:
             sys.stdout.write(verdict.to_json())
         return verdict.exit_code
+    except KeyboardInterrupt:
+        if folder is not None:
+            Verdict(scenario=name, seed=seed, error="interrupted", clock=clock).write(folder)
+        raise
     except Exception as bug:  # ours, or of a user's node: whoever reads the verdict learns of it, too
         if folder is not None:
             sentence = f"{type(bug).__name__}: {bug}"
