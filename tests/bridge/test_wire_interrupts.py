@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -114,7 +115,10 @@ def test_a_run_that_others_may_join(tmp_path: Path) -> None:
         ) as process:
             code, errors = _interrupt(process, 0.4 + number * 0.25)
         assert (code, "Traceback" in errors, "Error" in errors) == (130, False, False), (number, errors)
-        assert not out.exists() or not any(out.iterdir()), number
+        left = sorted(file.name for file in out.iterdir()) if out.exists() else []
+        assert left in ([], ["junit.xml", "verdict.json"]), number
+        if left:
+            assert json.loads((out / "verdict.json").read_text("utf-8"))["error"] == "interrupted"
 
 
 def test_an_interrupt_inside_a_callback_comes_with_the_next_spin() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import wait_for_listener
+from tests.processes import free_endpoint, wait_for_listener
 
 SCENARIO = """
 name: open_floor
@@ -46,7 +46,9 @@ def positions(echo: subprocess.Popen[str]) -> Iterator[tuple[float, float]]:
 
 
 @pytest.mark.slow
-def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path, endpoint: str) -> None:
+@pytest.mark.timeout(120)
+def test_pub_drives_the_robot_of_a_run_on_a_circle(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
     (tmp_path / "open_floor.yaml").write_text(SCENARIO)
     run = ("run", str(tmp_path / "open_floor.yaml"), "--listen", endpoint, "--pace", "1", "--no-record")
     with twin(*run, "--out", str(tmp_path / "out")):
