@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +15,7 @@ from xml.etree import ElementTree
 from tests.cli.ros.conftest import ROOT
 from tests.processes import free_endpoint
 from twin.bridge import live
+from twin.bridge.msgs import TFMessage, ns
 from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
 from twin.geometry import Pose3
 
@@ -123,3 +126,21 @@ def test_frames_as_gv_and_svg(twin: Twin, tmp_path: Path) -> None:
     refused = twin("tf", "frames", "-o", str(tmp_path / "frames.pdf"))
     assert refused.returncode == 2
     assert ".gv or .svg" in refused.stderr
+
+
+def test_throttled_frames_are_published_seldom(endpoint: str) -> None:
+    command = [sys.executable, "-m", "twin.cli", "tf", "throttle", "odom", "laser", "--rate", "5"]
+    with (
+        live.join([endpoint]) as process,
+        subprocess.Popen([*command, "--connect", endpoint], stdout=subprocess.PIPE, text=True) as throttle,
+    ):
+        got: list[TFMessage] = []
+        process.bus.create_node("ear").create_subscription(TFMessage, "tf_throttled", got.append)
+        assert process.spin(until=lambda: len(got) == 4, timeout_s=30)
+        throttle.send_signal(signal.SIGINT)
+        assert throttle.communicate(timeout=20)[0] == "laser in odom -> /tf_throttled\n"
+        assert throttle.returncode == 0
+    pairs = {(t.header.frame_id, t.child_frame_id) for message in got for t in message.transforms}
+    assert pairs == {("odom", "laser")}
+    stamps = [ns(message.transforms[0].header.stamp) for message in got]
+    assert all(after - before > 0.1e9 for before, after in itertools.pairwise(stamps))

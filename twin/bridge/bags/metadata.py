@@ -173,9 +173,8 @@ def read(folder: Path) -> BagInfo:
     except (yaml.YAMLError, UnicodeDecodeError) as fault:
         raise RecordingError(f"{path}: is not YAML: {' '.join(str(fault).split())}") from fault
     except (KeyError, TypeError, ValueError, AttributeError) as fault:
-        raise RecordingError(
-            f"{path}: is not the metadata of a ROS 2 bag ({fault} is missing or wrong)"
-        ) from fault
+        what = f"{fault} is missing" if isinstance(fault, KeyError) else "a value is of another kind"
+        raise RecordingError(f"{path}: is not the metadata of a ROS 2 bag: {what}") from fault
 
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

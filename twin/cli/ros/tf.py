@@ -130,6 +130,36 @@ def monitor(
                 return
 
 
+@app.command("throttle", epilog="Example: [bold]twin tf throttle map base_link laser --rate 2[/bold]")
+@joins
+@endless
+def throttle(
+    target_frame: Annotated[str, typer.Argument(help="The parent in what is published.")],
+    source_frames: Annotated[list[str], typer.Argument(help="The children.")],
+    rate: Annotated[float, typer.Option(help="At most so often, in Hz.")] = 10.0,
+    trans_thres: Annotated[float, typer.Option(help="Only after moving farther, in m; 0: always.")] = 0.0,
+    angular_thres: Annotated[
+        float, typer.Option(help="Only after turning farther, in rad; 0: always.")
+    ] = 0.0,
+    *,
+    joining: Joining,
+) -> None:
+    """Publish frames in another one on /tf_throttled, seldom: for a slow link or a web page."""
+    from twin.nodes.tf_throttle import TfThrottleNode
+
+    parameters = {
+        "target_frame": target_frame,
+        "source_frames": source_frames,
+        "rate": rate,
+        "trans_thres": trans_thres,
+        "angular_thres": angular_thres,
+    }
+    with joining.open() as process:
+        TfThrottleNode(process.bus, parameters=parameters)
+        typer.echo(f"{', '.join(source_frames)} in {target_frame} -> /tf_throttled")
+        process.spin()
+
+
 def _listen(process: LiveBus, wait_time_s: float) -> tuple[tuple[FrameInfo, ...], int]:
     """Return what is known of the frames after a while, and the time then [ns]."""
     from twin.bridge.tf import TransformBuffer, TransformListener
