@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -34,12 +33,15 @@ def router(
     """Run a Zenoh router, as rmw_zenohd, until Ctrl-C."""
     from twin.bridge.wire.router import RouterConfig, run_router
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     settings = RouterConfig(listen=tuple(listen or ()), connect=tuple(connect or ()), file=config)
-    with run_router(settings) as running:
-        typer.echo(
-            f"Started Zenoh router with id {running.session_id}, listening on {', '.join(running.listen)}"
-        )
-        stop.wait()
+    # Blocked and waited for: a handler that sets an Event can lock itself out while the Event is waited for.
+    ends = {signal.SIGINT, signal.SIGTERM}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    try:
+        with run_router(settings) as running:
+            typer.echo(
+                f"Started Zenoh router with id {running.session_id}, listening on {', '.join(running.listen)}"
+            )
+            signal.sigwait(ends)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
