@@ -128,6 +128,16 @@ def test_the_short_way_gives_what_the_walk_gives(
         assert got == pytest.approx(expected, abs=1e-9) if isinstance(expected, list) else got == expected
 
 
+def test_a_loop_of_the_past_is_named() -> None:
+    buffer = TransformBuffer()
+    for parent, child, time_ns in (("a", "b", S), ("b", "a", S), ("c", "a", 2 * S)):
+        buffer.set_transform(parent, child, time_ns, identity)
+    with pytest.raises(UnknownFrameError, match="loop: a -> b -> a"):
+        buffer.lookup_stamped("a", "c", S)
+    with pytest.raises(UnknownFrameError, match="loop: b -> a -> b"):
+        buffer.lookup_stamped("c", "b", S)
+
+
 def outcome(look_up: Callable[[], tuple[Rigid, int]]) -> list[float] | type[Exception]:
     try:
         value, time_ns = look_up()

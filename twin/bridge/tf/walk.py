@@ -91,6 +91,7 @@ def _climb(
 ) -> tuple[Rigid, str, FrameCache | None]:
     """Return T_end_start, where the climb ended, and the frame not known at that time that ended it."""
     chain, frame = IDENTITY, start
+    way: list[str] = []
     for _ in range(MAX_DEPTH + 1):
         cache = frames.get(frame)
         if frame in until or cache is None:
@@ -99,8 +100,9 @@ def _climb(
         if value is None:
             return chain, frame, cache
         chain = compose(value, chain)
+        way.append(frame)
         frame = cache.parent_at(time_ns)
-    raise _loop(frames, start)
+    raise _loop(way)
 
 
 def _latest_ancestors(frames: Frames, start: str, until: tuple[str, ...]) -> list[tuple[int, str]]:
@@ -112,7 +114,7 @@ def _latest_ancestors(frames: Frames, start: str, until: tuple[str, ...]) -> lis
         if cache.parent in until:
             break
         if len(steps) > MAX_DEPTH:
-            raise _loop(frames, start)
+            raise _loop([start, *(parent for _, parent in steps)])
         cache = frames.get(cache.parent)
     return steps
 
@@ -132,11 +134,8 @@ def _disconnected(target: str, target_root: str, source: str, source_root: str) 
     )
 
 
-def _loop(frames: Frames, start: str) -> UnknownFrameError:
-    names: list[str] = []
-    frame = start
-    while frame not in names:
-        names.append(frame)
-        frame = frames[frame].parent
-    ring = [*names[names.index(frame) :], frame]
-    return UnknownFrameError(f"the frames above {start!r} form a loop: {' -> '.join(ring)}")
+def _loop(way: list[str]) -> UnknownFrameError:
+    """Return what to say of a way up, of whatever time, that comes by a frame again."""
+    end = next(i for i, name in enumerate(way) if name in way[:i])
+    ring = way[way.index(way[end]) : end + 1]
+    return UnknownFrameError(f"the frames above {way[0]!r} form a loop: {' -> '.join(ring)}")
