@@ -20,16 +20,16 @@ from typing import Any
 from twin.bridge.bus import Bus
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
-from twin.navigation.amcl import AmclConfig
-from twin.navigation.dock_estimate import DockEstimateConfig
-from twin.navigation.goal_checker import GoalCheckerConfig
-from twin.navigation.planner import PlannerConfig
-from twin.navigation.progress_checker import ProgressCheckerConfig
+from twin.navigation.control.goal_checker import GoalCheckerConfig
+from twin.navigation.control.progress_checker import ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.docking.dock_estimate import DockEstimateConfig
+from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuitConfig
-from twin.nodes.bt_navigator import BtNavigatorConfig
-from twin.nodes.costmap import CostmapNodeConfig
-from twin.nodes.docking_server import DockingConfig
+from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking_server import DockingConfig
 from twin.runtime.build import build
 from twin.scenario.schema import json_schema, load
 from twin.warehouse.arena_file import ArenaFile

@@ -28,9 +28,9 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, stamp
 from twin.bridge.qos import LATCHED
 from twin.errors import RecordingError
-from twin.navigation.amcl import AmclConfig
-from twin.nodes.amcl import AmclNode, InitialPose
-from twin.nodes.robot_pose import Frames, RobotPose
+from twin.navigation.localisation.amcl import AmclConfig
+from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import run
 from twin.runtime.robot_stack import _initial_guess

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from twin.geometry import Pose2
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 

@@ -21,9 +21,9 @@ from twin.bridge.tf import StaticTransformBroadcaster, TransformBroadcaster, tra
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
 from twin.geometry import Pose2, Pose3
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
-from twin.nodes.robot_pose import Frames, RobotPose
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode
 
 ORIGIN = Pose2(0.0, 0.0, 0.0)

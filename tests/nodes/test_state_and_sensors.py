@@ -30,13 +30,13 @@ from twin.geometry import Pose2
 from twin.models import load
 from twin.models.kinematics import link_poses
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
-from twin.navigation.amcl import AmclConfig
-from twin.nodes.amcl import AmclNode, InitialPose
-from twin.nodes.map_server import MapServerNode
-from twin.nodes.robot_pose import Frames
+from twin.navigation.localisation.amcl import AmclConfig
+from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.static_localisation import StaticLocalisationNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
-from twin.nodes.static_localisation import StaticLocalisationNode
 from twin.nodes.transforms import TransformListenerNode
 
 # robot_state_publisher

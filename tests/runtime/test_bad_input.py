@@ -22,7 +22,7 @@ from twin.cli.options import RunOptions
 from twin.errors import BridgeError, MapError, ModelError, SimulationError, TwinError
 from twin.geometry import Pose2
 from twin.models import load as load_robot
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.recording import read_back
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario

@@ -10,7 +10,7 @@ import pytest
 
 import twin.warehouse
 from twin.geometry import Pose2
-from twin.navigation.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
+from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from twin.warehouse import arena as arenas
 from twin.warehouse.map_renderer import render
 

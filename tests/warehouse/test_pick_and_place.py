@@ -25,7 +25,7 @@ from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose
 from twin.models import load
-from twin.nodes.robot_pose import Frames
+from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime import derive
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
 from twin.warehouse.skills import Station

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.costmap import Costmap
-from twin.navigation.costmap_kernels import steps_to_collision
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.kernels import steps_to_collision
 
 COLLISION_AHEAD = "collision_ahead"
 TIMEOUT = "timeout"

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from twin.geometry import Pose2
-from twin.navigation.costmap import footprint_cost
-from twin.navigation.layered_costmap import CostmapConfig, LayeredCostmap
-from twin.navigation.likelihood_field import LikelihoodField
-from twin.navigation.occupancy_map import OccupancyMap
-from twin.navigation.planner import Planner, PlannerConfig
+from twin.navigation.costmaps.costmap import footprint_cost
+from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
-from twin.navigation.smoother import SimpleSmoother
 
 
 def warm_up() -> None:

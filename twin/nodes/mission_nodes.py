@@ -15,8 +15,8 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED
 from twin.bridge.types import ActionType
-from twin.nodes.bt.control import sequence
-from twin.nodes.bt.leaves import CallAction, Do
+from twin.nodes.navigation.bt.control import sequence
+from twin.nodes.navigation.bt.leaves import CallAction, Do
 
 
 class MissionNode:

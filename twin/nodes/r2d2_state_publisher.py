@@ -12,7 +12,7 @@ from twin.bridge.msgs import Float64MultiArray, MultiArrayLayout
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
 from twin.nodes.mission_nodes import MissionNode
-from twin.nodes.robot_pose import Frames
+from twin.nodes.navigation.robot_pose import Frames
 
 _DEGREE = math.pi / 180.0
 _SWEEPS = {"tilt": (-0.5, 0.0), "periscope": (0.0, 0.2)}

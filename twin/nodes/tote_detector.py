@@ -13,9 +13,9 @@ from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import LaserScan, PoseArray, header, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
-from twin.navigation.docking import find_box_faces
-from twin.nodes.costmap import scan_points
-from twin.nodes.robot_pose import RobotPose
+from twin.navigation.docking.controller import find_box_faces
+from twin.nodes.navigation.costmap import scan_points
+from twin.nodes.navigation.robot_pose import RobotPose
 
 
 @dataclass(frozen=True, kw_only=True)

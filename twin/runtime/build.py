@@ -18,7 +18,7 @@ from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.shapes import Box
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack, StackContext

@@ -10,15 +10,15 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
-from twin.navigation.goal_checker import GoalCheckerConfig
-from twin.navigation.layered_costmap import CostmapConfig
-from twin.navigation.planner import PlannerConfig
-from twin.navigation.progress_checker import ProgressCheckerConfig
+from twin.navigation.control.goal_checker import GoalCheckerConfig
+from twin.navigation.control.progress_checker import ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.navigation.regulated_pure_pursuit import RegulatedPurePursuitConfig
-from twin.nodes.controller_server import ControllerServerConfig
-from twin.nodes.costmap import CostmapNodeConfig
-from twin.nodes.robot_pose import Frames
+from twin.nodes.navigation.controller_server import ControllerServerConfig
+from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.robot_pose import Frames
 from twin.scenario.navigation import NavigationConfig, ParameterGroup
 
 C = TypeVar("C")

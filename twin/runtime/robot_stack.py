@@ -13,30 +13,30 @@ from twin.controllers.drive_config import drive_config
 from twin.geometry import Pose2
 from twin.models.description import RobotDescription
 from twin.models.specs import LidarSpec
-from twin.navigation.amcl import AmclConfig
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.amcl import AmclNode, InitialPose
-from twin.nodes.behavior_server import BehaviorServerNode
-from twin.nodes.bt_navigator import BtNavigatorNode
-from twin.nodes.controller_server import ControllerServerNode
-from twin.nodes.costmap import CostmapNode
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
-from twin.nodes.docking_server import DockingServerNode
 from twin.nodes.gripper_controller import GripperControllerNode
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
-from twin.nodes.map_server import MapServerNode
-from twin.nodes.planner_server import PlannerServerNode
+from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.behavior_server import BehaviorServerNode
+from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.costmap import CostmapNode
+from twin.nodes.navigation.docking_server import DockingServerNode
+from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.planner_server import PlannerServerNode
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
+from twin.nodes.navigation.static_localisation import StaticLocalisationNode
+from twin.nodes.navigation.twist_mux import TwistMuxNode
+from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.position_controller import PositionControllerNode
-from twin.nodes.robot_pose import Frames, RobotPose
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
-from twin.nodes.static_localisation import StaticLocalisationNode
 from twin.nodes.tote_detector import ToteDetectorNode
 from twin.nodes.transforms import TransformListenerNode
-from twin.nodes.twist_mux import TwistMuxNode
-from twin.nodes.velocity_smoother import VelocitySmootherNode
 from twin.runtime import derive
 from twin.runtime.navigation_config import navigation_parameters, overridden
 from twin.scenario.navigation import NavigationConfig

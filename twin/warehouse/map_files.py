@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from twin.errors import MapError, nearest
-from twin.navigation.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.warehouse.arena import Arena
 from twin.warehouse.map_renderer import render
 

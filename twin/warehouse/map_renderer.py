@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from twin.geometry import Pose2
 from twin.models.shapes import Box
-from twin.navigation.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
+from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from twin.warehouse.arena import Arena
 from twin.warehouse.footprint import Rectangle
 

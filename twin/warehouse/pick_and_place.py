@@ -10,9 +10,9 @@ from py_trees.common import Status
 
 from twin.bridge.bus import Bus
 from twin.manipulation.telescopic_arm import TelescopicArm
-from twin.nodes.bt.control import RecoveryNode, sequence
-from twin.nodes.docking_server import DockingConfig
-from twin.nodes.robot_pose import Frames
+from twin.nodes.navigation.bt.control import RecoveryNode, sequence
+from twin.nodes.navigation.docking_server import DockingConfig
+from twin.nodes.navigation.robot_pose import Frames
 from twin.warehouse.skills import MobileManipulationNode, Station
 
 

@@ -37,11 +37,11 @@ from twin.bridge.srvs import SetBool
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
-from twin.nodes.bt.leaves import CallAction, CallService, Condition, Do
-from twin.nodes.docking_server import DockingConfig
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import MissionNode
-from twin.nodes.robot_pose import Frames
+from twin.nodes.navigation.bt.leaves import CallAction, CallService, Condition, Do
+from twin.nodes.navigation.docking_server import DockingConfig
+from twin.nodes.navigation.robot_pose import Frames
 
 
 @dataclass(frozen=True, kw_only=True)

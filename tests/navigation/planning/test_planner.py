@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import heapq
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.failures import (
+    GoalOccupied,
+    GoalOutsideMap,
+    NoValidPath,
+    PlanningFailure,
+    StartOccupied,
+    StartOutsideMap,
+)
+from twin.navigation.planning.planner import Planner, PlannerConfig, path_length
+from twin.navigation.planning.smoother import SimpleSmoother
+
+EXACT = PlannerConfig(tolerance=0.0)
+
+
+def grid(*rows: str) -> Costmap:
+    """A costmap of 1 m cells: . free, @ lethal, # inscribed, ? unknown, 5 cost 125; highest y first."""
+    values = {".": 0, "@": 254, "#": 253, "?": 255, "5": 125}
+    costs = np.array([[values[c] for c in row] for row in reversed(rows)], dtype=np.uint8)
+    return Costmap(costs=costs, resolution=1.0)
+
+
+def centre(column: int, row: int, yaw: float = 0.0) -> Pose2:
+    return Pose2(column + 0.5, row + 0.5, yaw)
+
+
+def plan(costmap: Costmap, start: Pose2, goal: Pose2, config: PlannerConfig = EXACT) -> np.ndarray:
+    return Planner(config=config).plan(costmap, start, goal)
+
+
+@pytest.mark.parametrize(
+    "name", ["maze-32-32-2", "random-32-32-20", "room-64-64-16", "warehouse-10-20-10-2-1"]
+)
+def test_paths_are_optimal_on_every_problem_of_movingai(shared_data: Path, name: str) -> None:
+    bench = json.loads((shared_data / "movingai" / f"{name}.json").read_text())
+    free = np.array([[c == "." for c in row] for row in bench["rows"]])
+    costmap = Costmap(costs=np.where(free, 0, 254).astype(np.uint8), resolution=1.0)
+    for sx, sy, gx, gy, optimum in bench["problems"]:
+        path = plan(costmap, centre(sx, sy), centre(gx, gy))
+        assert path_length(path) == pytest.approx(optimum, abs=1e-6)
+        cells = np.floor(path[:, :2]).astype(int)
+        assert free[cells[:, 1], cells[:, 0]].all()
+        diagonal = np.flatnonzero(np.abs(np.diff(cells, axis=0)).sum(axis=1) == 2)
+        a, b = cells[diagonal], cells[diagonal + 1]
+        assert (free[a[:, 1], b[:, 0]] & free[b[:, 1], a[:, 0]]).all()  # no corner is cut
+
+
+def slow_cheapest(costs: np.ndarray, start: tuple[int, int], factor: float) -> dict[tuple[int, int], float]:
+    """Dijkstra by the book over (row, column)."""
+    price = np.where(costs < 253, 1.0 + factor * costs / 252.0, np.inf)
+    best, heap = {start: 0.0}, [(0.0, start)]
+    while heap:
+        cost, (y, x) = heapq.heappop(heap)
+        if cost > best[y, x]:
+            continue
+        for v, u in ((y + dy, x + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dx or dy):
+            if not (0 <= v < costs.shape[0] and 0 <= u < costs.shape[1]) or np.isinf(price[v, u]):
+                continue
+            if np.isinf(price[y, u]) or np.isinf(price[v, x]):
+                continue
+            new = cost + math.hypot(u - x, v - y) * (price[y, x] + price[v, u]) / 2.0
+            if new < best.get((v, u), math.inf):
+                best[v, u] = new
+                heapq.heappush(heap, (new, (v, u)))
+    return best
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31), factor=st.floats(0.0, 10.0))
+def test_weighted_paths_are_the_cheapest(seed: int, factor: float) -> None:
+    random = np.random.default_rng(seed)
+    costs = random.integers(0, 253, (9, 12)).astype(np.uint8)
+    costs[random.random(costs.shape) < 0.25] = 254
+    costs[0, 0] = 0
+    costmap = Costmap(costs=costs, resolution=1.0)
+    best = slow_cheapest(costs, (0, 0), factor)
+    price = 1.0 + factor * costs / 252.0
+    for (row, column), want in best.items():
+        path = plan(
+            costmap, centre(0, 0), centre(column, row), PlannerConfig(tolerance=0.0, cost_factor=factor)
+        )
+        if (row, column) == (0, 0):
+            continue
+        cells = np.floor(path[:, :2]).astype(int)
+        prices = price[cells[:, 1], cells[:, 0]]
+        steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        assert float(steps @ (prices[:-1] + prices[1:])) / 2.0 == pytest.approx(want)
+
+
+def test_a_path_starts_and_ends_exactly_and_looks_along_itself() -> None:
+    start, goal = Pose2(0.3, 0.6, 2.0), Pose2(3.7, 0.4, -1.0)
+    path = plan(grid("....."), start, goal)
+    assert path[0, :2] == pytest.approx((0.3, 0.6))
+    assert path[-1] == pytest.approx(goal)
+    assert path[1:-2, 2] == pytest.approx(0.0)
+
+
+def test_start_and_goal_in_one_cell() -> None:
+    path = plan(grid("."), Pose2(0.2, 0.5, 0.0), Pose2(0.7, 0.5, 1.0))
+    assert path[:, :2].tolist() == [[0.2, 0.5], [0.7, 0.5]]
+    assert path[-1, 2] == 1.0
+
+
+def test_a_short_dear_way_against_a_long_cheap_one() -> None:
+    costmap = grid(".....", ".@@@.", "55555")
+    through = plan(costmap, centre(0, 0), centre(4, 0), PlannerConfig(cost_factor=0.1))
+    around = plan(costmap, centre(0, 0), centre(4, 0), PlannerConfig(cost_factor=20.0))
+    assert through[:, 1].max() == 0.5
+    assert around[:, 1].max() == 2.5
+
+
+def test_unknown_cells() -> None:
+    costmap = grid("..?..")
+    assert len(plan(costmap, centre(0, 0), centre(4, 0))) == 5
+    with pytest.raises(NoValidPath):
+        plan(costmap, centre(0, 0), centre(4, 0), PlannerConfig(allow_unknown=False))
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "failure", "code"),
+    [
+        (centre(0, 0), centre(1, 0), GoalOccupied, 206),
+        (centre(1, 0), centre(0, 0), StartOccupied, 205),
+        (centre(0, 0), centre(2, 0), NoValidPath, 208),
+        (centre(0, 0), centre(9, 0), GoalOutsideMap, 204),
+        (centre(-1, 0), centre(0, 0), StartOutsideMap, 203),
+        (centre(0, 0), Pose2(math.nan, 0.0, 0.0), GoalOutsideMap, 204),
+    ],
+)
+def test_failures_carry_nav2s_codes(
+    start: Pose2, goal: Pose2, failure: type[PlanningFailure], code: int
+) -> None:
+    with pytest.raises(failure) as caught:
+        plan(grid(".@."), start, goal)
+    assert caught.value.error_code == code
+
+
+def test_tolerance_ends_the_path_at_the_nearest_cell_that_can_be_reached() -> None:
+    costmap = grid("....@..", "....@..", "....@@.")
+    inside_wall = plan(costmap, centre(0, 0), centre(4, 1), PlannerConfig(tolerance=2.0))
+    assert inside_wall[-1, :2].tolist() == [3.5, 1.5]
+    behind_wall = plan(costmap, centre(0, 0), centre(6, 1), PlannerConfig(tolerance=3.5))
+    assert behind_wall[-1, :2].tolist() == [3.5, 1.5]
+    with pytest.raises(NoValidPath):
+        plan(costmap, centre(0, 0), centre(6, 1), PlannerConfig(tolerance=2.0))
+
+
+def test_a_start_inside_the_inscribed_zone_gets_out_but_no_path_leads_in() -> None:
+    costmap = grid("@#..#..", "@#..#..")
+    out = plan(costmap, centre(1, 0), centre(3, 0))
+    assert out[:, 0].tolist() == [1.5, 2.5, 3.5]
+    with pytest.raises(NoValidPath):
+        plan(costmap, centre(1, 0), centre(6, 0))
+    with pytest.raises(GoalOccupied):
+        plan(costmap, centre(2, 0), centre(1, 0))
+
+
+def test_planning_twice_gives_the_same_path() -> None:
+    costmap = Costmap(costs=np.zeros((40, 40), dtype=np.uint8), resolution=0.05)
+    paths = [plan(costmap, Pose2(0.1, 0.1, 0.0), Pose2(1.8, 0.9, 0.0)) for _ in range(2)]
+    assert np.array_equal(*paths)
+
+
+def test_smoothing_rounds_corners_and_keeps_clear_of_obstacles() -> None:
+    costmap = grid("........", "........", "..@@@@..", "..@@@@..", "..@@@@..", "........")
+    path = plan(costmap, centre(1, 0), centre(6, 5, 0.7))
+    smooth = SimpleSmoother().smooth(path, costmap)
+    assert smooth.shape == path.shape
+    assert smooth[0, :2] == pytest.approx(path[0, :2])
+    assert smooth[-1] == pytest.approx(path[-1])
+    assert np.abs(np.diff(np.unwrap(smooth[:-1, 2]))).max() < np.abs(np.diff(np.unwrap(path[:-1, 2]))).max()
+    assert path_length(smooth) < path_length(path)
+    assert max(costmap.cost_at(x, y) for x, y in smooth[:, :2]) == 0
+    free = SimpleSmoother().smooth(path)
+    assert path_length(free) <= path_length(smooth) + 1e-9
+
+
+def test_smoothing_leaves_short_and_straight_paths_alone() -> None:
+    two = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.5]])
+    assert np.array_equal(SimpleSmoother().smooth(two), two)
+    straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
+    assert SimpleSmoother().smooth(straight) == pytest.approx(straight)

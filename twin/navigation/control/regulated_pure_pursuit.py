@@ -1,0 +1,247 @@
+"""Path following: Nav2's Regulated Pure Pursuit (Macenski, Singh, Martín, Ginés 2023, arXiv 2305.20026)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.costmaps.costmap import (
+    FREE_SPACE,
+    INSCRIBED_INFLATED_OBSTACLE,
+    NO_INFORMATION,
+    Costmap,
+)
+from twin.navigation.costmaps.footprint import radii
+from twin.navigation.costmaps.kernels import steps_to_collision
+from twin.navigation.failures import InvalidPath, NoValidControl
+from twin.navigation.planning.planner import path_length
+
+MAX_SPACING = 0.1
+"""Sparser paths are filled up to this spacing [m], so that "nearest point" means what it says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegulatedPurePursuitConfig:
+    """Parameters; names and defaults are those of nav2_regulated_pure_pursuit_controller."""
+
+    desired_linear_vel: float = 0.5
+    """[m/s]"""
+    lookahead_dist: float = 0.6
+    """[m]"""
+    min_lookahead_dist: float = 0.3
+    """[m]"""
+    max_lookahead_dist: float = 0.9
+    """[m]"""
+    lookahead_time: float = 1.5
+    """[s]"""
+    use_velocity_scaled_lookahead_dist: bool = False
+    use_regulated_linear_velocity_scaling: bool = True
+    regulated_linear_scaling_min_radius: float = 0.9
+    """Turns tighter than this are driven slower [m]."""
+    regulated_linear_scaling_min_speed: float = 0.25
+    """[m/s]"""
+    use_cost_regulated_linear_velocity_scaling: bool = True
+    cost_scaling_dist: float = 0.6
+    """Closer to an obstacle than this the robot slows down [m]."""
+    cost_scaling_gain: float = 1.0
+    use_rotate_to_heading: bool = True
+    rotate_to_heading_angular_vel: float = 1.8
+    """[rad/s]"""
+    rotate_to_heading_min_angle: float = 0.785
+    """[rad]"""
+    max_angular_accel: float = 3.2
+    """[rad/s²]"""
+    approach_velocity_scaling_dist: float = 0.6
+    """[m]"""
+    min_approach_linear_velocity: float = 0.05
+    """[m/s]"""
+    use_collision_detection: bool = True
+    max_allowed_time_to_collision_up_to_carrot: float = 1.0
+    """[s]"""
+    xy_goal_tolerance: float = 0.25
+    """The goal checker's: closer than this the robot only turns to the goal's heading [m]."""
+    max_robot_pose_search_dist: float = 3.0
+    """How far along the path the nearest pose is searched each time [m]."""
+
+
+@dataclass(kw_only=True)
+class RegulatedPurePursuit:
+    """Follows one path at a time; a new path array resets it."""
+
+    config: RegulatedPurePursuitConfig
+    footprint: Array = field(default_factory=lambda: np.zeros((1, 2)))
+    """Shape (n, 2) [m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
+    desired_linear_vel: float = field(init=False)
+    """Current speed limit [m/s]; see `set_speed_limit`."""
+    carrot: tuple[float, float] | None = field(init=False, default=None)
+    """The lookahead point of the last command, in the path's frame [m]."""
+
+    def __post_init__(self) -> None:
+        self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
+        self._radius = max(radii(self.footprint)[1], 0.05)
+        self.desired_linear_vel = self.config.desired_linear_vel
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the path."""
+        self._path: Array | None = None
+        self._points = np.zeros((0, 2))
+        self._nearest = 0
+        self._reached_xy = False
+        self.carrot = None
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        """Drive no faster than `limit` [m/s]; None lifts the limit (nav2's SpeedLimit)."""
+        maximum = self.config.desired_linear_vel
+        self.desired_linear_vel = maximum if limit is None else min(limit, maximum)
+
+    def compute_velocity(
+        self,
+        pose: Pose2,
+        velocity: tuple[float, float],
+        path: Array,
+        costmap: Costmap | None,
+        dt: float,
+        *,
+        costmap_pose: Pose2 | None = None,
+    ) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]).
+
+        Args:
+            pose: Of the base, in the path's frame.
+            velocity: The present (v, w).
+            path: Shape (n, 3): x, y, yaw.
+            costmap: For slowing down near obstacles and for collision checks; None switches both off.
+            dt: Control period [s].
+            costmap_pose: Of the base in the costmap's frame; None where that is the path's frame too.
+
+        Raises:
+            InvalidPath: the path is empty, not finite or not of shape (n, 3).
+            NoValidControl: the command would collide within max_allowed_time_to_collision_up_to_carrot.
+        """
+        config = self.config
+        self._accept(path)
+        local = pose.inverse().apply(self._ahead(pose))
+        x, y = _lookahead_point(local, self._lookahead(velocity[0]))
+        self.carrot = (pose @ Pose2(x, y, 0.0))[:2]
+        distance, bearing = math.hypot(x, y), math.atan2(y, x)
+        self._reached_xy |= math.hypot(local[-1, 0], local[-1, 1]) < config.xy_goal_tolerance
+        if config.use_rotate_to_heading and self._reached_xy:
+            v, w = 0.0, self._rotate(wrap_angle(float(path[-1, 2]) - pose.yaw), velocity[1], dt)
+        elif config.use_rotate_to_heading and abs(bearing) > config.rotate_to_heading_min_angle:
+            v, w = 0.0, self._rotate(bearing, velocity[1], dt)
+        else:
+            curvature = 2.0 * y / distance**2 if distance**2 > 0.001 else 0.0
+            v = self._regulate(curvature, costmap_pose or pose, local, costmap)
+            w = v * curvature
+        if costmap is not None and config.use_collision_detection:
+            self._check(costmap_pose or pose, v, w, distance, costmap)
+        return v, w
+
+    def _accept(self, path: Array) -> None:
+        """Start over when the path is another array than last time."""
+        if path is self._path:
+            return
+        if path.ndim != 2 or path.shape[1] != 3 or not len(path) or not np.isfinite(path).all():
+            raise InvalidPath(
+                f"a path has shape (n, 3), n >= 1, and finite values; this one has {path.shape}"
+            )
+        self.reset()
+        self._path = path
+        self._points = _dense(path[:, :2], MAX_SPACING)
+
+    def _ahead(self, pose: Pose2) -> Array:
+        """Return the points from the one nearest to the robot on, shape (n, 2)."""
+        reach = 1 + math.ceil(self.config.max_robot_pose_search_dist / MAX_SPACING)
+        near = self._points[self._nearest : self._nearest + reach]
+        self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
+        return self._points[self._nearest :]
+
+    def _lookahead(self, v: float) -> float:
+        config = self.config
+        if not config.use_velocity_scaled_lookahead_dist:
+            return config.lookahead_dist
+        return min(max(abs(v) * config.lookahead_time, config.min_lookahead_dist), config.max_lookahead_dist)
+
+    def _rotate(self, angle: float, w_now: float, dt: float) -> float:
+        """Return w for turning in place by `angle`: reachable from `w_now`, and able to stop in time."""
+        config = self.config
+        change = config.max_angular_accel * dt
+        target = math.copysign(config.rotate_to_heading_angular_vel, angle)
+        w = min(max(target, w_now - change), w_now + change)
+        stoppable = min(math.sqrt(2.0 * config.max_angular_accel * abs(angle)), abs(angle) / dt)
+        return math.copysign(stoppable, angle) if abs(w) > stoppable else w
+
+    def _regulate(self, curvature: float, pose: Pose2, local: Array, costmap: Costmap | None) -> float:
+        """Return the linear velocity: slower in turns, near obstacles and at the end."""
+        config = self.config
+        v = limit = self.desired_linear_vel
+        if config.use_regulated_linear_velocity_scaling and curvature != 0.0:
+            v = min(v, limit * abs(1.0 / curvature) / config.regulated_linear_scaling_min_radius)
+        if config.use_cost_regulated_linear_velocity_scaling and costmap is not None:
+            cost = costmap.cost_at(pose.x, pose.y)
+            if cost not in (NO_INFORMATION, FREE_SPACE):
+                decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
+                clearance = costmap.inscribed_radius - decay / costmap.cost_scaling_factor
+                if clearance < config.cost_scaling_dist:
+                    v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
+        v = max(v, config.regulated_linear_scaling_min_speed)
+        approach = config.approach_velocity_scaling_dist
+        if len(local) <= 1 + approach / MAX_SPACING or path_length(local) < approach:
+            remaining = math.hypot(local[-1, 0], local[-1, 1])
+            v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
+        return min(v, limit)
+
+    def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
+        """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""
+        if abs(v) < 0.01 and abs(w) > 0.01:
+            step = 2.0 * math.asin(min(1.0, costmap.resolution / 2.0 / self._radius)) / abs(w)
+        elif abs(v) >= 0.01:
+            step = costmap.resolution / abs(v)
+        else:
+            return
+        allowed = self.config.max_allowed_time_to_collision_up_to_carrot
+        hit = steps_to_collision(
+            costmap.costs,
+            self.footprint,
+            float(pose.x),
+            float(pose.y),
+            float(pose.yaw),
+            float(v),
+            float(w),
+            step,
+            carrot_dist,
+            int(allowed / step),
+            *costmap.frame,
+        )
+        if hit >= 0:
+            raise NoValidControl(f"collision in {hit * step:.2f} s at {v:.2f} m/s, {w:.2f} rad/s")
+
+
+def _dense(points: Array, spacing: float) -> Array:
+    """Return points, shape (n, 2), with more between them where they are farther apart than `spacing` [m]."""
+    length = np.hypot(*np.diff(points, axis=0).T)
+    if not len(length) or length.max() <= spacing:
+        return points.copy()
+    pieces = np.maximum(1, np.ceil(length / spacing)).astype(np.int64)
+    knots = np.concatenate([[0], np.cumsum(pieces)])
+    at = np.arange(knots[-1] + 1)
+    return np.column_stack([np.interp(at, knots, points[:, 0]), np.interp(at, knots, points[:, 1])])
+
+
+def _lookahead_point(local: Array, distance: float) -> tuple[float, float]:
+    """Return where the path, shape (n, 2) in the base frame, leaves the circle of radius `distance`."""
+    far = np.hypot(local[:, 0], local[:, 1]) >= distance
+    i = int(np.argmax(far))
+    if not far[i]:
+        return float(local[-1, 0]), float(local[-1, 1])
+    if i == 0:
+        return float(local[0, 0]), float(local[0, 1])
+    (ax, ay), (bx, by) = local[i - 1].tolist(), local[i].tolist()
+    dx, dy = bx - ax, by - ay
+    a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - distance * distance
+    t = (-b + math.sqrt(b * b - a * c)) / a
+    return ax + t * dx, ay + t * dy

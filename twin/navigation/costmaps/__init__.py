@@ -1,0 +1,1 @@
+"""What a cell costs a robot: layers, inflation, footprints."""

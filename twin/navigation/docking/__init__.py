@@ -1,0 +1,1 @@
+"""Driving up to a face that a lidar sees."""

@@ -1,0 +1,116 @@
+"""Where the face of a dock is: the plan says where to expect it, scans tell where it is.
+
+A measurement counts if it is near what the plan says, not near the estimate so far: otherwise a neighbour's
+tote could draw the estimate away step by step. Of what counts, the median of the latest few is taken, so that
+a single wrong sight changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.docking.controller import fit_wall
+
+
+@dataclass(frozen=True, kw_only=True)
+class DockEstimateConfig:
+    """How far things may be from where the plan says, and how many sights are looked at."""
+
+    search_half_width: float = 0.7
+    """Points of the face are looked for so far to each side of the expected point [m]."""
+    search_depth: float = 0.25
+    """And so far before and behind it [m]."""
+    max_yaw: float = 0.2
+    """A line turned further than this against the expected face is another thing [rad]."""
+    min_length: float = 0.3
+    """A shorter line is another thing [m]."""
+    tote_reach: float = 0.2
+    """A tote further aside of the expected point is another one; less than half of totes' spacing [m]."""
+    tote_depth: float = 0.2
+    """So is one further behind the face than this, or before it [m]."""
+    min_sights: int = 3
+    """Fewer are not believed."""
+    max_sights: int = 9
+    """Older ones count no more: they were made from further away."""
+
+
+class DockEstimate:
+    """The face of one dock, in the odom frame."""
+
+    def __init__(self, expected: Pose2, config: DockEstimateConfig, *, wants_tote: bool) -> None:
+        """Begin with what the plan says.
+
+        Args:
+            expected: Point on the face, x into the dock, in the odom frame.
+            config: What is believed.
+            wants_tote: Whether to line up with the tote there, or with the expected point.
+        """
+        self.config = config
+        self.wants_tote = wants_tote
+        self._expected = expected
+        self._walls: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
+        self._totes: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
+
+    @property
+    def seen_face(self) -> bool:
+        """Whether the face was seen often enough."""
+        return len(self._walls) >= self.config.min_sights
+
+    @property
+    def seen(self) -> bool:
+        """Whether all that is looked for was seen often enough."""
+        return self.seen_face and (not self.wants_tote or len(self._totes) >= self.config.min_sights)
+
+    @property
+    def face(self) -> Pose2:
+        """The point to dock at, x into the dock, in the odom frame."""
+        edge = self._edge()
+        if not self._totes:
+            return self._expected @ edge
+        # The tote stands behind the edge: its foot on the face is what the robot lines up with.
+        x, y = np.median(self._totes, axis=0).tolist()
+        return self._expected @ edge @ Pose2(0.0, (edge.inverse() @ Pose2(x, y, 0.0)).y, 0.0)
+
+    def _edge(self) -> Pose2:
+        """Return the point of the face on the expected dock's x axis, in the expected dock's frame."""
+        if not self._walls:
+            return Pose2(0.0, 0.0, 0.0)
+        x, yaw = np.median(self._walls, axis=0).tolist()
+        return Pose2(x, 0.0, yaw)
+
+    def take_scan(self, points: Array, T_odom_base: Pose2) -> bool:
+        """Look for the face among points, shape (n, 2), in the base frame; return whether it is there."""
+        config = self.config
+        local = (self.face.inverse() @ T_odom_base).apply(points)
+        near = np.abs(local[:, 0]) < config.search_depth
+        near &= np.abs(local[:, 1]) < config.search_half_width
+        T_expected_base = self._expected.inverse() @ T_odom_base
+        wall = fit_wall(
+            points[near], facing=-T_expected_base.yaw, max_yaw=config.max_yaw, min_length=config.min_length
+        )
+        if wall is None:
+            return False
+        yaw = wrap_angle(wall.yaw + T_expected_base.yaw)
+        offset = wall.distance + math.cos(yaw) * T_expected_base.x + math.sin(yaw) * T_expected_base.y
+        self._walls.append((offset / math.cos(yaw), yaw))
+        return True
+
+    def take_totes(self, totes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
+        """Look for the tote among faces seen, in the base frame; return whether it is one of them."""
+        if not self.wants_tote:
+            return False
+        T_expected_base = self._expected.inverse() @ T_odom_base
+        edge, config = self._edge(), self.config
+        seen = [T_expected_base @ tote for tote in totes]
+        there = [t for t in seen if abs(t.x - edge.x) <= config.tote_depth and abs(t.y) <= config.tote_reach]
+        if not there:
+            return False
+        nearest = min(there, key=lambda tote: abs(tote.y))
+        self._totes.append((nearest.x, nearest.y))
+        return True

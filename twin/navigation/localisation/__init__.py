@@ -1,0 +1,1 @@
+"""Where a robot is on a map that it has."""

@@ -1,0 +1,1 @@
+"""Occupancy maps: in memory, and as map_server files."""

@@ -1,0 +1,1 @@
+"""Global planners: from a costmap and two poses to a path."""

@@ -1,0 +1,1 @@
+"""The nodes of navigation: names, topics and actions of Nav2."""
