@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from twin.errors import ScenarioError
+from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
-from twin.scenario.navigation import AmclLocalisation
 from twin.scenario.schema import Scenario, json_schema, load
 
 ROOT = Path(__file__).parents[2]

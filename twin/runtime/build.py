@@ -21,9 +21,10 @@ from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
-from twin.runtime.robot_stack import RobotStack, StackContext
+from twin.runtime.robot_stack import RobotStack
+from twin.runtime.stack_context import StackContext
+from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
-from twin.scenario.navigation import AmclLocalisation
 from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig

@@ -19,7 +19,8 @@ from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
-from twin.scenario.navigation import NavigationConfig, ParameterGroup
+from twin.scenario.navigation import NavigationConfig
+from twin.scenario.parameter_group import ParameterGroup
 
 C = TypeVar("C")
 

@@ -2,67 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
-from twin.bridge.bus import Bus
 from twin.controllers.drive_config import drive_config
-from twin.geometry import Pose2
 from twin.models.description import RobotDescription
-from twin.models.specs import LidarSpec
-from twin.navigation.localisation.amcl import AmclConfig
-from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
 from twin.nodes.gripper_controller import GripperControllerNode
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
-from twin.nodes.navigation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
-from twin.nodes.navigation.controller_server import ControllerServerNode
-from twin.nodes.navigation.costmap import CostmapNode
-from twin.nodes.navigation.docking_server import DockingServerNode
-from twin.nodes.navigation.map_server import MapServerNode
-from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
-from twin.nodes.navigation.static_localisation import StaticLocalisationNode
-from twin.nodes.navigation.twist_mux import TwistMuxNode
-from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.position_controller import PositionControllerNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.nodes.tote_detector import ToteDetectorNode
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import derive
-from twin.runtime.navigation_config import navigation_parameters, overridden
-from twin.scenario.navigation import NavigationConfig
-from twin.scenario.robots import RobotConfig
-from twin.sim.noise import NoiseStream
-from twin.sim.robot import RobotHandle
-
-
-@dataclass(frozen=True, kw_only=True)
-class StackContext:
-    """What the stack of one robot is built from."""
-
-    bus: Bus
-    config: RobotConfig
-    handle: RobotHandle
-    start: Pose2
-    """Where the robot really starts; only its guess, off by the scenario's error, reaches localisation."""
-    map: OccupancyMap | None
-    seed: int
-    control_period_ns: int
-    spawn_height: float
-    """Of the root link when the robot stands on the floor [m]."""
-    track_ratio: float | None
-    """Effective over geometric track of a skid steer, as calibrated."""
-    namespace: str
-    """'' for a single robot, '/name' among several."""
+from twin.runtime.localisation_stack import build_localisation
+from twin.runtime.navigation_stack import build_navigation
+from twin.runtime.stack_context import StackContext
 
 
 class RobotStack:
@@ -89,9 +49,11 @@ class RobotStack:
         self.manipulator = derive.manipulator(description)
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
-        self._build_localisation()
+        build_localisation(context, self.robot_pose)
         if context.config.navigation is not None:
-            self._build_navigation(context.config.navigation)
+            self.navigator = build_navigation(
+                context, context.config.navigation, self.robot_pose, self.footprint
+            )
         elif drive is not None:
             BehaviorServerNode(
                 bus,
@@ -121,52 +83,6 @@ class RobotStack:
             namespace=context.namespace,
         )
 
-    def _build_localisation(self) -> None:
-        context, config = self._context, self._context.config.localisation
-        if config is None or config.type == "none":
-            return
-        guess = _initial_guess(context.start, config.initial_pose_error, context.seed, self.name)
-        if config.type == "odometry":
-            StaticLocalisationNode(context.bus, self.frames, guess, namespace=context.namespace)
-            return
-        assert context.map is not None
-        MapServerNode(context.bus, context.map, namespace=context.namespace)
-        AmclNode(
-            context.bus,
-            self.robot_pose,
-            overridden(AmclConfig(), config.parameters.overrides()),
-            InitialPose.from_error(guess, config.initial_pose_error.xy, config.initial_pose_error.yaw),
-            seed=context.seed,
-            namespace=context.namespace,
-        )
-
-    def _build_navigation(self, config: NavigationConfig) -> None:
-        context, namespace, bus = self._context, self._context.namespace, self._context.bus
-        drive, pose = self.handle.description.drive, self.robot_pose
-        assert drive is not None
-        parameters = navigation_parameters(config, drive, self.footprint, self.frames)
-        period_ns = context.control_period_ns
-        TwistMuxNode(bus, namespace=namespace)
-        VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
-        global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
-        local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
-        PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
-        ControllerServerNode(
-            bus, pose, local_costmap, self.footprint, parameters.controller_server, namespace=namespace
-        )
-        BehaviorServerNode(
-            bus,
-            pose,
-            parameters.behaviors,
-            costmap=local_costmap,
-            period_ns=period_ns,
-            namespace=namespace,
-        )
-        sensors = self.handle.description.sensors
-        if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in sensors):
-            DockingServerNode(bus, pose, namespace=namespace)
-        self.navigator = BtNavigatorNode(bus, pose, namespace=namespace)
-
     def _build_arm(self, description: RobotDescription) -> None:
         bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware
         if self.manipulator is None:
@@ -182,15 +98,3 @@ class RobotStack:
             namespace=namespace,
         )
         ToteDetectorNode(bus, self.robot_pose, namespace=namespace)
-
-
-def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:
-    """Return the start as a person would click it: off by `error` in a direction drawn from the seed."""
-    draw = NoiseStream(seed, f"{name}/initial_pose").uniform(0, 2)
-    direction = 2.0 * math.pi * float(draw[0])
-    sign = 1.0 if draw[1] < 0.5 else -1.0
-    return Pose2(
-        start.x + error.xy * math.cos(direction),
-        start.y + error.xy * math.sin(direction),
-        start.yaw + sign * error.yaw,
-    )

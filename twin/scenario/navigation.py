@@ -1,98 +1,15 @@
-"""What a scenario may override of a robot's localisation and navigation; names are Nav2's.
+"""What a scenario may override of a robot's navigation; names are Nav2's.
 
 Every one is optional: `overrides()` holds only what the file gives, the rest keeps the node's default.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
-from pydantic import Field
-
-from twin.scenario.fields import Fraction, NameOrPath, NotNegative, Positive
+from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.parameter_group import ParameterGroup
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
-
-
-class ParameterGroup(StrictModel):
-    """Parameters of one node; a key that is absent keeps the node's default."""
-
-    def overrides(self) -> dict[str, Any]:
-        """Return only the parameters that the file gives, by name."""
-        return {name: getattr(self, name) for name in self.model_fields_set}
-
-
-class InitialPoseError(StrictModel):
-    """How wrong the first guess of the pose is."""
-
-    xy: Annotated[Metres, NotNegative] = 0.0
-    """Distance from the true start, in a direction drawn from the seed [m]."""
-    yaw: Annotated[Radians, NotNegative] = 0.0
-    """Size of the heading error, its sign drawn from the seed [rad]."""
-
-
-class AmclParameters(ParameterGroup):
-    """Parameters of `/amcl`."""
-
-    min_particles: Annotated[int, Positive] | None = None
-    """Fewest particles."""
-    max_particles: Annotated[int, Positive] | None = None
-    """Most particles."""
-    alpha1: Annotated[float, NotNegative] | None = None
-    """Rotation noise from rotation."""
-    alpha2: Annotated[float, NotNegative] | None = None
-    """Rotation noise from translation."""
-    alpha3: Annotated[float, NotNegative] | None = None
-    """Translation noise from translation."""
-    alpha4: Annotated[float, NotNegative] | None = None
-    """Translation noise from rotation."""
-    max_beams: Annotated[int, Positive] | None = None
-    """Beams of a scan that are compared with the map."""
-    sigma_hit: Annotated[Metres, Positive] | None = None
-    """Standard deviation of a hit [m]."""
-    z_hit: Annotated[float, Fraction] | None = None
-    """Weight of hits in the beam model."""
-    z_rand: Annotated[float, Fraction] | None = None
-    """Weight of random readings in the beam model."""
-    laser_likelihood_max_dist: Annotated[Metres, Positive] | None = None
-    """Distance beyond which a beam says nothing [m]."""
-    update_min_d: Annotated[Metres, NotNegative] | None = None
-    """Translation before the next update [m]."""
-    update_min_a: Annotated[Radians, NotNegative] | None = None
-    """Rotation before the next update [rad]."""
-
-
-class NoLocalisation(StrictModel):
-    """Nobody estimates the pose."""
-
-    type: Literal["none"]
-    """`none`"""
-
-
-class OdometryLocalisation(StrictModel):
-    """Dead reckoning from the start pose: `map` and `odom` are tied together."""
-
-    type: Literal["odometry"]
-    """`odometry`"""
-    initial_pose_error: InitialPoseError = InitialPoseError()
-    """How wrong the first guess is."""
-
-
-class AmclLocalisation(StrictModel):
-    """Monte Carlo localisation on a map (`/amcl`)."""
-
-    type: Literal["amcl"]
-    """`amcl`"""
-    map: NameOrPath | None = None
-    """Name of a shipped map, or path of a map_server YAML file; absent: the arena's own map."""
-    initial_pose_error: InitialPoseError = InitialPoseError()
-    """How wrong the first guess is."""
-    parameters: AmclParameters = AmclParameters()
-    """Overrides of the filter's parameters."""
-
-
-Localisation = Annotated[
-    NoLocalisation | OdometryLocalisation | AmclLocalisation, Field(discriminator="type")
-]
 
 
 class PlannerParameters(ParameterGroup):

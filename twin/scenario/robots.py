@@ -8,7 +8,8 @@ from typing import Literal
 from pydantic import model_validator
 
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName
-from twin.scenario.navigation import Localisation, NavigationConfig
+from twin.scenario.localisation import Localisation
+from twin.scenario.navigation import NavigationConfig
 from twin.strict_yaml import Fault, Faults, StrictModel
 
 

@@ -1,0 +1,1 @@
+"""Public benchmarks of navigation, run in the twin: `twin bench`."""

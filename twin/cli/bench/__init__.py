@@ -1,0 +1,1 @@
+"""`twin bench`: public navigation benchmarks, a module each."""

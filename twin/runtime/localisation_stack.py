@@ -1,0 +1,49 @@
+"""The nodes that tell a robot where it is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from twin.geometry import Pose2
+from twin.navigation.localisation.amcl import AmclConfig
+from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.static_localisation import StaticLocalisationNode
+from twin.runtime.navigation_config import overridden
+from twin.runtime.stack_context import StackContext
+from twin.sim.noise import NoiseStream
+
+
+def build_localisation(context: StackContext, pose: RobotPose) -> None:
+    """Create the nodes that the scenario's `localisation` asks for."""
+    config = context.config.localisation
+    if config is None or config.type == "none":
+        return
+    guess = _initial_guess(context.start, config.initial_pose_error, context.seed, context.handle.name)
+    if config.type == "odometry":
+        StaticLocalisationNode(context.bus, pose.frames, guess, namespace=context.namespace)
+        return
+    assert context.map is not None
+    MapServerNode(context.bus, context.map, namespace=context.namespace)
+    AmclNode(
+        context.bus,
+        pose,
+        overridden(AmclConfig(), config.parameters.overrides()),
+        InitialPose.from_error(guess, config.initial_pose_error.xy, config.initial_pose_error.yaw),
+        seed=context.seed,
+        namespace=context.namespace,
+    )
+
+
+def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:
+    """Return the start as a person would click it: off by `error` in a direction drawn from the seed."""
+    draw = NoiseStream(seed, f"{name}/initial_pose").uniform(0, 2)
+    direction = 2.0 * math.pi * float(draw[0])
+    sign = 1.0 if draw[1] < 0.5 else -1.0
+    return Pose2(
+        start.x + error.xy * math.cos(direction),
+        start.y + error.xy * math.sin(direction),
+        start.yaw + sign * error.yaw,
+    )

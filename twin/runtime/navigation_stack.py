@@ -1,0 +1,49 @@
+"""The nodes that drive a robot to a goal, in the order in which they run."""
+
+from __future__ import annotations
+
+from twin.geometry import Array
+from twin.models.specs import LidarSpec
+from twin.nodes.navigation.behavior_server import BehaviorServerNode
+from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.costmap import CostmapNode
+from twin.nodes.navigation.docking_server import DockingServerNode
+from twin.nodes.navigation.planner_server import PlannerServerNode
+from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.twist_mux import TwistMuxNode
+from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.runtime.navigation_config import navigation_parameters
+from twin.runtime.stack_context import StackContext
+from twin.scenario.navigation import NavigationConfig
+
+
+def build_navigation(
+    context: StackContext, config: NavigationConfig, pose: RobotPose, footprint: Array
+) -> BtNavigatorNode:
+    """Create the navigation nodes; return the navigator.
+
+    Args:
+        context: What the robot's nodes are built from.
+        config: What the scenario overrides.
+        pose: What the robot believes about its pose.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+    """
+    bus, namespace, description = context.bus, context.namespace, context.handle.description
+    assert description.drive is not None
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    period_ns = context.control_period_ns
+    TwistMuxNode(bus, namespace=namespace)
+    VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
+    global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
+    local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
+    PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
+    ControllerServerNode(
+        bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
+    )
+    BehaviorServerNode(
+        bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
+    )
+    if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
+        DockingServerNode(bus, pose, namespace=namespace)
+    return BtNavigatorNode(bus, pose, namespace=namespace)

@@ -1,0 +1,31 @@
+"""What the nodes of one robot are built from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twin.bridge.bus import Bus
+from twin.geometry import Pose2
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.scenario.robots import RobotConfig
+from twin.sim.robot import RobotHandle
+
+
+@dataclass(frozen=True, kw_only=True)
+class StackContext:
+    """What the stack of one robot is built from."""
+
+    bus: Bus
+    config: RobotConfig
+    handle: RobotHandle
+    start: Pose2
+    """Where the robot really starts; only its guess, off by the scenario's error, reaches localisation."""
+    map: OccupancyMap | None
+    seed: int
+    control_period_ns: int
+    spawn_height: float
+    """Of the root link when the robot stands on the floor [m]."""
+    track_ratio: float | None
+    """Effective over geometric track of a skid steer, as calibrated."""
+    namespace: str
+    """'' for a single robot, '/name' among several."""
