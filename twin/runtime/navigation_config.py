@@ -114,6 +114,7 @@ def _costmap(
         name=name,
         frame=frame,
         layers=overridden(layers, overrides),
+        range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )
 

@@ -50,12 +50,12 @@ class CostmapConfig:
     raytrace_max_range: float = 3.0
     """Rays clear up to here [m]."""
     inf_is_valid: bool = True
-    """Whether a reading of inf is "nothing there", and clears up to raytrace_max_range; Nav2's default is false."""
+    """Whether a reading of inf is "nothing there" and clears up to raytrace_max_range; Nav2's is false."""
     footprint_clearing_enabled: bool = True
     """Whether the cells under the robot are free."""
     keepout_before_inflation: bool = True
-    """Whether keep-out zones are inflated (Nav2: `keepout_filter` before `inflation_layer` in `plugins`), so that the
-    whole robot keeps out; if not (in `filters`), only its centre does."""
+    """Whether keep-out zones are inflated, so that the whole robot keeps out, not only its centre. In Nav2
+    `keepout_filter` is among the `plugins` then, before `inflation_layer`, and not among the `filters`."""
     range_sensor_layer: RangeSensorConfig = field(default_factory=RangeSensorConfig)
     keepout_filter: KeepoutConfig = field(default_factory=KeepoutConfig)
 

@@ -32,7 +32,7 @@ class KeepoutConfig:
     """Parameters of nav2_costmap_2d's KeepoutFilter."""
 
     override_lethal_cost: bool = False
-    """Whether a robot that stands in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
+    """Whether a robot in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
     lethal_override_cost: int = MAX_NON_OBSTACLE
 
 
@@ -134,7 +134,7 @@ def _sample(
     origin_y: float,
     resolution: float,
 ) -> None:
-    """Write the mask's value at the centre of each cell; (x, y, yaw) is the grid's frame in the mask's corner."""
+    """Write the mask's value at each cell's centre; (x, y, yaw) is the grid's frame in the mask's corner."""
     c, s = math.cos(yaw), math.sin(yaw)
     height, width = mask.shape
     for v in range(out.shape[0]):

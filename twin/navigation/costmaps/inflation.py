@@ -16,8 +16,8 @@ from twin.navigation.costmaps.window import Window
 class Inflation:
     """Writes a window of a costmap from its layers' costs.
 
-    The distance of a cell is the one between centres to the nearest lethal cell, as nav2's InflationLayer has it. It
-    is found column by column, then row by row: work that grows with the window, not with its obstacles.
+    The distance of a cell is that between its centre and the nearest lethal cell's, as nav2's InflationLayer
+    has it. It is found by columns, then by rows: work that grows with the window, not with its obstacles.
     """
 
     def __init__(

@@ -30,8 +30,8 @@ _SAME_FRAME = Pose2(0.0, 0.0, 0.0)
 class LayeredCostmap:
     """Layers, and the master grid that they make: static, obstacles, range sensors, keep-out, inflation.
 
-    What comes in only notes the window that it changed; `costmap` combines and inflates that window, once, when it is
-    asked for. So a scan costs what it changed, and a window that rolls twice between questions is inflated once.
+    What comes in only notes the window that it changed; `costmap` combines and inflates that window, once,
+    when it is asked for. So a scan costs what it changed, and a window that rolls twice is inflated once.
 
     Raises:
         MapError: the static map is turned (origin yaw), or the window is to roll over a static map.
@@ -119,7 +119,7 @@ class LayeredCostmap:
         Args:
             sensor: Pose in the costmap's frame; the cone opens along its x.
             distance: What was measured [m].
-            limits: The sensor's least and greatest range [m]; if equal, it tells only -inf (something) or inf.
+            limits: The sensor's least and greatest range [m]; if equal it tells only -inf (something) or inf.
             field_of_view: Full angle of the cone [rad].
         """
         if self._ranges is None:

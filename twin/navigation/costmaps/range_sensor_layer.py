@@ -25,7 +25,7 @@ class RangeSensorConfig:
     phi: float = 1.2
     """Distance at which a reading counts half [m]."""
     inflate_cone: float = 1.0
-    """How far, as a share of the cone, cells beside the cone are looked at; 1 looks at its whole bounding box."""
+    """How far beside the cone cells are looked at, as a share of it; 1: in its whole bounding box."""
     clear_threshold: float = 0.2
     """Cells less probable than this are free."""
     mark_threshold: float = 0.8
@@ -61,8 +61,8 @@ class RangeSensorLayer:
 
         Args:
             sensor: Pose in the costmap's frame; the cone opens along its x.
-            distance: What was measured [m]; of a sensor whose limits are equal, -inf is "something there" and inf
-                is "nothing there" (sensor_msgs/Range).
+            distance: What was measured [m]; of a sensor whose limits are equal, -inf is "something there" and
+                inf is "nothing there" (sensor_msgs/Range).
             limits: Least and greatest range [m]; readings outside are no readings.
             field_of_view: Full angle of the cone [rad].
             frame: Origin x, y and resolution of the grid [m].
@@ -90,7 +90,9 @@ class RangeSensorLayer:
             return NOTHING
         _update_cone(
             self.probabilities,
-            *(float(value) for value in sensor),
+            float(sensor.x),
+            float(sensor.y),
+            float(sensor.yaw),
             float(distance),
             half,
             self.config.phi,

@@ -27,7 +27,7 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
     Args:
         message: The scan.
         no_return: Where rays without return (inf, or beyond the sensor's range) end, so that they clear [m].
-        inf_is_valid: Whether they do; if not they are NaN as other invalid ones: below the least range, NaN, -inf.
+        inf_is_valid: Whether they do; if not they are NaN, as those below the least range are.
     """
     ranges = message.ranges.astype(np.float64)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))

@@ -1,4 +1,4 @@
-"""What a costmap hears of filter masks, as Nav2: an info topic that names the mask's topic, and the mask there."""
+"""What a costmap hears of filter masks, as Nav2: an info topic names the topic of the mask."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class MaskSubscription:
     def _on_info(self, info: Any) -> None:
         if info.type not in self._types:
             self._node.get_logger().error(
-                f"{self._name}: info of type {info.type} refused; valid is {' or '.join(map(str, self._types))}"
+                f"{self._name}: info of type {info.type} refused; valid: {', '.join(map(str, self._types))}"
             )
             return
         if self._subscription is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.bridge.conversions import pose_from_pose2
+from twin.bridge.msgs import Costmap as CostmapMessage
 from twin.bridge.msgs import (
     CostmapMetaData,
     OccupancyGrid,
@@ -17,7 +18,6 @@ from twin.bridge.msgs import (
     header,
     stamp,
 )
-from twin.bridge.msgs import Costmap as CostmapMessage
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
     INSCRIBED_INFLATED_OBSTACLE,

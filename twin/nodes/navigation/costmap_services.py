@@ -24,7 +24,7 @@ from twin.nodes.navigation.robot_pose import RobotPose
 
 
 class CostmapServices:
-    """`clear_entirely_`, `clear_around_`, `clear_around_pose_`, `clear_except_`, `get_cost_<name>`, `get_costmap`."""
+    """`clear_entirely_<name>`, `clear_around_`, `clear_around_pose_`, `clear_except_`, `get_cost_`."""
 
     def __init__(
         self, node: Node, name: str, frame: str, pose: RobotPose, layers: Callable[[], LayeredCostmap | None]
@@ -73,7 +73,7 @@ class CostmapServices:
             layers.clear_area(pose.x, pose.y, float(size), outside=outside)
 
     def _get_cost(self, request: Any) -> Any:
-        """Answer the cost at a point, or the worst under the footprint's outline; -1 outside of the costmap."""
+        """Answer the cost at a point, or the worst under the footprint's outline; -1 off the costmap."""
         layers = self._layers()
         cost = -1.0
         if layers is not None and layers.costmap.contains(request.x, request.y):
