@@ -42,6 +42,12 @@ class GoalOccupied(PlanningFailure):
     error_code = 206
 
 
+class PlanningTimeout(PlanningFailure):
+    """The search was given up."""
+
+    error_code = 207
+
+
 class NoValidPath(PlanningFailure):
     """Start and goal are free but not connected."""
 

@@ -1,8 +1,8 @@
 """The compiled loops of planning on a grid: A* and Theta*, exact, cost-weighted, never cutting a corner.
 
-Keys wait in a ring of buckets of equal width (Dial 1969; with real keys: delta-stepping, Meyer and Sanders 2003).
-Within a bucket the last one pushed comes first, which goes on where the search just was. A cell may so be expanded
-before the cheapest way to it is known; it is expanded again then, so the result is exact all the same.
+Keys wait in a ring of buckets of equal width (Dial 1969; real keys: delta-stepping, Meyer and Sanders 2003).
+Within a bucket the last one pushed comes first, which goes on where the search just was. A cell may so be
+expanded before the cheapest way to it is known; then it is expanded again, so the result is exact.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _EPSILON = 1e-10
 
 @jit
 def line_cost(costs: Cells, prices: Array, width: int, first: int, last: int, limit: float) -> float:
-    """Return the cost [cells] of the straight line between two cells' centres; inf if blocked or over `limit`.
+    """Return the cost [cells] of the straight line between two cells; inf if blocked or over `limit`.
 
-    The line pays for the length inside of each cell (Amanatides and Woo 1987, in whole numbers). Where it goes through
-    a corner, both cells beside it must be passable, as for a diagonal step.
+    The line joins the centres and pays for its length inside of each cell (Amanatides and Woo 1987, in whole
+    numbers). Where it goes through a corner, both cells beside it must be passable, as for a diagonal step.
 
     Args:
         costs: Of the grid, shape (h * w,).
@@ -102,6 +102,7 @@ def search(
     start: int,
     goal: int,
     any_angle: bool,
+    slack: float,
     generation: int,
     g: Array,
     mark: Ints,
@@ -109,21 +110,22 @@ def search(
 ) -> int:
     """Search from `start` until the cheapest way to `goal` is known, or nothing is left.
 
-    A step is as long as the distance of the two centres [cells] times the mean of their prices, all >= 1, so the
-    distance never overestimates. A diagonal step needs both cells beside it to be passable. With `any_angle` a
-    cell's way may come straight from the parent of the cell beside it, where that is no dearer than the step: Theta*
-    (Nash, Daniel, Koenig, Felner 2007). As cells are expanded again when a cheaper way to them is found, such a path
-    is never dearer than the one of A*.
+    A step costs the distance of the two centres [cells] times the mean of their prices, all >= 1, so
+    distance never overestimates. A diagonal step needs both cells beside it to be passable. With `any_angle`
+    the way to a cell may come straight from the parent of the cell beside it, where that is no dearer than
+    the step: Theta* (Nash, Daniel, Koenig, Felner 2007). As cells are expanded again when a cheaper way to
+    them is found, such a path is never dearer than the one of A*.
 
     Args:
         costs: Of the grid, shape (h * w,).
-        prices: Shape (2, 256): of a metre in a cell of each cost, inf where the robot cannot be. Row 0 is for cells
-            entered from passable ones, row 1 for those entered from cells that row 0 forbids: the way out of an
-            inscribed zone.
+        prices: Shape (2, 256): of a metre in a cell of each cost, inf where the robot cannot be. Row 0 is for
+            cells entered from passable ones, row 1 for those entered from cells that row 0 forbids: the way
+            out of an inscribed zone.
         width: Of the grid [cells].
         start: Flat index of the first cell.
         goal: Flat index of the last cell.
         any_angle: Theta* instead of A*.
+        slack: 0, or at least 1: search in all directions (Dijkstra) as far as this many times the goal's cost.
         generation: More than in every search before on the same scratch.
         g: Scratch, shape (h * w,): cost to come.
         mark: Scratch, shape (h * w,): the generation in which a cell was reached.
@@ -154,7 +156,8 @@ def search(
     side, steps = np.empty(4), np.empty(8, np.int64)
     for k in range(8):
         steps[k] = _DX[k] + _DY[k] * width
-    lowest = distance(abs(start % width - goal_x), abs(start // width - goal_y), any_angle)
+    aim = 0.0 if slack > 0.0 else 1.0
+    lowest = aim * distance(abs(start % width - goal_x), abs(start // width - goal_y), any_angle)
     following[0] = -1
     entry_cell[0], entry_g[0], heads[0] = start, 0.0, 0
     g[start], mark[start], parent[start] = 0.0, generation, start
@@ -171,11 +174,12 @@ def search(
         unused = entry
         waiting -= 1
         cell, here = entry_cell[entry], entry_g[entry]
-        if here != g[cell] or cell == goal:
+        if here != g[cell] or (cell == goal and slack == 0.0):
             continue  # a cheaper way to the cell was found since
         x, y = cell % width, cell // width
-        if best < math.inf and here + distance(abs(x - goal_x), abs(y - goal_y), any_angle) >= best:
-            continue
+        if best < math.inf:
+            if here + aim * distance(abs(x - goal_x), abs(y - goal_y), any_angle) >= best:
+                continue
         expanded += 1
         row = 1 if prices[0, costs[cell]] == math.inf else 0
         price = prices[row, costs[cell]]
@@ -209,13 +213,15 @@ def search(
                         cost, before = g[above] + straight, above
             if cost >= known - _EPSILON:
                 continue
-            key = cost + distance(abs(x + _DX[k] - goal_x), abs(y + _DY[k] - goal_y), any_angle)
+            nx, ny = abs(x + _DX[k] - goal_x), abs(y + _DY[k] - goal_y)
+            key = cost + aim * distance(nx, ny, any_angle)
             if key >= best:
                 continue
             g[near], mark[near], parent[near] = cost, generation, before
             if near == goal:
-                best = cost - _EPSILON
-                continue
+                best = max(slack, 1.0) * cost - _EPSILON
+                if slack == 0.0:
+                    continue
             if unused == capacity:
                 more_following = np.empty(2 * capacity, np.int32)
                 more_cell, more_g = np.empty(2 * capacity, np.int32), np.empty(2 * capacity, np.float64)

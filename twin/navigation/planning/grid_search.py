@@ -24,7 +24,7 @@ class GridSearch:
         self.expanded = 0
         """Cells that the last search expanded."""
 
-    def run(self, costs: Cells, prices: Array, start: int, goal: int, *, any_angle: bool = False) -> bool:
+    def run(self, costs: Cells, prices: Array, start: int, goal: int, *, any_angle: bool = False, slack: float = 0.0) -> bool:
         """Search; return whether there is a way. Cells are flat indices, row by row.
 
         Args:
@@ -33,6 +33,7 @@ class GridSearch:
             start: First cell; it must be passable.
             goal: Last cell.
             any_angle: Theta* instead of A*.
+            slack: If not 0, go on in all directions up to so many times the cost of the goal.
         """
         if costs.shape != self._shape or self._generation == _LAST_GENERATION:
             self._reserve(costs.shape)
@@ -45,6 +46,7 @@ class GridSearch:
             start,
             goal,
             any_angle,
+            slack,
             self._generation,
             self._g,
             self._mark,
@@ -56,12 +58,17 @@ class GridSearch:
         """Return which cells the last search reached; all that can be, if it did not reach its goal."""
         return self._mark[cells] == self._generation
 
+    @property
+    def field(self) -> tuple[Array, Ints, int]:
+        """Costs to come [cells], shape (h * w,), and marks of those that hold: equal to the number."""
+        return self._g, self._mark, self._generation
+
     def cost(self, cell: int) -> float:
         """Return the cost [cells] of the way to a cell that the last search reached."""
         return float(self._g[cell])
 
     def path(self, cell: int) -> Ints:
-        """Return the way to a cell that the last search reached: cells (A*) or its corners (Theta*), shape (n,)."""
+        """Return the way to a cell that was reached: its cells (A*) or corners (Theta*), shape (n,)."""
         return trace(self._parent, self._start, cell)
 
     def _reserve(self, shape: tuple[int, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Global planning on a grid: the cheapest path over a costmap, 8-connected (A*) or of straight lines (Theta*)."""
+"""Global planning on a grid: the cheapest path, 8-connected (A*) or of straight lines (Theta*)."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class ThetaStarConfig:
 
 @dataclass(kw_only=True)
 class Planner:
-    """A* (Hart, Nilsson, Raphael 1968) or Theta* (Nash et al. 2007) by its config; never cuts a blocked corner."""
+    """A* (Hart, Nilsson, Raphael 1968) or Theta* (Nash et al. 2007) by its config; never cuts a corner."""
 
     config: PlannerConfig | ThetaStarConfig
     _search: GridSearch = field(default_factory=GridSearch, init=False, repr=False, compare=False)
@@ -88,8 +88,8 @@ class Planner:
         """Return the cheapest path, shape (n, 3): x, y [m], yaw [rad] along the path.
 
         The first row is the start's position, the last the goal itself with its yaw, or the nearest reachable
-        cell within the tolerance. Rows between are cell centres, or with Theta* points of straight lines between
-        such, at most a cell apart.
+        cell within the tolerance. Rows between are cell centres, or with Theta* points of straight lines
+        between such, at most a cell apart.
 
         Raises:
             StartOutsideMap: the start is off the costmap.
@@ -124,7 +124,7 @@ class Planner:
         return with_headings(path, goal.yaw if last == _flat(costmap, goal) else None)
 
     def _prices(self) -> Array:
-        """Return the price of a metre by cost, shape (2, 256): as entered from outside, from the inscribed zone."""
+        """Return the price of a metre by cost, shape (2, 256), as `grid_kernel.search` takes it."""
         config = self.config
         price = np.empty((2, 256))
         price[:] = config.price(np.arange(256) / MAX_NON_OBSTACLE)
