@@ -57,7 +57,7 @@ def grid(
         for result in planned:
             stdout().print(_map_table(result))
         if nano_astar() is None:
-            stderr().print(_NO_PEER, style="yellow")
+            stderr().print(_NO_PEER, style="yellow", markup=False)
     raise typer.Exit(0 if passed else 1)
 
 
@@ -69,7 +69,7 @@ def _problems_table(results: list[GridResult]) -> Table:
     table = Table(title="MovingAI", title_justify="left", box=None)
     table.caption = f"ms per plan; over nano_astar's at most {MAX_RATIO:g}"
     table.caption_justify = "left"
-    table.add_column("")
+    table.add_column("", no_wrap=True, min_width=4)
     table.add_column("map", no_wrap=True)
     for name in ("size", "optimal", "error", "ms", "nano_astar", "ratio"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -77,7 +77,7 @@ def _problems_table(results: list[GridResult]) -> Table:
         table.add_row(
             _mark(result.passed),
             result.name,
-            f"{result.shape[1]} x {result.shape[0]}",
+            f"{result.shape[1]}x{result.shape[0]}",
             f"{result.optimal}/{result.problems}",
             f"{result.worst_error:.0e}",
             f"{result.ms:.4f}",

@@ -1,4 +1,4 @@
-"""Shortest curves of bounded curvature between two poses: Dubins (1957), forwards, and Reeds and Shepp (1990).
+"""Shortest curves of bounded curvature: Dubins (1957), forwards only, and Reeds and Shepp (1990).
 
 A word is up to five pieces, each an arc to the left (1), straight (0) or an arc to the right (-1); a negative
 length is driven backwards. Lengths are in turning radii, so an arc's is its angle. Formula numbers are those
@@ -67,7 +67,9 @@ def _dubins(kind: int, x: float, y: float, phi: float) -> tuple[bool, float, flo
         return True, t, radius, _forward(phi - t)
     if radius > 4.0 + _ZERO:
         return False, 0.0, 0.0, 0.0
-    back = 2.0 * math.asin(min(1.0, 0.25 * radius))  # left, right, left: round the far side of the middle circle
+    back = 2.0 * math.asin(
+        min(1.0, 0.25 * radius)
+    )  # left, right, left: round the far side of the middle circle
     t = _forward(theta - 0.5 * back + math.pi)
     return True, t, 2.0 * math.pi - back, _forward(phi - t - back)
 
@@ -136,9 +138,7 @@ def _total(kind: int, t: float, u: float, v: float) -> float:
 
 
 @jit
-def _spell(
-    kind: int, t: float, u: float, v: float, backwards: bool, turns: Turns, lengths: Array
-) -> int:
+def _spell(kind: int, t: float, u: float, v: float, backwards: bool, turns: Turns, lengths: Array) -> int:
     """Write the pieces of a word, left first; return how many. `backwards` is the order of the pieces."""
     count = 3
     if kind == 0:
@@ -214,7 +214,9 @@ def shortest_curve(
 
 
 @jit
-def advance(x: float, y: float, yaw: float, turn: int, length: float, radius: float) -> tuple[float, float, float]:
+def advance(
+    x: float, y: float, yaw: float, turn: int, length: float, radius: float
+) -> tuple[float, float, float]:
     """Return the pose after one piece of `length` [radii], negative backwards, at a turning radius [m]."""
     if turn == 0:
         return x + radius * length * math.cos(yaw), y + radius * length * math.sin(yaw), yaw

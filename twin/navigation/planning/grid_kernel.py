@@ -125,7 +125,7 @@ def search(
         start: Flat index of the first cell.
         goal: Flat index of the last cell.
         any_angle: Theta* instead of A*.
-        slack: 0, or at least 1: search in all directions (Dijkstra) as far as this many times the goal's cost.
+        slack: 0, or at least 1: search in all directions (Dijkstra) up to so many times the goal's cost.
         generation: More than in every search before on the same scratch.
         g: Scratch, shape (h * w,): cost to come.
         mark: Scratch, shape (h * w,): the generation in which a cell was reached.
@@ -177,9 +177,9 @@ def search(
         if here != g[cell] or (cell == goal and slack == 0.0):
             continue  # a cheaper way to the cell was found since
         x, y = cell % width, cell // width
-        if best < math.inf:
-            if here + aim * distance(abs(x - goal_x), abs(y - goal_y), any_angle) >= best:
-                continue
+        ahead = aim * distance(abs(x - goal_x), abs(y - goal_y), any_angle) if best < math.inf else 0.0
+        if here + ahead >= best:
+            continue
         expanded += 1
         row = 1 if prices[0, costs[cell]] == math.inf else 0
         price = prices[row, costs[cell]]

@@ -24,7 +24,16 @@ class GridSearch:
         self.expanded = 0
         """Cells that the last search expanded."""
 
-    def run(self, costs: Cells, prices: Array, start: int, goal: int, *, any_angle: bool = False, slack: float = 0.0) -> bool:
+    def run(
+        self,
+        costs: Cells,
+        prices: Array,
+        start: int,
+        goal: int,
+        *,
+        any_angle: bool = False,
+        slack: float = 0.0,
+    ) -> bool:
         """Search; return whether there is a way. Cells are flat indices, row by row.
 
         Args:

@@ -165,10 +165,10 @@ class HybridPlanner:
         r = math.ceil(tolerance / costmap.resolution)
         column, row = costmap.world_to_cell(goal.x, goal.y)
         offsets = np.stack(np.meshgrid(np.arange(-r, r + 1), np.arange(-r, r + 1)), axis=-1).reshape(-1, 2)
-        centres = costmap.cell_to_world(offsets + (column, row))
+        centres = costmap.cell_to_world(offsets + np.array([column, row]))
         away = np.hypot(*(centres - (goal.x, goal.y)).T)
         for i in np.argsort(away, kind="stable"):
-            near = Pose2(*map(float, centres[i]), goal.yaw)
+            near = Pose2(float(centres[i, 0]), float(centres[i, 1]), goal.yaw)
             if away[i] <= tolerance and self._is_free(frame, frame.pose(near)):
                 return near
         message = f"the robot fits nowhere within {tolerance:g} m of the goal"
@@ -275,11 +275,11 @@ def _aheads(most: int) -> list[int]:
 
 def _driven(first: Array, pieces: list[tuple[int, float]], radius: float) -> Array:
     """Return the poses along pieces, shape (n, 3), at most a cell apart."""
-    poses, here = [tuple(map(float, first))], tuple(map(float, first))
+    poses = [(float(first[0]), float(first[1]), float(first[2]))]
     for turn, length in pieces:
         count = max(1, math.ceil(abs(length) * radius))
-        poses += [advance(*here, turn, length * i / count, radius) for i in range(1, count + 1)]
-        here = poses[-1]
+        x, y, yaw = poses[-1]
+        poses += [advance(x, y, yaw, turn, length * i / count, radius) for i in range(1, count + 1)]
     if len(poses) == 1:
         poses.append(poses[0])
     return np.array(poses)

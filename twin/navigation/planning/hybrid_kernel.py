@@ -1,8 +1,9 @@
-"""The compiled loops of Hybrid-A* (Dolgov, Thrun, Montemerlo, Diebel 2008): poses, arcs, a curve to the goal."""
+"""The compiled loops of Hybrid-A* (Dolgov et al. 2008): poses, arcs, and a curve to the goal."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,8 +182,8 @@ def expand(
         most: Poses to expand at most.
 
     Returns:
-        An outcome, the last node, and per node its pose (n, 3), its cost, the one before and its move: turn + 1,
-        plus 3 backwards; 6 for the curve to the goal.
+        An outcome, the last node, and per node its pose (n, 3), its cost, the one before and its move: turn
+        + 1, plus 3 backwards; 6 for the curve to the goal.
     """
     height, width = costs.shape
     capacity = 1024
@@ -275,7 +276,17 @@ def expand(
                 if known >= 0 and closed[known]:
                     continue
                 cost = piece_cost(
-                    costs, corners, x, y, yaw, turn, way * arc, radius, clear_below, allow_unknown, penalties[0]
+                    costs,
+                    corners,
+                    x,
+                    y,
+                    yaw,
+                    turn,
+                    way * arc,
+                    radius,
+                    clear_below,
+                    allow_unknown,
+                    penalties[0],
                 )
                 if cost == math.inf:
                     continue
@@ -333,7 +344,7 @@ def expand(
 
 
 @jit
-def _longer(values: Array, size: int) -> Array:
+def _longer(values: Any, size: int) -> Any:
     more = np.empty(size, values.dtype)
     more[: values.shape[0]] = values
     return more
