@@ -26,12 +26,11 @@ from twin.navigation.failures import NoValidControl
 
 _EXACT = 2
 """The first rollouts have no noise: one keeps the controls as they are, one brakes."""
-_WINDOW = 9
-"""Of the Savitzky-Golay filter."""
 _FILTERS = {
-    1: np.ones(9) / 9.0,
-    2: np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231.0,
+    1: np.full(9, 1.0 / 9.0, dtype=np.float32),
+    2: (np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231.0).astype(np.float32),
 }
+"""Savitzky-Golay, by order."""
 _NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
 
 
@@ -68,8 +67,13 @@ class MPPI:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
         self.configure(self.config)
 
+    @property
+    def max_speed(self) -> float:
+        """vx_max [m/s]."""
+        return self.config.vx_max
+
     def configure(self, config: MPPIConfig) -> None:
-        """Go on with other parameters, from rest."""
+        """Go on with other parameters, from rest; lifts the speed limit."""
         self.config = config
         self._noise = NoiseBank(config)
         self._limit: float | None = None
@@ -79,6 +83,7 @@ class MPPI:
         self._raw = np.zeros((kernels.CRITIC_COUNT, batch), dtype=np.float32)
         self._hit = np.zeros(batch, dtype=np.uint8)
         self._total = np.zeros(batch, dtype=np.float32)
+        self._leads = np.zeros((steps, 3))
         self._delays = np.array(
             [round(config.model_delay_vx / config.model_dt), round(config.model_delay_wz / config.model_dt)]
         )
@@ -103,6 +108,13 @@ class MPPI:
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than `limit` [m/s]; None lifts the limit. As in Nav2, turning is slowed as much."""
         self._limit = limit
+
+    def set_goal_tolerance(self, xy: float) -> None:
+        """Ignore it: the critics of the goal draw to its middle."""
+
+    def cancel(self) -> bool:
+        """Return True: there is nothing to bring to an end."""
+        return True
 
     def compute_velocity(
         self,
@@ -131,7 +143,7 @@ class MPPI:
             raise NoValidControl(f"all {self.config.batch_size} rollouts of MPPI collide")
         command = float(self._mean[0, 0]), float(self._mean[1, 0])
         self._remember(command)
-        self.trajectory = self._in_path_frame(self._simulate(scene), pose, costmap_pose or pose, scene)
+        self.trajectory = self._in_path_frame(self._leads, pose, costmap_pose or pose, scene)
         self._shift(dt)
         return command
 
@@ -161,7 +173,7 @@ class MPPI:
         to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw)
         turn = wrap_angle(at.yaw - pose.yaw)
         points = to_grid.apply(pose.inverse().apply(local.poses[:, :2]))
-        path = np.vstack([points.T, local.poses[:, 2] + turn]).astype(np.float32)
+        path = np.array([points[:, 0], points[:, 1], local.poses[:, 2] + turn], dtype=np.float32)
         step = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
         v, w = self._expected(velocity, dt)
         return _Scene(
@@ -206,9 +218,8 @@ class MPPI:
             self._score(scene)
             before = self._mean.copy()
             config = self.config
-            gains = np.array([config.gamma / config.vx_std**2, config.gamma / config.wz_std**2], np.float32)
             best = kernels.average(
-                noise, self._mean, self._total, gains, np.float32(config.temperature), _EXACT
+                noise, self._mean, self._total, self._noise.gains, np.float32(config.temperature), _EXACT
             )
             self._smooth()
             self._constrain(scene, dt)
@@ -309,10 +320,7 @@ class MPPI:
 
     def _angle(self, scene: _Scene, furthest: int) -> bool:
         critic = self.config.PathAngleCritic
-        if (
-            not self.config.scores("PathAngleCritic")
-            or scene.local.length < critic.threshold_to_consider
-        ):
+        if not self.config.scores("PathAngleCritic") or scene.local.length < critic.threshold_to_consider:
             return False
         at = min(furthest + critic.offset_from_furthest, len(scene.along) - 1)
         x, y, path_yaw = (float(value) for value in scene.path[:, at])
@@ -338,47 +346,19 @@ class MPPI:
         if self.config.time_steps <= 20:
             return
         past = np.array(self._sent, dtype=np.float32).T
-        padded = np.concatenate([past, self._mean, np.repeat(self._mean[:, -1:], _WINDOW // 2, axis=1)], axis=1)
-        kernel = _FILTERS[self.config.sgf_order]
-        for axis in range(2):
-            self._mean[axis] = np.convolve(padded[axis], kernel, mode="valid")
+        kernels.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: _Scene, dt: float) -> None:
-        """Keep the controls within the limits of speed and acceleration, from the present speed on."""
-        vx_max, vx_min, wz_max, ax_max, ax_min, az_max, radius = self._limits.tolist()
-        v, w = scene.start[3:].tolist()
-        period = dt
-        controls = self._mean.T.tolist()
-        for control in controls:
-            up, down = (ax_max, -ax_min) if v >= 0.0 else (-ax_min, ax_max)
-            v = min(max(min(max(control[0], vx_min), vx_max), v - down * period), v + up * period)
-            w = min(max(min(max(control[1], -wz_max), wz_max), w - az_max * period), w + az_max * period)
-            if radius > 0.0:
-                w = min(max(w, -abs(v) / radius), abs(v) / radius)
-            control[0], control[1] = v, w
-            period = self.config.model_dt
-        self._mean = np.array(controls, dtype=np.float32).T.copy()
-
-    def _simulate(self, scene: _Scene) -> F32:
-        """Return where the controls lead, shape (time_steps, 3), in metres from the costmap's corner."""
-        dt = self.config.model_dt
-        x, y, yaw = scene.start[:3].tolist()
-        v, w = np.array(self._mean, dtype=np.float64)
-        for axis, speed in enumerate((v, w)):
-            delay = int(self._delays[axis])
-            if delay:
-                speed[:] = np.concatenate([self._under_way[axis, -delay:], speed[:-delay]])
-        turned = np.cumsum(w * dt)
-        middle = yaw + turned - 0.5 * w * dt
-        columns = [x + np.cumsum(v * dt * np.cos(middle)), y + np.cumsum(v * dt * np.sin(middle)), yaw + turned]
-        return np.column_stack(columns).astype(np.float32)
+        model_dt = np.float32(self.config.model_dt)
+        kernels.constrain(self._mean, scene.start, self._limits, np.float32(dt), model_dt)
+        kernels.simulate(self._mean, self._under_way, self._delays, scene.start, model_dt, self._leads)
 
     def _collides(self, scene: _Scene) -> bool:
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
         check = np.array([1, *scene.cover.costs])
         return bool(
             kernels.first_collision(
-                self._simulate(scene),
+                self._leads,
                 scene.costmap.costs,
                 np.float32(1.0 / scene.costmap.resolution),
                 check,
@@ -401,8 +381,8 @@ class MPPI:
         at = np.minimum(steps + dt / self.config.model_dt, steps[-1])
         self._mean = np.stack([np.interp(at, steps, axis) for axis in self._mean]).astype(np.float32)
 
-    def _in_path_frame(self, trajectory: F32, pose: Pose2, at: Pose2, scene: _Scene) -> Array:
-        points = np.array(trajectory, dtype=np.float64)
+    def _in_path_frame(self, trajectory: Array, pose: Pose2, at: Pose2, scene: _Scene) -> Array:
+        points = trajectory.copy()
         points[:, :2] = pose.apply(at.inverse().apply(points[:, :2] + scene.costmap.origin))
         points[:, 2] += pose.yaw - at.yaw
         return points

@@ -1,8 +1,8 @@
 """The compiled loops of MPPI: rollouts with what is scored on the way, scores along the path, the average.
 
-Arrays are time-major, shape (time_steps, batch_size), single precision: the inner loops run over the batch, and
-the compiler does eight rollouts at once. Headings are kept as (cos, sin) and turned by the Taylor series of
-the small angle of one step: no sine is called. Positions are in metres from the costmap's lower-left corner.
+Arrays are time-major, shape (time_steps, batch_size), single precision: the inner loops run over the batch,
+and the compiler does eight rollouts at once. Headings are kept as (cos, sin) and turned by the Taylor series
+of the small angle of one step: no sine is called. Positions are in metres from the costmap's corner.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from twin.navigation._jit import fast_jit
 
 F32 = NDArray[np.float32]
 
-CONSTRAINT, COST, OBSTACLES, GOAL, GOAL_ANGLE, ALIGN, FOLLOW, ANGLE, FORWARD, TWIRLING, DEADBAND, SPEED = range(12)
+CONSTRAINT, COST, OBSTACLES, GOAL, GOAL_ANGLE, ALIGN, FOLLOW, ANGLE, FORWARD, TWIRLING, DEADBAND, SPEED = (
+    range(12)
+)
 """Rows of the critics' raw scores."""
 CRITIC_COUNT = 12
 
@@ -31,8 +33,8 @@ def outline_hits(
     """Whether a point of the outline, in cells of the base frame, is lethal at a pose in cells."""
     height, width = costs.shape
     for i in range(outline.shape[0]):
-        ix = int(math.floor(x + c * outline[i, 0] - s * outline[i, 1]))
-        iy = int(math.floor(y + s * outline[i, 0] + c * outline[i, 1]))
+        ix = math.floor(x + c * outline[i, 0] - s * outline[i, 1])
+        iy = math.floor(y + s * outline[i, 0] + c * outline[i, 1])
         if 0 <= ix < width and 0 <= iy < height and costs[iy, ix] == 254:
             return True
     return False
@@ -61,8 +63,8 @@ def collides(
     height, width = costs.shape
     near = False
     for i in range(circles.shape[0]):
-        ix = int(math.floor(x + c * circles[i, 0] - s * circles[i, 1]))
-        iy = int(math.floor(y + s * circles[i, 0] + c * circles[i, 1]))
+        ix = math.floor(x + c * circles[i, 0] - s * circles[i, 1])
+        iy = math.floor(y + s * circles[i, 0] + c * circles[i, 1])
         if 0 <= ix < width and 0 <= iy < height and circle_cost <= costs[iy, ix] < 255:
             near = True
             break
@@ -351,7 +353,7 @@ def average(noise: F32, mean: F32, total: F32, gains: F32, temperature: np.float
 
 @fast_jit
 def first_collision(
-    trajectory: F32,
+    trajectory: NDArray[np.float64],
     costs: NDArray[np.uint8],
     per_metre: np.float32,
     check: NDArray[np.int64],
@@ -371,3 +373,66 @@ def first_collision(
             if collides(costs, cost, circles, check[2], outline, x, y, c, s):
                 return t
     return -1
+
+
+@fast_jit
+def smooth(mean: F32, past: F32, weights: F32) -> None:
+    """Filter the controls, shape (2, time_steps), by an odd number of weights; `past` goes before them."""
+    steps, side = mean.shape[1], weights.shape[0] // 2
+    padded = np.empty(steps + 2 * side, dtype=np.float32)
+    for axis in range(2):
+        padded[:side] = past[axis, past.shape[1] - side :]
+        padded[side : side + steps] = mean[axis]
+        padded[side + steps :] = mean[axis, steps - 1]
+        for t in range(steps):
+            total = np.float32(0.0)
+            for i in range(weights.shape[0]):
+                total += weights[i] * padded[t + i]
+            mean[axis, t] = total
+
+
+@fast_jit
+def constrain(mean: F32, start: F32, limits: F32, first_dt: np.float32, dt: np.float32) -> None:
+    """Keep the controls within the limits of speed and acceleration, from the present speed on.
+
+    Args:
+        mean: Shape (2, time_steps), changed.
+        start: x, y, yaw, v, w.
+        limits: As `roll_out` has them.
+        first_dt: Time until the first control holds: the controller's period [s].
+        dt: Between the others [s].
+    """
+    v, w, period = start[3], start[4], first_dt
+    for t in range(mean.shape[1]):
+        up = limits[3] if v >= 0.0 else -limits[4]
+        down = -limits[4] if v >= 0.0 else limits[3]
+        target = min(max(mean[0, t], limits[1]), limits[0])
+        v = min(max(target, v - down * period), v + up * period)
+        target = min(max(mean[1, t], -limits[2]), limits[2])
+        w = min(max(target, w - limits[5] * period), w + limits[5] * period)
+        if limits[6] > 0.0:
+            w = min(max(w, -abs(v) / limits[6]), abs(v) / limits[6])
+        mean[0, t], mean[1, t] = v, w
+        period = dt
+
+
+@fast_jit
+def simulate(
+    mean: F32,
+    history: F32,
+    delays: NDArray[np.int64],
+    start: F32,
+    dt: np.float32,
+    trajectory: NDArray[np.float64],
+) -> None:
+    """Write where the controls lead, shape (time_steps, 3); the arguments are those of `roll_out`."""
+    x, y, yaw = float(start[0]), float(start[1]), float(start[2])
+    kept = history.shape[1]
+    for t in range(mean.shape[1]):
+        tv, tw = t - delays[0], t - delays[1]
+        v = mean[0, tv] if tv >= 0 else history[0, kept + tv]
+        w = mean[1, tw] if tw >= 0 else history[1, kept + tw]
+        x += v * dt * math.cos(yaw + 0.5 * w * dt)
+        y += v * dt * math.sin(yaw + 0.5 * w * dt)
+        yaw += w * dt
+        trajectory[t, 0], trajectory[t, 1], trajectory[t, 2] = x, y, yaw

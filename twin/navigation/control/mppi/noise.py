@@ -28,6 +28,10 @@ class NoiseBank:
         keep = math.exp(-config.model_dt / config.noise_time_constant) if config.noise_time_constant else 0.0
         for t in range(1, config.time_steps):
             drawn[:, :, t] = keep * drawn[:, :, t - 1] + math.sqrt(1.0 - keep * keep) * drawn[:, :, t]
+        # The price is u' S^-1 e: slow noise has by this factor less weight in S^-1 than white noise.
+        price = config.gamma * (1.0 - keep) / (1.0 + keep)
+        self.gains: F32 = np.array([price / config.vx_std**2, price / config.wz_std**2], dtype=np.float32)
+        """What `average` charges for the noise of vx and wz."""
         drawn[:, 0] *= config.vx_std
         drawn[:, 1] *= config.wz_std
         mirrored = drawn * np.array([1.0, -1.0], dtype=np.float32)[None, :, None, None]
