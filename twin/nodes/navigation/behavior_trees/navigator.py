@@ -102,9 +102,9 @@ class Navigator:
         """Return the lowest error code on the blackboard with its message; (0, '') if there is none."""
         found = []
         for prefix in self.setup.error_code_name_prefixes:
-            code = self.blackboard.get(f"{prefix}_error_code", 0)
+            code = int(self.blackboard.get(f"{prefix}_error_code", 0))
             if code:
-                found.append((int(code), str(self.blackboard.get(f"{prefix}_error_msg", ""))))
+                found.append((code, str(self.blackboard.get(f"{prefix}_error_msg", ""))))
         return min(found, default=(0, ""))
 
     def _load(self, name: str) -> Tree:
