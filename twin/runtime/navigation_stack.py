@@ -13,6 +13,7 @@ from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.scenario.navigation import NavigationConfig
@@ -46,4 +47,6 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    return BtNavigatorNode(bus, pose, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, namespace=namespace)
+    WaypointFollowerNode(bus, namespace=namespace)
+    return navigator
