@@ -14,6 +14,7 @@ from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
@@ -59,4 +60,6 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    return BtNavigatorNode(bus, pose, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, namespace=namespace)
+    WaypointFollowerNode(bus, namespace=namespace)
+    return navigator
