@@ -24,7 +24,8 @@ from twin.bridge.srvs import Empty
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.errors import MapError
 from twin.geometry import Array, Pose2, Pose3
-from twin.navigation.localisation.amcl import Amcl, AmclConfig, Estimate
+from twin.navigation.localisation.amcl import Amcl, Estimate
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.navigation.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
