@@ -63,7 +63,8 @@ class Amcl:
         self.config = config
         self._map = occupancy
         self._surfaces = SurfaceDistance(occupancy, max_dist=config.laser_likelihood_max_dist)
-        self._hits = HitCalibration(occupancy.resolution, config.sigma_hit)
+        self.hits = HitCalibration(occupancy.resolution, config.sigma_hit)
+        """What was learnt about this map and lidar."""
         self._model = laser_model(config, self._surfaces)
         self._free = np.argwhere(occupancy.data == FREE)[:, ::-1]
         if not len(self._free):
@@ -100,7 +101,7 @@ class Amcl:
 
         Args:
             odom: Pose of the base in the odom frame when the scan was taken.
-            ranges: Shape (n,) [m]; what is not finite or out of range saw nothing.
+            ranges: Shape (n,) [m]; +inf saw nothing, nan and -inf tell nothing; empty: odometry alone.
             angles: Shape (n,), of the beams in the lidar frame [rad].
             T_base_lidar: Pose of the lidar in the base frame.
             force: Update without motion (nav2's request_nomotion_update).
@@ -128,6 +129,10 @@ class Amcl:
         if self._updates % config.resample_interval == 0:
             self._resample(beams, self.estimate.lost)
         return self.estimate
+
+    def rebase(self, odom: Pose2) -> None:
+        """Take odometry as continuing from `odom` without motion: it jumped."""
+        self._odom = odom
 
     def _restart(self, particles: Array) -> None:
         self.particles = particles
@@ -160,13 +165,13 @@ class Amcl:
         config = self.config
         converged = is_converged(self.particles)
         if config.do_beamskip and config.laser_model_type == "likelihood_field_prob" and converged:
-            beams = without_strangers(beams, self.particles, self._surfaces, self._hits, config)
+            beams = without_strangers(beams, self.particles, self._surfaces, self.hits, config)
         # What was learnt about hits holds near the truth; far from it a wide model leads there.
-        sigma = self._hits.sigma if converged else config.sigma_hit
+        sigma = self.hits.sigma if converged else config.sigma_hit
         self.particles, self.weights = self._fitted(self.particles, self.weights, beams, sigma)
 
     def _fitted(self, particles: Array, weights: Array, beams: Beams, sigma: float) -> tuple[Array, Array]:
-        config, depth = self.config, self._hits.depth
+        config, depth = self.config, self.hits.depth
         return annealed(
             particles,
             weights,
@@ -183,9 +188,12 @@ class Amcl:
         fit = math.nan
         if len(beams):
             distances = self._surfaces.at(pose.apply(beams.ends))
-            fit = float(np.mean(np.exp(-0.5 * ((distances + self._hits.depth) / _FIT_SIGMA) ** 2)))
+            fit = float(np.mean(np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)))
             self._confidence.update(fit)
-            self._hits.learn(distances)
+            self.hits.learn(distances)
+        elif self.estimate is not None:
+            # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.
+            pose = self.estimate.T_map_odom @ odom
         if self._confidence.lost:
             _, covariance = mean_and_covariance(self.particles, self.weights)
         return Estimate(
