@@ -92,6 +92,7 @@ MarkerArray = ros.visualization_msgs__msg__MarkerArray
 
 CollisionMonitorState: Any = types.get("nav2_msgs/msg/CollisionMonitorState")
 Costmap: Any = types.get("nav2_msgs/msg/Costmap")
+CostmapFilterInfo: Any = types.get("nav2_msgs/msg/CostmapFilterInfo")
 CostmapMetaData: Any = types.get("nav2_msgs/msg/CostmapMetaData")
 CostmapUpdate: Any = types.get("nav2_msgs/msg/CostmapUpdate")
 BehaviorTreeLog: Any = types.get("nav2_msgs/msg/BehaviorTreeLog")
@@ -143,6 +144,7 @@ __all__ = [
     "ColorRGBA",
     "CompressedImage",
     "Costmap",
+    "CostmapFilterInfo",
     "CostmapMetaData",
     "CostmapUpdate",
     "DiagnosticArray",

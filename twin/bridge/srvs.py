@@ -6,10 +6,13 @@ from twin.bridge.types import ServiceType
 
 AddTwoInts = ServiceType("example_interfaces/srv/AddTwoInts")
 CancelGoal = ServiceType("action_msgs/srv/CancelGoal")
+ClearCostmapAroundPose = ServiceType("nav2_msgs/srv/ClearCostmapAroundPose")
 ClearCostmapAroundRobot = ServiceType("nav2_msgs/srv/ClearCostmapAroundRobot")
+ClearCostmapExceptRegion = ServiceType("nav2_msgs/srv/ClearCostmapExceptRegion")
 ClearEntireCostmap = ServiceType("nav2_msgs/srv/ClearEntireCostmap")
 DescribeParameters = ServiceType("rcl_interfaces/srv/DescribeParameters")
 Empty = ServiceType("std_srvs/srv/Empty")
+GetCost = ServiceType("nav2_msgs/srv/GetCost")
 GetCostmap = ServiceType("nav2_msgs/srv/GetCostmap")
 GetMap = ServiceType("nav_msgs/srv/GetMap")
 GetParameterTypes = ServiceType("rcl_interfaces/srv/GetParameterTypes")

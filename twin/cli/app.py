@@ -10,6 +10,7 @@ import typer
 
 from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
+from twin.cli.map import app as map_app
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
@@ -65,6 +66,8 @@ for _name, _function, _panel, _example in _COMMANDS:
 
 for _name, _group in _GROUPS:
     app.add_typer(_group, name=_name, rich_help_panel=_GRAPH)
+
+app.add_typer(map_app, name="map", rich_help_panel="Navigation")
 
 
 @app.callback()

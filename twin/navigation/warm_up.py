@@ -6,6 +6,7 @@ import numpy as np
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
+from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
@@ -22,7 +23,9 @@ def warm_up() -> None:
     data[0] = data[-1] = 100
     room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
     layered = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room)
-    layered.update([[0.5, 1.0]], (1.0, 1.0))
+    layered.update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
+    layered.update_range(Pose2(1.0, 1.0, 0.0), 0.3, (0.1, 0.5), 0.2)
+    layered.set_keepout(KeepoutFilter(mask=room))
     costmap = layered.costmap
     start, goal = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
     SimpleSmoother().smooth(Planner(config=PlannerConfig()).plan(costmap, start, goal), costmap)

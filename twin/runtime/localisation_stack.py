@@ -8,6 +8,7 @@ from typing import Any
 from twin.geometry import Pose2
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.static_localisation import StaticLocalisationNode
@@ -27,6 +28,7 @@ def build_localisation(context: StackContext, pose: RobotPose) -> None:
         return
     assert context.map is not None
     MapServerNode(context.bus, context.map, namespace=context.namespace)
+    MapSaverNode(context.bus, namespace=context.namespace)
     AmclNode(
         context.bus,
         pose,

@@ -57,6 +57,7 @@ def navigation_parameters(
     angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
     layers = CostmapConfig(
         footprint=polygon,
+        footprint_padding=0.0,  # it is in the footprint already
         inflation_radius=0.8,
         cost_scaling_factor=4.0,
         obstacle_max_range=4.0,
@@ -113,6 +114,7 @@ def _costmap(
         name=name,
         frame=frame,
         layers=overridden(layers, overrides),
+        range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )
 

@@ -15,6 +15,7 @@ from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
+from twin.runtime.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
 
 
@@ -35,8 +36,11 @@ def build_navigation(
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
-    global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
-    local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
+    build_zones(bus, config, pose.frames.map, namespace=namespace)
+    in_map = with_filters(parameters.global_costmap, config, speed=False)
+    global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
+    around = with_filters(parameters.local_costmap, config, speed=True)
+    local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
     PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
     ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
 
@@ -53,16 +53,34 @@ class CostmapParameters(ParameterGroup):
 
     resolution: Annotated[Metres, Positive] | None = None
     """Cell size [m]."""
+    width: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along x [m]."""
+    height: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along y [m]."""
+    footprint_padding: Annotated[Metres, NotNegative] | None = None
+    """Added to the footprint on every side [m]; the robot's own has 0.01 m already."""
     inflation_radius: Annotated[Metres, NotNegative] | None = None
     """Distance from obstacles within which cells cost [m]."""
     cost_scaling_factor: Annotated[float, Positive] | None = None
     """Decay of that cost [1/m]."""
     update_frequency: Annotated[Hertz, Positive] | None = None
     """Rate of updates [Hz]."""
+    obstacle_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    raytrace_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam clears cells [m]."""
+    inf_is_valid: bool | None = None
+    """Whether a beam without return (inf) clears cells."""
+    footprint_clearing_enabled: bool | None = None
+    """Whether the cells under the robot are free."""
+    keepout_before_inflation: bool | None = None
+    """Whether keep-out zones are inflated, so that no part of the robot enters them."""
+    range_topics: tuple[str, ...] | None = None
+    """Topics of sensor_msgs/Range for the range sensor layer."""
 
 
 class NavigationConfig(StrictModel):
@@ -72,6 +90,10 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [m/s]; absent: the robot's own."""
     max_angular_speed: Annotated[RadiansPerSecond, Positive] | None = None
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
+    keepout_mask: NameOrPath | None = None
+    """Mask of the zones that no path may cross: a YAML file of map_server."""
+    speed_mask: NameOrPath | None = None
+    """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()

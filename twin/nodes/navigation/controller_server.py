@@ -12,7 +12,7 @@ from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import Odometry, Point, PointStamped, Twist, header, new
+from twin.bridge.msgs import Odometry, Point, PointStamped, SpeedLimit, Twist, header, new
 from twin.geometry import Array, Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig, SimpleGoalChecker
 from twin.navigation.control.progress_checker import ProgressCheckerConfig, SimpleProgressChecker
@@ -63,13 +63,25 @@ class ControllerServerNode:
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = self.node.create_publisher(PointStamped, "lookahead_point", 1)
         self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        self._speed_limit: Any = None
+        self.node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 10)
         ActionServer(self.node, FollowPath, "follow_path", self._execute)
 
     def _reconfigure(self, config: ControllerServerConfig) -> None:
         """Go on with other parameters: the checkers from the next goal on, the rest at once."""
         self.config = config
         self._controller.config = config.controller
-        self._controller.set_speed_limit(None)
+        self._on_speed_limit(self._speed_limit)
+
+    def _on_speed_limit(self, message: Any) -> None:
+        """Drive no faster than a zone allows; 0 is no limit, a percentage is one of the cruise speed."""
+        self._speed_limit = message
+        limit = message.speed_limit if message is not None else 0.0
+        if not limit > 0.0:
+            self._controller.set_speed_limit(None)
+            return
+        top = self.config.controller.desired_linear_vel
+        self._controller.set_speed_limit(top * min(limit, 100.0) / 100.0 if message.percentage else limit)
 
     def _on_odom(self, message: Odometry) -> None:
         self._velocity = (message.twist.twist.linear.x, message.twist.twist.angular.z)
