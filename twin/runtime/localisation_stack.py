@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from twin.geometry import Pose2
-from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
