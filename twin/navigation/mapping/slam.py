@@ -360,7 +360,7 @@ class Slam:
         match = _better(match, reference.best_match(scan, guess, wide, EXPANDED * prior, least, SECTORS))
         if match is not None and match.score >= LOST:
             return match
-        # Odometry has slipped, or what is seen is new. A corridor looks alike both ways: only a clear match counts.
+        # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
         wide = replace(window, half_angle=math.pi)
         other = reference.best_match(scan, guess, wide, SLIPPED * prior, least, 4 * SECTORS)
         return other if other is not None and other.score >= DOUBTFUL else match
