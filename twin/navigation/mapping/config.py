@@ -26,7 +26,7 @@ class SlamConfig:
     """A scan is taken after driving so far [m] ..."""
     minimum_travel_heading: float = 0.5
     """... or turning so far [rad]."""
-    scan_buffer_size: int = 10
+    scan_buffer_size: int = 20
     """A scan is matched with so many before it ..."""
     scan_buffer_maximum_scan_distance: float = 10.0
     """... that were taken no farther away than this [m]."""
@@ -36,7 +36,7 @@ class SlamConfig:
     """Width of the window around odometry's guess that is searched for a match [m]."""
     correlation_search_space_resolution: float = 0.05
     """Step of that search; the alignment of points with lines follows [m]."""
-    correlation_search_space_smear_deviation: float = 0.1
+    correlation_search_space_smear_deviation: float = 0.07
     """Standard deviation with which points are smeared [m]."""
     coarse_search_angle_offset: float = 0.4
     """Half the window searched in heading [rad]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,10 @@ REFRESH = 10
 """Covariances are computed anew after so many scans."""
 
 
+SPREAD = 0.2
+"""Scans that are apart by less than this [m, rad] see the same."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Candidate:
     edge: Edge
@@ -44,6 +48,7 @@ class LoopCloser:
         self.steps: list[Array] = [np.zeros((3, 3))]
         """Covariance of each node in the frame of the one before, shape (3, 3)."""
         self._marginals: Marginals | None = None
+        self._searched = 0
         self._waiting: list[_Candidate] = []
 
     def forget(self) -> None:
@@ -52,6 +57,9 @@ class LoopCloser:
 
     def search(self, graph: PoseGraph, scans: Sequence[Scan], node: int) -> list[Edge]:
         """Return the edges that close loops at `node`, which is the last one; often none."""
+        if not apart(graph.poses[node], graph.poses[self._searched]):
+            return []
+        self._searched = node
         self._waiting = [waiting for waiting in self._waiting if waiting.edge.second > node - REMEMBERED]
         found = []
         for place in self._places(graph, node):
@@ -67,7 +75,7 @@ class LoopCloser:
     def _places(self, graph: PoseGraph, node: int) -> list[int]:
         """Return the nearest node of each stretch of the path that passes near, nearest first."""
         config = self.config
-        old = max(node - config.scan_buffer_size, 0)
+        old = spread(graph.poses, range(node, -1, -1), config.scan_buffer_size)[-1]
         if old < config.loop_match_minimum_chain_size:
             return []
         distances = np.hypot(*(graph.poses[:old, :2] - graph.poses[node, :2]).T)
@@ -78,8 +86,8 @@ class LoopCloser:
             if len(chain) < config.loop_match_minimum_chain_size:
                 continue
             nearest = int(chain[np.argmin(distances[chain])])
-            spread = self._spread(graph, nearest, node)
-            if distances[nearest] < config.loop_search_maximum_distance + 2.0 * spread[0]:
+            position, _ = self._spread(graph, nearest, node)
+            if distances[nearest] < config.loop_search_maximum_distance + 2.0 * position:
                 places.append(nearest)
         return sorted(places, key=lambda place: float(distances[place]))[:MOST_PLACES]
 
@@ -132,13 +140,15 @@ class LoopCloser:
         return _Candidate(edge=_edge(place, node, here, match), sure=position < SURE)
 
     def _members(self, graph: PoseGraph, place: int, node: int) -> list[int]:
-        half = self.config.scan_buffer_size // 2
-        last = max(node - self.config.scan_buffer_size, place + 1)
-        members = range(max(place - half, 0), min(place + half + 1, last))
-        positions = graph.poses[list(members), :2]
-        near = (
-            np.hypot(*(positions - graph.poses[place, :2]).T) < self.config.scan_buffer_maximum_scan_distance
-        )
+        """Return nodes before and after a place, spread over the path, without those just before `node`."""
+        config = self.config
+        half = config.scan_buffer_size // 4 + 1
+        last = spread(graph.poses, range(node, -1, -1), config.scan_buffer_size)[-1]
+        before = spread(graph.poses, range(place, -1, -1), half)
+        after = spread(graph.poses, range(place, max(last, place + 1)), half)
+        members = [*before[::-1], *after[1:]]
+        away = np.hypot(*(graph.poses[members, :2] - graph.poses[place, :2]).T)
+        near = (away < config.scan_buffer_maximum_scan_distance).tolist()
         return [member for member, is_near in zip(members, near, strict=True) if is_near]
 
     def _agreed(self, graph: PoseGraph) -> list[Edge]:
@@ -161,6 +171,29 @@ class LoopCloser:
         around = (old @ latest.pose).inverse() @ (other.pose @ new)
         span = abs(new.x) + abs(new.y) + abs(old.x) + abs(old.y)
         return math.hypot(around.x, around.y) < 0.15 + 0.02 * span and abs(around.yaw) < 0.06
+
+
+def spread(poses: Array, nodes: Iterable[int], most: int) -> list[int]:
+    """Return up to `most` of `nodes`, the first and those that have moved from the one chosen before.
+
+    Args:
+        poses: Of all nodes, shape (n, 3).
+        nodes: In their order along the path, or against it.
+        most: At most so many.
+    """
+    chosen: list[int] = []
+    for node in nodes:
+        if not chosen or apart(poses[node], poses[chosen[-1]]):
+            chosen.append(node)
+            if len(chosen) == most:
+                break
+    return chosen
+
+
+def apart(first: Array, second: Array) -> bool:
+    """Return whether two poses, shape (3,), differ enough to see something else."""
+    turn = math.remainder(first[2] - second[2], 2.0 * math.pi)
+    return math.hypot(first[0] - second[0], first[1] - second[1]) > SPREAD or abs(turn) > SPREAD
 
 
 def _edge(place: int, node: int, here: Pose2, match: Match) -> Edge:

@@ -15,7 +15,7 @@ from twin.errors import MapError
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
 from twin.navigation.mapping.correlation import Window
-from twin.navigation.mapping.loop_closing import LoopCloser
+from twin.navigation.mapping.loop_closing import LoopCloser, spread
 from twin.navigation.mapping.matcher import Match, Reference, levels_for
 from twin.navigation.mapping.pose_graph import Edge, PoseGraph
 from twin.navigation.mapping.scan import Scan
@@ -308,11 +308,12 @@ class Slam:
         )
 
     def _recent(self, guess: Pose2) -> list[int]:
-        """Return the nodes just before."""
+        """Return the nodes just before, spread over the path."""
         config = self.config
-        recent = np.arange(max(len(self._graph) - config.scan_buffer_size, 0), len(self._graph))
-        away = np.hypot(*(self._graph.poses[recent, :2] - guess[:2]).T)
-        return recent[away < config.scan_buffer_maximum_scan_distance].tolist()
+        nodes = spread(self._graph.poses, range(len(self._graph) - 1, -1, -1), config.scan_buffer_size)
+        away = np.hypot(*(self._graph.poses[nodes, :2] - guess[:2]).T)
+        near = zip(nodes, (away < config.scan_buffer_maximum_scan_distance).tolist(), strict=True)
+        return [node for node, is_near in near if is_near]
 
     def _near(self, guess: Pose2, most: int | None = None) -> list[int]:
         """Return the nodes that most likely have seen what is seen at `guess`: near, looking the same way."""
