@@ -68,9 +68,7 @@ class _Log:
             self.scans.append((sample.time_ns, sample.message.ranges))
 
 
-def track(
-    distance: float, seed: int, progress: Callable[[float, float], None] | None = None
-) -> Tracking:
+def track(distance: float, seed: int, progress: Callable[[float, float], None] | None = None) -> Tracking:
     """Drive `distance` [m] and score.
 
     Args:
