@@ -19,7 +19,11 @@ from twin.nodes.explore_mission import ExploreMissionNode
 from twin.nodes.mission_nodes import ActionSequenceNode, ActionStep, VelocityProfileNode
 from twin.nodes.navigation.explorer import ExplorerNode, ExplorerNodeConfig
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+<<<<<<< HEAD
 from twin.runtime.navigation_config import overridden
+=======
+from twin.nodes.random_goals import RandomGoalsConfig, RandomGoalsNode
+>>>>>>> main
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.missions import (
     Behaviors,
@@ -29,6 +33,7 @@ from twin.scenario.missions import (
     Mission,
     PickAndPlace,
     R2D2StatePublisher,
+    RandomGoals,
     VelocityProfile,
 )
 from twin.warehouse.arena import Arena
@@ -71,6 +76,7 @@ def build_mission(
     stacks: Mapping[str, RobotStack],
     arena: Arena | None,
     namespaces: Mapping[str, str],
+    seed: int,
 ) -> MissionHandle:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
@@ -82,6 +88,14 @@ def build_mission(
         case Behaviors():
             steps = [_behavior(step, stack) for step in mission.steps]
             return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
+        case RandomGoals():
+            goals = RandomGoalsConfig(
+                distance=mission.distance,
+                clearance=mission.clearance,
+                min_goal_distance=mission.min_goal_distance,
+                max_failed=mission.max_failed,
+            )
+            return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():
             profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
             return VelocityProfileNode(bus, profile * mission.repeat, namespace=namespace)
@@ -138,8 +152,9 @@ def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
 
 def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
     overrides = mission.overrides()
-    inner, outer = footprints.radii(stack.footprint)
-    frontiers = overridden(FrontierConfig(robot_radius=inner, turning_radius=outer), overrides)
+    # Where the robot may have to turn, it needs its circumscribed radius.
+    radius = footprints.radii(stack.footprint)[1]
+    frontiers = overridden(FrontierConfig(robot_radius=radius), overrides)
     explorer = overridden(ExplorerConfig(frontiers=frontiers), overrides)
     config = ExplorerNodeConfig(return_to_init=mission.return_to_init, explorer=explorer)
     node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)

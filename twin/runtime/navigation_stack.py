@@ -33,9 +33,7 @@ def build_navigation(
     assert description.drive is not None
     localisation = context.config.localisation
     mapping = localisation is not None and localisation.type == "slam"
-    parameters = navigation_parameters(
-        config, description.drive, footprint, pose.frames, mapping=mapping
-    )
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)

@@ -15,8 +15,6 @@ from twin.navigation.exploration.wavefront import travel_distances, way_back
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 
 _EIGHT = np.ones((3, 3), dtype=np.int8)
-_LOOK_BACK = 1.0
-"""A place to turn is looked for along so much of the way [m]."""
 _FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
@@ -27,10 +25,7 @@ class FrontierConfig:
     min_frontier_size: float = 0.5
     """Shorter ones are left alone [m]."""
     robot_radius: float = 0.3
-    """The robot's centre keeps this distance from obstacles: its inscribed radius [m]."""
-    turning_radius: float = 0.3
-    """Where the robot stops and looks it needs this much room, if there is such a place: its circumscribed
-    radius [m]."""
+    """The robot's centre keeps this distance from obstacles: its circumscribed radius, so that it can turn [m]."""
     lethal_threshold: int = 65
     """Occupancy from which a cell of the map is an obstacle."""
 
@@ -97,30 +92,18 @@ class FrontierMap:
         """In the order of their cells in the map: from its lower left."""
 
     def view_of(self, frontier: Frontier, standoff: float) -> Pose2:
-        """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it.
-
-        If the robot cannot turn there, from the last place before it where it can, else from the roomiest one.
-        """
-        cell = self._grid.resolution
-        way = way_back(self._distance, *frontier.gate, (2.0 * standoff + _LOOK_BACK) / cell)
-        travelled = (self._distance[frontier.gate] - self._distance[way[:, 0], way[:, 1]]) * cell
-        beyond = np.flatnonzero(travelled >= standoff - 1e-9)
-        room = self._clearance[way[beyond, 0], way[beyond, 1]]
-        roomy = np.flatnonzero(room >= self._config.turning_radius)
-        if beyond.size:
-            row, column = way[beyond[roomy[0] if roomy.size else int(np.argmax(room))]]
-        else:
-            row, column = way[-1]
+        """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it."""
+        row, column = way_back(self._distance, *frontier.gate, standoff / self._grid.resolution)
         x, y = self._grid.cell_to_world((column, row))
         yaw = math.atan2(frontier.target[1] - y, frontier.target[0] - x)
         return Pose2(float(x), float(y), yaw)
 
     def _passable(self, unknown: NDArray[np.bool_]) -> NDArray[np.bool_]:
         lethal = self._grid.data >= self._config.lethal_threshold
-        self._clearance: Array = np.full(unknown.shape, np.inf)
+        self._near_obstacles = np.zeros(unknown.shape, dtype=np.bool_)
         if lethal.any():
-            self._clearance = ndimage.distance_transform_edt(~lethal) * self._grid.resolution
-        self._near_obstacles = self._clearance <= self._config.robot_radius
+            clearance = ndimage.distance_transform_edt(~lethal) * self._grid.resolution
+            self._near_obstacles = clearance <= self._config.robot_radius
         passable: NDArray[np.bool_] = ~unknown & ~self._near_obstacles
         return passable
 

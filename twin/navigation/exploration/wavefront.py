@@ -56,14 +56,11 @@ def travel_distances(passable: NDArray[np.bool_], row: int, column: int, distanc
 
 
 @jit
-def way_back(distance: Array, row: int, column: int, length: float) -> NDArray[np.int64]:
-    """Return the last `length` [cells] of the shortest way to a cell, from it back: rows, columns, shape (n, 2)."""
+def way_back(distance: Array, row: int, column: int, length: float) -> tuple[int, int]:
+    """Return the cell `length` [cells] before (row, column) on the shortest way to it; the start at most."""
     height, width = distance.shape
     target = max(distance[row, column] - length, 0.0)
-    cells = np.empty((int(2.0 * length) + 2, 2), np.int64)
-    cells[0] = row, column
-    count = 1
-    while distance[row, column] > target and count < len(cells):
+    while distance[row, column] > target:
         best_y, best_x = row, column
         for v in range(max(0, row - 1), min(height, row + 2)):
             for u in range(max(0, column - 1), min(width, column + 2)):
@@ -72,6 +69,4 @@ def way_back(distance: Array, row: int, column: int, length: float) -> NDArray[n
         if best_y == row and best_x == column:
             break
         row, column = best_y, best_x
-        cells[count] = row, column
-        count += 1
-    return cells[:count]
+    return row, column

@@ -69,7 +69,9 @@ class SlamServices:
 
     def _on_pause(self, _request: Any) -> Any:
         self._owner.paused = not self._owner.paused
-        self._owner.node.get_logger().info("scans are left unread" if self._owner.paused else "scans are read")
+        self._owner.node.get_logger().info(
+            "scans are left unread" if self._owner.paused else "scans are read"
+        )
         return new(PauseSlam.Response, status=True)
 
     def _on_reset(self, request: Any) -> Any:

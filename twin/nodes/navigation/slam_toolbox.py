@@ -93,10 +93,9 @@ class SlamToolboxNode:
 
     def reset(self) -> None:
         """Forget everything; the robot is where it believes to be."""
-        here = self.robot_pose.in_map()
+        T_map_odom = self.slam.T_map_odom
         self.slam = Slam(self.config.slam)
-        if here is not None:
-            self.start_at(here)
+        self.slam.T_map_odom = T_map_odom
 
     def load(self, path: Path, mode: Mode, pose: Pose2 | None) -> None:
         """Take a pose graph in place of the present one.
@@ -109,13 +108,7 @@ class SlamToolboxNode:
         Raises:
             MapError: It cannot be read.
         """
-        self.slam = Slam.load(path, self.config.slam, mode=mode)
-        self.start_at(self.slam.graph_pose(0) if pose is None else pose)
-
-    def start_at(self, pose: Pose2) -> None:
-        """Take that the robot is at a pose in the map frame."""
-        odom = self.robot_pose.in_odom() or Pose2(0.0, 0.0, 0.0)
-        self.slam.T_map_odom = pose @ odom.inverse()
+        self.slam = Slam.load(path, mode=mode, start=pose, config=self.config.slam)
 
     def fresh_map(self) -> OccupancyMap | None:
         """Return the map with every scan so far; None before the first one."""
@@ -128,7 +121,7 @@ class SlamToolboxNode:
             self.load(Path(config.map_file_name), config.mode, start)
             return self.slam
         slam = Slam(config.slam)
-        slam.T_map_odom = start
+        slam.T_map_odom = start  # odometry begins at zero
         return slam
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -138,7 +131,7 @@ class SlamToolboxNode:
         elif self.slam.mode == "mapping":
             self.node.get_logger().error("initialpose refused: a robot that maps knows where it is")
         else:
-            self.start_at(guess)
+            self.slam.start_at(guess)
             self.node.get_logger().info(f"initial pose ({guess.x:.2f}, {guess.y:.2f}, {guess.yaw:.2f})")
 
     def _on_scan(self, message: LaserScan) -> None:

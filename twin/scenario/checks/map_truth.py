@@ -94,9 +94,9 @@ def _outline(solid: Rectangle) -> tuple[Array, Array]:
     """Return points along a rectangle's edge and the outward normals there, both of shape (n, 2)."""
     x, y = solid.size_x / 2.0, solid.size_y / 2.0
     along = np.arange(_CELL / 2.0 - x, x, _CELL), np.arange(_CELL / 2.0 - y, y, _CELL)
-    sides = [
-        (np.column_stack([along[0], np.full(len(along[0]), s * y)]), (0.0, s)) for s in (-1.0, 1.0)
-    ] + [(np.column_stack([np.full(len(along[1]), s * x), along[1]]), (s, 0.0)) for s in (-1.0, 1.0)]
+    sides = [(np.column_stack([along[0], np.full(len(along[0]), s * y)]), (0.0, s)) for s in (-1.0, 1.0)] + [
+        (np.column_stack([np.full(len(along[1]), s * x), along[1]]), (s, 0.0)) for s in (-1.0, 1.0)
+    ]
     points = np.concatenate([side for side, _ in sides])
     normals = np.concatenate([np.broadcast_to(normal, side.shape) for side, normal in sides])
     turned = solid.centre.apply(normals) - solid.centre.apply([[0.0, 0.0]])
