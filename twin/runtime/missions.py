@@ -12,18 +12,15 @@ from twin.bridge.msgs import Point, duration, new
 from twin.errors import ScenarioError
 from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps import footprint as footprints
-from twin.nodes.messages import pose_stamped
 from twin.navigation.exploration.explorer import ExplorerConfig
 from twin.navigation.exploration.frontiers import FrontierConfig
 from twin.nodes.explore_mission import ExploreMissionNode
+from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import ActionSequenceNode, ActionStep, VelocityProfileNode
 from twin.nodes.navigation.explorer import ExplorerNode, ExplorerNodeConfig
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
-<<<<<<< HEAD
-from twin.runtime.navigation_config import overridden
-=======
 from twin.nodes.random_goals import RandomGoalsConfig, RandomGoalsNode
->>>>>>> main
+from twin.runtime.navigation_config import overridden
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.missions import (
     Behaviors,
