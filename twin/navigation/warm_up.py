@@ -9,6 +9,7 @@ import numpy as np
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, PlannerConfig
@@ -28,5 +29,6 @@ def warm_up() -> None:
     SimpleSmoother().smooth(Planner(config=PlannerConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
+    Explorer().update(room, start, 0.0)
     field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
     field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))

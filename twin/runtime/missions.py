@@ -149,9 +149,8 @@ def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
 
 def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
     overrides = mission.overrides()
-    # Where the robot may have to turn, it needs its circumscribed radius.
-    radius = footprints.radii(stack.footprint)[1]
-    frontiers = overridden(FrontierConfig(robot_radius=radius), overrides)
+    inner, outer = footprints.radii(stack.footprint)
+    frontiers = overridden(FrontierConfig(robot_radius=outer, inscribed_radius=inner), overrides)
     explorer = overridden(ExplorerConfig(frontiers=frontiers), overrides)
     config = ExplorerNodeConfig(return_to_init=mission.return_to_init, explorer=explorer)
     node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)

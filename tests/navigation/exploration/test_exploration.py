@@ -13,7 +13,7 @@ from twin.navigation.exploration.frontiers import FrontierConfig, FrontierMap
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 CELL = 0.1
-CONFIG = FrontierConfig(min_frontier_size=0.5, robot_radius=0.25)
+CONFIG = FrontierConfig(min_frontier_size=0.5, robot_radius=0.25, inscribed_radius=0.25)
 
 
 def grid(data: np.ndarray) -> OccupancyMap:

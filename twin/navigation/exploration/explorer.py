@@ -43,9 +43,9 @@ class Goal:
 class Explorer:
     """Keeps one goal until its frontier is known, reached or given up; then the cheapest other one follows.
 
-    Differs from explore_lite (github.com/hrnr/m-explore) where that hinders: goals lie before a frontier on known
-    ground instead of at its centroid, ways are measured along the ground, and a goal is not dropped for
-    another one while its frontier is there.
+    Differs from explore_lite (github.com/hrnr/m-explore) where that hinders: goals lie before a frontier on
+    known ground instead of at its centroid, ways are measured along the ground, and a goal is not dropped
+    for another one while its frontier is there.
     """
 
     def __init__(self, config: ExplorerConfig | None = None) -> None:

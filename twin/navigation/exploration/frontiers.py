@@ -25,7 +25,11 @@ class FrontierConfig:
     min_frontier_size: float = 0.5
     """Shorter ones are left alone [m]."""
     robot_radius: float = 0.3
-    """The robot's centre keeps this distance from obstacles: its circumscribed radius, so that it can turn [m]."""
+    """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn [m]."""
+    inscribed_radius: float = 0.3
+    """Unknown cells this near to obstacles are none that matter [m]."""
+    view_distance: float = 2.0
+    """A frontier in a passage too narrow to turn in is looked at from outside, so far away at most [m]."""
     lethal_threshold: int = 65
     """Occupancy from which a cell of the map is an obstacle."""
 
@@ -80,32 +84,38 @@ class FrontierMap:
         self._grid = grid
         self._config = config
         unknown = grid.data == UNKNOWN
-        passable = self._passable(unknown)
+        clearance = self._clearance()
+        roomy = ~unknown & (clearance > config.robot_radius)
         self._distance = np.full(grid.data.shape, np.inf)
-        start = self._start(passable, position)
+        start = self._start(roomy, position)
         if start is not None:
-            travel_distances(passable, *start, self._distance)
+            self._distance[start] = 0.0
+            travel_distances(roomy, self._distance)
         self.reachable: NDArray[np.bool_] = np.isfinite(self._distance)
         """Cells that the robot's centre can get to on known ground, shape (h, w)."""
-        wanted = unknown & ~self._near_obstacles & ~self._near(leave_out, around)
+        passages = clearance > config.inscribed_radius
+        travel_distances(~unknown & passages, self._distance)
+        wanted = unknown & passages & ~self._near(leave_out, around)
         self.frontiers: tuple[Frontier, ...] = tuple(self._find(wanted))
         """In the order of their cells in the map: from its lower left."""
 
     def view_of(self, frontier: Frontier, standoff: float) -> Pose2:
         """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it."""
-        row, column = way_back(self._distance, *frontier.gate, standoff / self._grid.resolution)
+        row, column = self._stand(frontier.gate, standoff)
         x, y = self._grid.cell_to_world((column, row))
         yaw = math.atan2(frontier.target[1] - y, frontier.target[0] - x)
         return Pose2(float(x), float(y), yaw)
 
-    def _passable(self, unknown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _stand(self, gate: tuple[int, int], standoff: float) -> tuple[int, int]:
+        return way_back(self._distance, self.reachable, *gate, standoff / self._grid.resolution)
+
+    def _clearance(self) -> Array:
+        """Return the distance of each cell to the nearest obstacle, shape (h, w) [m]."""
         lethal = self._grid.data >= self._config.lethal_threshold
-        self._near_obstacles = np.zeros(unknown.shape, dtype=np.bool_)
-        if lethal.any():
-            clearance = ndimage.distance_transform_edt(~lethal) * self._grid.resolution
-            self._near_obstacles = clearance <= self._config.robot_radius
-        passable: NDArray[np.bool_] = ~unknown & ~self._near_obstacles
-        return passable
+        if not lethal.any():
+            return np.full(lethal.shape, np.inf)
+        distance: Array = ndimage.distance_transform_edt(~lethal) * self._grid.resolution
+        return distance
 
     def _near(self, points: Sequence[tuple[float, float]], radius: float) -> NDArray[np.bool_]:
         """Return the cells within `radius` [m] of any of the points."""
@@ -142,13 +152,17 @@ class FrontierMap:
             first = int(np.argmin(nearest[rows, columns]))
             row, column = int(rows[first]), int(columns[first])
             v, u = _FOUR[int(np.argmin(beside[:, row, column]))]
+            gate = row + v, column + u
+            aside = float(nearest[row, column] - self._distance[self._stand(gate, 0.0)])
+            if aside * self._grid.resolution > self._config.view_distance:
+                continue
             found.append(
                 Frontier(
                     points=points,
                     size=size,
                     distance=float(nearest[row, column]) * self._grid.resolution,
                     target=(float(points[first, 0]), float(points[first, 1])),
-                    gate=(row + v, column + u),
+                    gate=gate,
                 )
             )
         return found

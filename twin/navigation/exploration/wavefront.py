@@ -12,26 +12,27 @@ from twin.navigation._jit import jit
 
 
 @jit
-def travel_distances(passable: NDArray[np.bool_], row: int, column: int, distance: Array) -> None:
-    """Write the length of the shortest 8-connected way from a cell to every passable one [cells].
+def travel_distances(passable: NDArray[np.bool_], distance: Array) -> None:
+    """Write the length of the shortest 8-connected way to every passable cell [cells].
 
     A diagonal step needs both cells beside it to be passable. Cells are corrected until nothing gets shorter;
     they wait in the order of arrival, so that most are corrected once.
 
     Args:
         passable: Where the robot's centre may be, shape (h, w).
-        row: Of the first cell, which may be impassable itself.
-        column: Of the first cell.
-        distance: Shape (h, w), filled with inf; written.
+        distance: Shape (h, w): what is finite is where the ways begin, after so much; written.
     """
     height, width = passable.shape
     size = height * width
     queue = np.empty(size, np.int32)
     waiting = np.zeros(size, np.bool_)
     root2 = math.sqrt(2.0)
-    distance[row, column] = 0.0
-    queue[0] = row * width + column
-    head, count = 0, 1
+    head, count = 0, 0
+    for cell in range(size):
+        if distance[cell // width, cell % width] < math.inf:
+            waiting[cell] = True
+            queue[count] = cell
+            count += 1
     while count > 0:
         cell = queue[head]
         head = (head + 1) % size
@@ -56,11 +57,21 @@ def travel_distances(passable: NDArray[np.bool_], row: int, column: int, distanc
 
 
 @jit
-def way_back(distance: Array, row: int, column: int, length: float) -> tuple[int, int]:
-    """Return the cell `length` [cells] before (row, column) on the shortest way to it; the start at most."""
+def way_back(
+    distance: Array, roomy: NDArray[np.bool_], row: int, column: int, length: float
+) -> tuple[int, int]:
+    """Return the first roomy cell at least `length` [cells] before a cell on the shortest way to it.
+
+    Args:
+        distance: What `travel_distances` has written, shape (h, w).
+        roomy: Where the way may end, shape (h, w).
+        row: Of the cell; so `column`.
+        column: Of the cell.
+        length: [cells]; where the way is shorter it ends at its beginning.
+    """
     height, width = distance.shape
     target = max(distance[row, column] - length, 0.0)
-    while distance[row, column] > target:
+    while distance[row, column] > target or not roomy[row, column]:
         best_y, best_x = row, column
         for v in range(max(0, row - 1), min(height, row + 2)):
             for u in range(max(0, column - 1), min(width, column + 2)):

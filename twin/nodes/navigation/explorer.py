@@ -1,4 +1,4 @@
-"""`/explore`: drives a robot to the frontiers of its growing map until none is left, with explore_lite's names."""
+"""`/explore`: drives to the frontiers of a growing map until none is left, with explore_lite's names."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ class ExplorerNodeConfig:
 
 
 class ExplorerNode:
-    """Takes `map` and `explore/resume`; sends `navigate_to_pose`, publishes `explore/status` and `explore/frontiers`.
+    """Takes `map` and `explore/resume`; sends `navigate_to_pose`.
 
-    The map decides what is a frontier, navigation what can be reached: a goal that it gives up is left out.
+    Publishes `explore/status`, and `explore/frontiers` if somebody listens. The map decides what is a
+    frontier, navigation what can be reached: a goal that it gives up is left out.
     """
 
     _WATCH_NS = 100_000_000
@@ -143,7 +144,7 @@ class ExplorerNode:
             self._finish(ExploreStatus.EXPLORATION_COMPLETE)
 
     def _finish(self, status: str | None) -> None:
-        """End; without a status the robot did not get back, and without a goal reached nothing was explored."""
+        """End; without a status the robot did not get back."""
         self.done = True
         self.succeeded = status is not None and (self.explorer.reached > 0 or not self.explorer.given_up)
         if status is not None:
@@ -166,7 +167,7 @@ class ExplorerNode:
     def _show(self) -> None:
         if self._markers.has_subscribers:
             markers = frontier_markers(self.explorer, self._robot_pose.frames.map, self.node.now_ns)
-            self._markers.publish(MarkerArray(markers=markers))
+            self._markers.publish(new(MarkerArray, markers=markers))
 
     @staticmethod
     def _why(goal: ClientGoal) -> str:

@@ -1,4 +1,4 @@
-"""A pose graph as RViz shows it: nodes as spheres, edges as lines, those that close loops in another colour."""
+"""A pose graph as RViz shows it: nodes as spheres, edges as lines, loops in another colour."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from twin.bridge.msgs import new
 from twin.bridge.srvs import DeserializePoseGraph, PauseSlam, ResetSlam, SaveSlamMap, SerializePoseGraph
 from twin.errors import MapError
 from twin.geometry import Pose2
+from twin.navigation.mapping.slam import Mode
 
 if TYPE_CHECKING:
     from twin.nodes.navigation.slam_toolbox import SlamToolboxNode
@@ -60,7 +61,7 @@ class SlamServices:
             self._say("deserialize_map refused: match_type is not set")
             return new(DeserializePoseGraph.Response)
         first = request.match_type == kind.START_AT_FIRST_NODE
-        mode = "localization" if request.match_type == kind.LOCALIZE_AT_POSE else "mapping"
+        mode: Mode = "localization" if request.match_type == kind.LOCALIZE_AT_POSE else "mapping"
         try:
             self._owner.load(Path(request.filename), mode, None if first else pose)
         except (MapError, OSError) as fault:

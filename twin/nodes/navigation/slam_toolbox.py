@@ -1,4 +1,4 @@
-"""`/slam_toolbox`: SLAM from odometry and scans, with the topics, services and parameters of slam_toolbox and gmapping."""
+"""`/slam_toolbox`: SLAM from odometry and scans, with the names of slam_toolbox and gmapping."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ class SlamToolboxNode:
         if self._graph_publisher.has_subscribers:
             frame = self.robot_pose.frames.map
             markers = graph_markers(self.slam.graph(), frame, self.node.now_ns)
-            self._graph_publisher.publish(MarkerArray(markers=markers))
+            self._graph_publisher.publish(new(MarkerArray, markers=markers))
 
     def _message(self, grid: OccupancyMap) -> OccupancyGrid:
         frame = self.robot_pose.frames.map

@@ -81,16 +81,17 @@ class _MapCheck(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the first measure that fails, else the last one."""
-        value, limit, reason = None, None, ""
+        value: float | None = None
+        limit: float | None = None
         if self._surroundings is None or not self._surroundings.solids:
             reason = "there is nothing that a lidar could see"
         elif self._map is None:
             reason = f"{self._robot} made no map"
         else:
-            for text, value, limit, passed in self._measures(self._map, MapTruth(self._surroundings)):
-                if not passed:
-                    reason = text
-                    break
+            measures = list(self._measures(self._map, MapTruth(self._surroundings)))
+            failed = [measure for measure in measures if not measure[3]]
+            text, value, limit, passed = (failed or measures)[0 if failed else -1]
+            reason = "" if passed else text
         return CheckResult(
             name=self.name,
             passed=not reason,

@@ -22,7 +22,7 @@ _BESIDE = 0.02
 
 
 class MapTruth:
-    """What a perfect map would hold of the surfaces at the lidar's height and of the floor that can be driven on.
+    """What a perfect map would hold: surfaces at the lidar's height, floor that can be driven on.
 
     Raises:
         ValueError: There is nothing that a lidar could see.
