@@ -63,7 +63,7 @@ class CorrelationGrid:
         self._low = low
         self._pyramid = np.zeros((levels, int(size[1]), int(size[0])), dtype=np.uint8)
         cells = np.floor(points / resolution).astype(np.int64) - low
-        _stamp(self._pyramid[0], np.unique(cells, axis=0), _kernel(resolution, deviation))
+        _stamp(self._pyramid[0], cells, _kernel(resolution, deviation))
         _raise_pyramid(self._pyramid)
 
     def search(self, points: Array, guess: Pose2, window: Window, least: float = 0.0) -> Correlation | None:
@@ -112,6 +112,8 @@ def _stamp(grid: NDArray[np.uint8], cells: NDArray[np.int64], kernel: NDArray[np
     half = kernel.shape[0] // 2
     for n in range(cells.shape[0]):
         column, row = cells[n, 0], cells[n, 1]
+        if grid[row, column] == 255:  # a point of the same cell was here
+            continue
         for i in range(kernel.shape[0]):
             for j in range(kernel.shape[1]):
                 value = kernel[i, j]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -34,6 +34,16 @@ DISAGREEING = 1.0
 """Loops that disagree by less than this [sigma^2] wait for others before the graph is optimised."""
 MOST_WAITING = 10
 """So many loops wait at most."""
+DOUBTFUL = 0.6
+"""Below this score a match is compared with others ..."""
+SECTORS = 8
+"""... in so many parts of a window that is twice as wide ..."""
+LOST = 0.3
+"""... and below this in all directions."""
+EXPANDED = np.diag([1.0, 1.0, 25.0])
+"""By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip."""
+SLIPPED = np.diag([1.0, 1.0, 1e4])
+"""By so much it is larger if it certainly has."""
 
 START_COVARIANCE = np.diag([1.0, 1.0, 0.3])
 """Of the pose at which a session is said to start: x, y [m^2], yaw [rad^2]."""
@@ -340,7 +350,20 @@ class Slam:
             minimum_angle_penalty=config.minimum_angle_penalty,
         )
         least = config.link_match_minimum_response_fine
-        return None if reference is None else reference.match(scan, guess, window, prior, least)
+        if reference is None:
+            return None
+        match = reference.match(scan, guess, window, prior, least)
+        if match is not None and match.score >= DOUBTFUL:
+            return match
+        # What responds most on the smeared grid need not fit best: ask for several.
+        wide = replace(window, half_angle=2.0 * angle)
+        match = _better(match, reference.best_match(scan, guess, wide, EXPANDED * prior, least, SECTORS))
+        if match is not None and match.score >= LOST:
+            return match
+        # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
+        wide = replace(window, half_angle=math.pi)
+        other = reference.best_match(scan, guess, wide, SLIPPED * prior, least, 4 * SECTORS)
+        return other if other is not None and other.score >= DOUBTFUL else match
 
     def _close_loops(self, node: int) -> bool:
         edges = self._closer.search(self._graph, self._scans, node)
@@ -367,3 +390,9 @@ class Slam:
         self.loops_closed += len(edges) - len(wrong)
         self.covariance = self._graph.marginals().of(node)
         return True
+
+
+def _better(first: Match | None, second: Match | None) -> Match | None:
+    if first is None or second is None:
+        return first or second
+    return second if second.score > first.score + 0.02 else first
