@@ -8,6 +8,7 @@ from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.localisation.surface_distance import SurfaceDistance
@@ -31,6 +32,7 @@ def warm_up() -> None:
     SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
+    Explorer().update(room, start, 0.0)
     _localise(room)
 
 

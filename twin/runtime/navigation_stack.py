@@ -34,7 +34,9 @@ def build_navigation(
     """
     bus, namespace, description = context.bus, context.namespace, context.handle.description
     assert description.drive is not None
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    localisation = context.config.localisation
+    mapping = localisation is not None and localisation.type == "slam"
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
