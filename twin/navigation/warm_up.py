@@ -10,6 +10,7 @@ from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.mapping.slam import Slam, SlamConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother
@@ -30,3 +31,15 @@ def warm_up() -> None:
     DriveOnHeading().update(start, 0.1, costmap)
     field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
     field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
+    _warm_up_slam()
+
+
+def _warm_up_slam() -> None:
+    slam = Slam(SlamConfig(minimum_travel_distance=0.0))
+    angles = np.linspace(-1.5, 1.5, 60)
+    for step in range(2):
+        slam.process(
+            Pose2(0.1 * step, 0.0, 0.0), 1.0 / np.cos(0.5 * angles), angles, Pose2(0.0, 0.0, 0.0), step
+        )
+    slam.optimise()
+    slam.map()
