@@ -48,6 +48,7 @@ NOT_RUN = {
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
+    r"twin bench slam .*": "needs logs that are not shipped: tests/cli/bench has its own",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
