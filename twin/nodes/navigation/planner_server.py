@@ -54,8 +54,8 @@ class PlannerParameters:
 class PlannerServerNode:
     """Plans on request; publishes `plan`.
 
-    `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with its defaults but
-    the tolerance and the unknown cells of the configured one.
+    `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with its own
+    defaults, but the tolerance and the unknown cells of the configured one.
     """
 
     def __init__(
@@ -75,7 +75,10 @@ class PlannerServerNode:
         chosen = config or PLUGINS[DEFAULT]()
         self._configs: dict[str, PlannerPluginConfig] = {DEFAULT_ID: chosen}
         for name, plugin in PLUGINS.items():
-            self._configs[name] = plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
+            if isinstance(chosen, plugin):
+                self._configs[name] = chosen
+            else:
+                self._configs[name] = plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
         self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
         self._tried: list[Array] = []
         self._asked: tuple[Pose2, Pose2] | None = None
