@@ -193,6 +193,9 @@ def test_recoveries() -> None:
     assert fold(forced, run(0, 1, 1)).at_s == 2.0, "when it last recovered"
     assert fold(forced, run(0, 0)).reason == "bot recovered 0 times"
     assert fold(forced, run(0, 3)).limit == 2.0
+    km = [at(t, robots=bot(x, 0.0, recoveries=int(x > 0))) for t, x in enumerate((0.0, 900.0, 1100.0))]
+    assert not fold({"recoveries": {"max_per_km": 1}}, km[:2]).passed
+    assert fold({"recoveries": {"max_per_km": 1}}, km).passed
 
 
 def test_driven_distance() -> None:

@@ -118,7 +118,7 @@ def build(
             )
             for robot in scenario.robots
         }
-        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces)
+        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces, scenario.seed)
         for place in outside.nodes:
             create_nodes(bus, place)
     except BaseException:
@@ -186,6 +186,8 @@ def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
     if obstacle.appears_within is not None:
         hidden = hidden_pose(obstacle)
         return PlacedBody(name=obstacle.name, T_world_body=hidden, shapes=shapes, friction=obstacle.friction)
+    if obstacle.route is not None:
+        return PlacedBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
     if obstacle.mass is None:
         return StaticBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
     return FreeBody(

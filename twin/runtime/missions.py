@@ -14,6 +14,7 @@ from twin.geometry import Pose2, Pose3
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import ActionSequenceNode, ActionStep, VelocityProfileNode
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.nodes.random_goals import RandomGoalsConfig, RandomGoalsNode
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.missions import (
     Behaviors,
@@ -22,6 +23,7 @@ from twin.scenario.missions import (
     Mission,
     PickAndPlace,
     R2D2StatePublisher,
+    RandomGoals,
     VelocityProfile,
 )
 from twin.warehouse.arena import Arena
@@ -64,6 +66,7 @@ def build_mission(
     stacks: Mapping[str, RobotStack],
     arena: Arena | None,
     namespaces: Mapping[str, str],
+    seed: int,
 ) -> MissionHandle:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
@@ -75,6 +78,14 @@ def build_mission(
         case Behaviors():
             steps = [_behavior(step, stack) for step in mission.steps]
             return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
+        case RandomGoals():
+            goals = RandomGoalsConfig(
+                distance=mission.distance,
+                clearance=mission.clearance,
+                min_goal_distance=mission.min_goal_distance,
+                max_failed=mission.max_failed,
+            )
+            return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():
             profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
             return VelocityProfileNode(bus, profile * mission.repeat, namespace=namespace)

@@ -14,10 +14,11 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.planner import PlannerConfig
+from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
@@ -36,7 +37,8 @@ class NavigationParameters:
     smoother: VelocitySmootherConfig
     global_costmap: CostmapNodeConfig
     local_costmap: CostmapNodeConfig
-    planner: PlannerConfig
+    planner: PlannerPluginConfig
+    planner_server: PlannerServerConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
 
@@ -77,7 +79,10 @@ def navigation_parameters(
         local_costmap=_costmap(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
-        planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
+        planner=overridden(
+            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=False), config.planner.overrides()
+        ),
+        planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         controller_server=_controller_server(config.controller.overrides(), linear, angular),
         behaviors=BehaviorConfig(footprint=polygon),
     )

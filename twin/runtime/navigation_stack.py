@@ -11,6 +11,7 @@ from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.runtime.navigation_config import navigation_parameters
@@ -41,7 +42,15 @@ def build_navigation(
     global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
     around = with_filters(parameters.local_costmap, config, speed=True)
     local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
-    PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
+    PlannerServerNode(
+        bus,
+        pose,
+        global_costmap,
+        config=parameters.planner,
+        server=parameters.planner_server,
+        namespace=namespace,
+    )
+    SmootherServerNode(bus, global_costmap, namespace=namespace)
     ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )

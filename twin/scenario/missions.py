@@ -101,6 +101,23 @@ class Behaviors(StrictModel):
     """How often to run all steps."""
 
 
+class RandomGoals(StrictModel):
+    """Drive to random places of `/map`, one after the other: a soak test of navigation."""
+
+    type: Literal["random_goals"]
+    """`random_goals`"""
+    robot: str
+    """Name of the robot."""
+    distance: Annotated[Metres, Positive]
+    """The mission is done when odometry has counted so much [m]."""
+    clearance: Annotated[Metres, Positive] = 0.7
+    """Distance of a goal from what the map shows [m]."""
+    min_goal_distance: Annotated[Metres, NotNegative] = 3.0
+    """Distance of a goal from the robot, as the crow flies [m]."""
+    max_failed: Annotated[int, NotNegative] = 0
+    """How many goals the navigator may give up; one more ends the mission."""
+
+
 class VelocityStep(StrictModel):
     """A velocity command held for some time."""
 
@@ -148,5 +165,6 @@ class Idle(StrictModel):
 
 
 Mission = Annotated[
-    PickAndPlace | Behaviors | VelocityProfile | R2D2StatePublisher | Idle, Field(discriminator="type")
+    PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Idle,
+    Field(discriminator="type"),
 ]

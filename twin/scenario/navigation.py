@@ -9,16 +9,8 @@ from typing import Annotated
 
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.planners import PlannerParameters
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
-
-
-class PlannerParameters(ParameterGroup):
-    """Parameters of `/planner_server`."""
-
-    tolerance: Annotated[Metres, NotNegative] | None = None
-    """How far from the requested goal a plan may end [m]."""
-    allow_unknown: bool | None = None
-    """Whether a plan may cross unknown cells."""
 
 
 class ControllerParameters(ParameterGroup):
