@@ -35,8 +35,8 @@ class PlannerServerConfig:
     """Parameters of the server itself."""
 
     compute_alternatives: int = 0
-    """How many other ways are tried when a goal is asked for again from the place where it was asked last: the
-    path could not be followed. For trees that plan anew only when they must."""
+    """How many other ways are tried when a goal is asked for again from where it was asked last: the path could
+    not be followed. For trees that plan anew only when they must."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
@@ -54,7 +54,8 @@ class PlannerParameters:
 class PlannerServerNode:
     """Plans on request; publishes `plan`.
 
-    A request's `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with its defaults.
+    A request's `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with
+    its defaults.
     """
 
     def __init__(
