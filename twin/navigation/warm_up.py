@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from twin.geometry import Pose2
+from twin.navigation.control.collision_monitor import time_to_collision
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
@@ -31,5 +32,6 @@ def warm_up() -> None:
     SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
+    time_to_collision(np.ones((2, 2)), layered.config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
     field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
     field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
