@@ -24,7 +24,7 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
-from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig

@@ -26,8 +26,7 @@ app = typer.Typer(
 )
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_SCENARIOS, _ROBOTS, _GRAPH = "Scenarios", "Robot files", "ROS 2 graph"
-_NAVIGATION = "Navigation"
+_SCENARIOS, _ROBOTS, _GRAPH, _NAVIGATION = "Scenarios", "Robot files", "ROS 2 graph", "Navigation"
 
 _COMMANDS = (
     ("run", run.run, _SCENARIOS, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from twin.geometry import Pose2
@@ -11,7 +9,10 @@ from twin.navigation.control.collision_monitor import time_to_collision
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.exploration.explorer import Explorer
+from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother
@@ -33,5 +34,11 @@ def warm_up() -> None:
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
     time_to_collision(np.ones((2, 2)), layered.config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
-    field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
-    field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
+    Explorer().update(room, start, 0.0)
+    _localise(room)
+
+
+def _localise(room: OccupancyMap) -> None:
+    beams = chosen_beams([0.5, 0.6], [0.0, 1.0], Pose2(0.0, 0.0, 0.0), most=2, min_range=0.0, max_range=9.0)
+    field = LikelihoodField(SurfaceDistance(room, max_dist=2.0), z_hit=0.5, z_rand=0.5)
+    field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)

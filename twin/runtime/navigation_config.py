@@ -41,7 +41,7 @@ class NavigationParameters:
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -50,6 +50,7 @@ def navigation_parameters(
         drive: Whose limits hold where the scenario gives none.
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
+        mapping: Whether the map is made on the way: paths may lead through what is unknown.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
@@ -78,7 +79,7 @@ def navigation_parameters(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
         planner=overridden(
-            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=False), config.planner.overrides()
+            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),

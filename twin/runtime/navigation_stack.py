@@ -13,6 +13,7 @@ from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
@@ -33,7 +34,9 @@ def build_navigation(
     """
     bus, namespace, description = context.bus, context.namespace, context.handle.description
     assert description.drive is not None
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    localisation = context.config.localisation
+    mapping = localisation is not None and localisation.type == "slam"
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     period_ns = context.control_period_ns
     build_commands(context, config.collision_monitor, pose, footprint)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
@@ -59,4 +62,6 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    return BtNavigatorNode(bus, pose, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, namespace=namespace)
+    WaypointFollowerNode(bus, namespace=namespace)
+    return navigator

@@ -35,8 +35,8 @@ class PlannerServerConfig:
     """Parameters of the server itself."""
 
     compute_alternatives: int = 0
-    """How many other ways are tried when a goal is asked for again from where it was asked last: the path could
-    not be followed. For trees that plan anew only when they must."""
+    """How many other ways are tried when a goal is asked for again from where it was asked last: the path
+    could not be followed. For trees that plan anew only when they must."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
