@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.geometry import Pose2
+from twin.navigation.control.collision_monitor import time_to_collision
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
@@ -32,6 +33,7 @@ def warm_up() -> None:
     SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
+    time_to_collision(np.ones((2, 2)), layered.config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
     Explorer().update(room, start, 0.0)
     _localise(room)
 

@@ -12,9 +12,9 @@ from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.smoother_server import SmootherServerNode
-from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
+from twin.runtime.commands import build_commands
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
@@ -38,7 +38,7 @@ def build_navigation(
     mapping = localisation is not None and localisation.type == "slam"
     parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     period_ns = context.control_period_ns
-    TwistMuxNode(bus, namespace=namespace)
+    build_commands(context, config.collision_monitor, pose, footprint)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
