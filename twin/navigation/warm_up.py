@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import numpy as np
 
 from twin.geometry import Pose2
+from twin.navigation.control.controller import Controller
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.failures import ControlFailure
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, PlannerConfig
@@ -30,3 +33,16 @@ def warm_up() -> None:
     DriveOnHeading().update(start, 0.1, costmap)
     field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
     field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
+
+
+def warm_up_controller(controller: Controller) -> None:
+    """Let a controller drive a few commands along a path that bends and ends, and forget them."""
+    data = np.zeros((80, 80), dtype=np.int8)
+    data[30, 40] = 100
+    room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
+    costmap = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room).costmap
+    path = np.column_stack([np.linspace(0.5, 3.5, 31), np.full(31, 2.0), np.zeros(31)])
+    for x, yaw in ((0.5, 0.0), (0.5, 1.5), (3.3, 0.0)):
+        with contextlib.suppress(ControlFailure):
+            controller.compute_velocity(Pose2(x, 2.0, yaw), (0.0, 0.0), path, costmap, 0.05)
+    controller.reset()
