@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from twin.geometry import Array
 from twin.models.specs import LidarSpec
+from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
 from twin.nodes.navigation.controller_server import ControllerServerNode
@@ -54,9 +55,11 @@ def build_navigation(
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, namespace=namespace)
-    ControllerServerNode(
+    server = ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )
+    for controller in server.controllers.values():
+        warm_up_controller(controller)
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )

@@ -263,7 +263,7 @@ class MPPI:
             np.array([config.CostCritic.trajectory_point_step, *scene.cover.costs]),
             scene.cover.circles,
             scene.cover.outline,
-            np.array([*scene.path[:, -1], *near], dtype=np.float32),
+            np.array([*scene.path[:, -1], *near, local.length], dtype=np.float32),
             np.array([config.scores("TwirlingCritic"), dead[0], dead[2]], dtype=np.float32),
             self._state,
             self._points,
@@ -321,6 +321,9 @@ class MPPI:
             return False
         x, y = scene.path[:2, at]
         np.hypot(self._state[kernels.X] - x, self._state[kernels.Y] - y, out=self._raw[kernels.FOLLOW])
+        if at == last:
+            # Being at the end in time is not enough: the robot would put off to go there, again and again.
+            self._raw[kernels.FOLLOW] += self._raw[kernels.LAG]
         return True
 
     def _angle(self, scene: _Scene, furthest: int) -> bool:
