@@ -37,7 +37,7 @@ class Tracking:
     rms_deg: float
     max_deg: float
     nees: float
-    """Mean of the normalised estimation error squared of `amcl_pose`; 3 is perfectly honest, less is modest."""
+    """Mean of the normalised error squared of `amcl_pose`: 3 is perfectly honest, less is modest."""
     real_time: float
     """Simulated seconds per CPU second of the whole run: physics, sensors, all nodes."""
     amcl_real_time: float
@@ -68,9 +68,7 @@ class _Log:
             self.scans.append((sample.time_ns, sample.message.ranges))
 
 
-def track(
-    distance: float, seed: int, progress: Callable[[float, float], None] | None = None
-) -> Tracking:
+def track(distance: float, seed: int, progress: Callable[[float, float], None] | None = None) -> Tracking:
     """Drive `distance` [m] and score.
 
     Args:

@@ -46,7 +46,9 @@ class PoseError:
 
 
 @contextmanager
-def opened(mission: dict[str, Any], seed: int, *, navigation: bool, tap: Tap | None = None) -> Iterator[Bench]:
+def opened(
+    mission: dict[str, Any], seed: int, *, navigation: bool, tap: Tap | None = None
+) -> Iterator[Bench]:
     """Yield the warehouse with its robot, on a bus that nobody else takes part in."""
     robot: dict[str, Any] = {
         "model": ROBOT,
@@ -106,7 +108,11 @@ class Bench:
 
     def carry(self, pose: Pose2) -> None:
         """Put the robot somewhere else; its wheels notice nothing."""
-        model, data, place = self._world.model, self._world.data, Pose3.from_pose2(pose, self.stack.spawn_height)
+        model, data, place = (
+            self._world.model,
+            self._world.data,
+            Pose3.from_pose2(pose, self.stack.spawn_height),
+        )
         joint = model.body(self.stack.handle.base).jntadr[0]
         position, velocity = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
         data.qpos[position : position + 7] = (*place.xyz, *place.quat_wxyz)
