@@ -253,6 +253,8 @@ def test_closed_loop() -> None:
         {"odometry_drift": {"max": 1}},
         {"driven_distance": {"min": 0}},
         {"recoveries": {"max": 1}},
+        {"map_accuracy": {"mean": 1}},
+        {"map_coverage": {"floor": 0.5}},
         {"energy": {"max": 1}},
         {"final_pose": {"x": 0, "y": 0}},
         {"path_on_circle": {"radius": 1, "tolerance": 1}},

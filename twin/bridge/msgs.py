@@ -100,6 +100,7 @@ BehaviorTreeStatusChange: Any = types.get("nav2_msgs/msg/BehaviorTreeStatusChang
 Particle: Any = types.get("nav2_msgs/msg/Particle")
 ParticleCloud: Any = types.get("nav2_msgs/msg/ParticleCloud")
 SpeedLimit: Any = types.get("nav2_msgs/msg/SpeedLimit")
+ExploreStatus: Any = types.get("explore_lite_msgs/msg/ExploreStatus")
 GripperCommandMsg: Any = types.get("control_msgs/msg/GripperCommand")
 JointTolerance: Any = types.get("control_msgs/msg/JointTolerance")
 JointTrajectoryControllerState: Any = types.get("control_msgs/msg/JointTrajectoryControllerState")
@@ -151,6 +152,7 @@ __all__ = [
     "DiagnosticStatus",
     "Duration",
     "Empty",
+    "ExploreStatus",
     "Float32",
     "Float64",
     "Float64MultiArray",

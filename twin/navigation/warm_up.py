@@ -8,11 +8,12 @@ from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.planner import Planner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
 
@@ -28,9 +29,10 @@ def warm_up() -> None:
     layered.set_keepout(KeepoutFilter(mask=room))
     costmap = layered.costmap
     start, goal = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
-    SimpleSmoother().smooth(Planner(config=PlannerConfig()).plan(costmap, start, goal), costmap)
+    SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
+    Explorer().update(room, start, 0.0)
     _localise(room)
 
 

@@ -7,45 +7,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
-
-
-class PlannerParameters(ParameterGroup):
-    """Parameters of `/planner_server`."""
-
-    tolerance: Annotated[Metres, NotNegative] | None = None
-    """How far from the requested goal a plan may end [m]."""
-    allow_unknown: bool | None = None
-    """Whether a plan may cross unknown cells."""
-
-
-class ControllerParameters(ParameterGroup):
-    """Parameters of `/controller_server` (regulated pure pursuit and its goal and progress checkers)."""
-
-    controller_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of the velocity commands [Hz]."""
-    desired_linear_vel: Annotated[MetresPerSecond, Positive] | None = None
-    """Cruise speed [m/s]."""
-    lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Distance of the point that is followed [m]."""
-    min_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its lower bound when scaled by speed [m]."""
-    max_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its upper bound when scaled by speed [m]."""
-    lookahead_time: Annotated[Seconds, Positive] | None = None
-    """Time that the point lies ahead when scaled by speed [s]."""
-    rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
-    """Turn rate on the spot [rad/s]."""
-    xy_goal_tolerance: Annotated[Metres, Positive] | None = None
-    """Position tolerance of the goal checker [m]."""
-    yaw_goal_tolerance: Annotated[Radians, Positive] | None = None
-    """Heading tolerance of the goal checker [rad]."""
-    required_movement_radius: Annotated[Metres, Positive] | None = None
-    """Progress checker: movement that counts [m]."""
-    movement_time_allowance: Annotated[Seconds, Positive] | None = None
-    """Progress checker: time allowed for it [s]."""
+from twin.scenario.planners import PlannerParameters
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
 
 
 class CostmapParameters(ParameterGroup):

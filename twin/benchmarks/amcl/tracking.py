@@ -37,7 +37,7 @@ class Tracking:
     rms_deg: float
     max_deg: float
     nees: float
-    """Mean of the normalised error squared of `amcl_pose`: 3 is perfectly honest, less is modest."""
+    """Mean of the normalised estimation error squared of `amcl_pose`; 3 is honest, less is modest."""
     real_time: float
     """Simulated seconds per CPU second of the whole run: physics, sensors, all nodes."""
     amcl_real_time: float
