@@ -16,9 +16,11 @@ from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitC
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
 
@@ -39,6 +41,8 @@ class NavigationParameters:
     planner: PlannerConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
+    navigator: BtNavigatorConfig
+    waypoints: WaypointFollowerConfig
 
 
 def navigation_parameters(
@@ -79,6 +83,8 @@ def navigation_parameters(
         planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
         controller_server=_controller_server(config.controller.overrides(), linear, angular),
         behaviors=BehaviorConfig(footprint=polygon),
+        navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
+        waypoints=WaypointFollowerConfig(),
     )
 
 

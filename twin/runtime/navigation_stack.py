@@ -14,6 +14,7 @@ from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
+from twin.runtime.nav2_parameters import with_file
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.scenario.navigation import NavigationConfig
@@ -33,6 +34,7 @@ def build_navigation(
     bus, namespace, description = context.bus, context.namespace, context.handle.description
     assert description.drive is not None
     parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
@@ -47,6 +49,8 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    navigator = BtNavigatorNode(bus, pose, namespace=namespace)
-    WaypointFollowerNode(bus, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
+    for sentence in not_understood:
+        navigator.node.get_logger().warn(sentence)
     return navigator

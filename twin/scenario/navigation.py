@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
 
@@ -65,6 +65,15 @@ class CostmapParameters(ParameterGroup):
     """Range within which a beam clears cells [m]."""
 
 
+class NavigatorParameters(ParameterGroup):
+    """Parameters of `/bt_navigator`."""
+
+    default_nav_to_pose_bt_xml: NameOrPath | None = None
+    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
+    default_nav_through_poses_bt_xml: NameOrPath | None = None
+    """The same for goals through poses."""
+
+
 class NavigationConfig(StrictModel):
     """The navigation of one robot; `navigation: {}` takes every default."""
 
@@ -72,6 +81,10 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [m/s]; absent: the robot's own."""
     max_angular_speed: Annotated[RadiansPerSecond, Positive] | None = None
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
+    params_file: NameOrPath | None = None
+    """A Nav2 parameter file; keys below go before its values."""
+    navigator: NavigatorParameters = NavigatorParameters()
+    """Overrides of the navigator."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()
