@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from twin.errors import NavigationError
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.footprint import rectangle
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.nav2_parameters import with_file
+from twin.runtime.nav2_parameters import with_file, with_plugins
 from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
 from twin.scenario.navigation import NavigationConfig
 
@@ -31,6 +32,7 @@ controller_server:
   ros__parameters:
     controller_frequency: 25.0
     min_x_velocity_threshold: 0.001
+    costmap_update_timeout: 0.3
     goal_checker_plugins: ["precise"]
     controller_plugins: ["FollowPath"]
     progress_checker:
@@ -85,8 +87,13 @@ def applied(
         wheel_separation=0.3,
         wheel_radius=0.05,
     )
+    scenario = with_plugins(scenario, namespace)
     before = navigation_parameters(scenario, drive, rectangle(0.3, 0.3), Frames())
     return with_file(before, scenario, namespace)
+
+
+def _controller(got: NavigationParameters) -> Any:
+    return got.controller_server.controllers["FollowPath"]
 
 
 def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
@@ -94,9 +101,11 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert got.navigator.bt_loop_duration == 20
     assert got.navigator.error_code_name_prefixes == ("compute_path", "follow_path")
     assert got.controller_server.controller_period_ns == 40_000_000
-    assert got.controller_server.controller.lookahead_dist == 0.55
-    assert got.controller_server.goal_checker.xy_goal_tolerance == 0.11, "whatever the plugin is called"
-    assert got.controller_server.progress_checker.movement_time_allowance == 7.0
+    assert _controller(got).lookahead_dist == 0.55
+    assert got.controller_server.goal_checkers["general_goal_checker"].xy_goal_tolerance == 0.11, (
+        "whatever the plugin is called"
+    )
+    assert got.controller_server.progress_checkers["progress_checker"].movement_time_allowance == 7.0
     assert got.local_costmap.update_period_ns == 250_000_000
     assert got.local_costmap.layers.width == 3.0
     assert got.local_costmap.layers.inflation_radius == 0.66
@@ -107,15 +116,37 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert not got.waypoints.stop_on_failure
     assert got.waypoints.wait_at_waypoint.waypoint_pause_duration == 300
     assert told == [
-        "nav2.yaml: controller_server does not have min_x_velocity_threshold",
+        "nav2.yaml: controller_server does not have costmap_update_timeout",
         "nav2.yaml: not read for amcl",
     ]
 
 
 def test_a_plugin_that_is_not_here_is_told_and_its_parameters_are_not_taken(tmp_path: Path) -> None:
     got, told = applied(tmp_path, FILE.format(plugin="teb_local_planner::TebLocalPlannerROS"))
-    assert got.controller_server.controller.lookahead_dist != 0.55
+    assert _controller(got).lookahead_dist != 0.55
     assert "does not have teb_local_planner::TebLocalPlannerROS (FollowPath.*)" in "\n".join(told)
+
+
+def test_the_file_chooses_controller_and_planner(tmp_path: Path) -> None:
+    text = """\
+controller_server:
+  ros__parameters:
+    FollowPath:
+      plugin: nav2_rotation_shim_controller::RotationShimController
+      primary_controller: nav2_mppi_controller::MPPIController
+      batch_size: 321
+planner_server:
+  ros__parameters:
+    GridBased: {plugin: nav2_navfn_planner/NavfnPlanner, tolerance: 0.3}
+    planner_plugins: [GridBased]
+"""
+    got, _ = applied(tmp_path, text.replace("nav2_navfn_planner/", "nav2_navfn_planner::"))
+    assert type(_controller(got).primary_controller).__name__ == "MPPIConfig"
+    assert _controller(got).primary_controller.batch_size == 321
+    assert type(got.planner).__name__ == "PlannerConfig"
+    assert got.planner.tolerance == 0.3
+    got, _ = applied(tmp_path, text, {"controller": {"plugin": "dwb"}})
+    assert type(_controller(got).primary_controller).__name__ == "DWBConfig", "the scenario goes before it"
 
 
 def test_what_the_scenario_gives_goes_before_the_file(tmp_path: Path) -> None:
@@ -126,7 +157,7 @@ def test_what_the_scenario_gives_goes_before_the_file(tmp_path: Path) -> None:
     }
     got, _ = applied(tmp_path, FILE.format(plugin=RPP), config)
     assert got.smoother.linear.max_velocity == 0.3
-    assert got.controller_server.controller.lookahead_dist == 0.9
+    assert _controller(got).lookahead_dist == 0.9
     assert got.planner.tolerance == 0.05
 
 

@@ -2,179 +2,47 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
 
-import yaml
-
-from twin.bridge.parameters import files
-from twin.errors import NavigationError, Problem, TwinError
 from twin.nodes.navigation.costmap import CostmapNodeConfig
-from twin.nodes.node_parameters import overlay, parameter_names
+from twin.runtime.nav2_file import PLANNERS, Nav2Parameters
 from twin.runtime.navigation_config import NavigationParameters
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
 
-C = TypeVar("C")
-
-_CONTROLLER_NAMES = {"controller": "FollowPath", "goal_checker": "general_goal_checker"}
-_TYPO = 0.85
-"""As similar as this to a name that the node has, an unknown name is a mistake; else it is Nav2's alone."""
-_ONLY_NAV2S = ("critics", "transform_tolerance")
-"""Names of Nav2 that only look like mistakes."""
-_LAYERS = ("static_layer", "obstacle_layer", "voxel_layer", "inflation_layer", "stvl_layer", "range_layer")
-_BEHAVIORS = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
-_SECTIONS = {
-    "controller_plugins": "FollowPath",
-    "planner_plugins": "GridBased",
-    "goal_checker_plugins": "general_goal_checker",
-    "progress_checker_plugins": "progress_checker",
+_CONTROLLER_NAMES = dict.fromkeys(
+    ("controllers", "goal_checkers", "progress_checkers", "primary_controller"), ""
+)
+_CONTROLLERS = {
+    "RegulatedPurePursuitController": "regulated_pure_pursuit",
+    "DWBLocalPlanner": "dwb",
+    "MPPIController": "mppi",
 }
-"""List of plugins -> what the section of the first one is called here."""
 
 
-class _Value(NamedTuple):
-    value: Any
-    said: str
-    """Its name in the file."""
-    line: int | None
-    is_general: bool
-    """Whether it is for whichever node has it, as what is under a pattern is."""
+def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
+    """Return a scenario's navigation with the file's controller and planner, unless it names its own.
 
-
-class Nav2Parameters:
-    """The values of one file; remembers what became of each."""
-
-    def __init__(self, path: Path, namespace: str = "") -> None:
-        """Read a file.
-
-        Args:
-            path: A file as for ROS nodes: `node: {ros__parameters: {...}}`.
-            namespace: Of the robot; nodes may be named with it or without.
-
-        Raises:
-            NavigationError: the file is no parameter file.
-        """
-        self.path, self._namespace = path, namespace
-        try:
-            self._sections = files.read(path)
-        except TwinError as error:
-            raise NavigationError(error.problems) from error
-        self._lines = _lines(path)
-        self._problems: list[Problem] = []
-        self._ignored: dict[str, list[str]] = {}
-        self._nodes: set[str] = set()
-
-    def applied(
-        self,
-        node: str,
-        config: C,
-        names: Mapping[str, str] | None = None,
-        *,
-        prefix: str = "",
-        keep: frozenset[str] = frozenset(),
-    ) -> C:
-        """Return a node's config with the file's values.
-
-        Args:
-            node: Its name, such as 'controller_server' or 'local_costmap/local_costmap'.
-            config: What holds without the file.
-            names: Field -> parameter, as for `declare_config`.
-            prefix: Of all parameters of this config, such as 'GridBased.'.
-            keep: Parameters, without their sections, that the scenario gives: they stay.
-        """
-        self._nodes.add(node)
-        values = self._values(node, config, names or {}, prefix)
-        known = tuple(prefix + name for name in parameter_names(config, names or {}))
-        taken = {
-            name.removeprefix(prefix): entry.value
-            for name, entry in values.items()
-            if name in known and not keep & {name, name.rpartition(".")[2]}
-        }
-        config, refused = overlay(config, taken, names or {})
-        for name, why in refused.items():
-            entry = values[prefix + name]
-            self._problems.append(Problem(f"{node}: {entry.said} {why}", self.path, entry.line))
-        for name, entry in values.items():
-            if name not in known and not entry.is_general and name != "use_sim_time":
-                self._unknown(node, name, entry, known)
+    Raises:
+        NavigationError: the file is no parameter file.
+    """
+    if config.params_file is None:
         return config
-
-    def costmap(self, name: str, config: CostmapNodeConfig, group: ParameterGroup) -> CostmapNodeConfig:
-        """Return a costmap's config with the file's values."""
-        return self.applied(f"{name}/{name}", config, {"layers": ""}, keep=_given(group))
-
-    def finish(self) -> list[str]:
-        """Return one sentence per node of the file that was not, or not wholly, understood.
-
-        Raises:
-            NavigationError: every value that cannot be, every name that is a likely typing mistake.
-        """
-        if self._problems:
-            raise NavigationError(self._problems)
-        others = sorted(s.node.strip("/") for s in self._sections if not s.is_pattern)
-        absent = [name for name in others if self._without_namespace(name) not in self._nodes]
-        told = [
-            f"{self.path.name}: {node} does not have {', '.join(what)}"
-            for node, what in self._ignored.items()
-        ]
-        return [*told, f"{self.path.name}: not read for {', '.join(absent)}"] if absent else told
-
-    def _without_namespace(self, name: str) -> str:
-        return name.removeprefix(self._namespace.strip("/") + "/") if self._namespace else name
-
-    def _values(self, node: str, config: Any, names: Mapping[str, str], prefix: str) -> dict[str, _Value]:
-        """Return the node's values by the names that this config has for them."""
-        found: dict[str, _Value] = {}
-        for full in dict.fromkeys((f"/{node}", f"{self._namespace}/{node}")):
-            for section in sorted(self._sections, key=lambda section: not section.is_pattern):
-                if section.matches(full):
-                    for said, value in section.values.items():
-                        line = self._lines.get((section.node, said))
-                        found[said] = _Value(value, said, line, section.is_pattern)
-        renamed = _by_axis(_renamed(found))
-        known = tuple(prefix + name for name in parameter_names(config, names))
-        if "costmap" in node or node == "behavior_server":
-            renamed = {_flat(name, known): entry for name, entry in renamed.items()}
-        foreign = [name.removesuffix("plugin") for name in renamed if name.endswith(".plugin")]
-        return self._without_foreign(node, renamed, config, names, prefix, foreign)
-
-    def _without_foreign(
-        self,
-        node: str,
-        values: dict[str, _Value],
-        config: Any,
-        names: Mapping[str, str],
-        prefix: str,
-        sections: list[str],
-    ) -> dict[str, _Value]:
-        """Leave out sections of plugins that are others than those here, and the lists of plugins."""
-        classes = {
-            f"{names.get(key, key)}.": getattr(config, key)
-            for key in getattr(config, "__dataclass_fields__", {})
-        }
-        if prefix:
-            classes = {prefix: config}
-        out = {name: entry for name, entry in values.items() if not name.endswith(("plugins", "plugin"))}
-        for section in sections:
-            own, plugin = classes.get(section), str(values[section + "plugin"].value)
-            if own is not None and not _is_same(plugin, own):
-                self._ignored.setdefault(node, []).append(f"{plugin} ({section}*)")
-                out = {name: entry for name, entry in out.items() if not name.startswith(section)}
-        return out
-
-    def _unknown(self, node: str, name: str, entry: _Value, known: tuple[str, ...]) -> None:
-        section, _, last = name.rpartition(".")
-        beside = [other.rpartition(".")[2] for other in known if other.rpartition(".")[0] == section]
-        close = difflib.get_close_matches(last, beside, n=1, cutoff=_TYPO)
-        if close and last not in _ONLY_NAV2S:
-            said = f"{node} has no parameter {entry.said}; did you mean '{close[0]}'?"
-            self._problems.append(Problem(said, self.path, entry.line))
-        else:
-            self._ignored.setdefault(node, []).append(entry.said)
+    file = Nav2Parameters(Path(config.params_file), namespace)
+    controller, planner = config.controller, config.planner
+    chosen = file.plugin("controller_server", "FollowPath")
+    if chosen == "RotationShimController":
+        primary = file.plugin("controller_server", "FollowPath", "primary_controller")
+        update = {"rotation_shim": True, "plugin": _CONTROLLERS.get(primary)}
+    else:
+        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
+    if update["plugin"] and not {"plugin", "rotation_shim"} & controller.model_fields_set:
+        controller = controller.model_copy(update=update)
+    found = PLANNERS.get(file.plugin("planner_server", "GridBased"))
+    if found and "plugin" not in planner.model_fields_set:
+        planner = planner.model_copy(update={"plugin": found})
+    return config.model_copy(update={"controller": controller, "planner": planner})
 
 
 def with_file(
@@ -196,8 +64,8 @@ def with_file(
     changed = replace(
         parameters,
         smoother=file.applied("velocity_smoother", parameters.smoother, keep=given),
-        global_costmap=file.costmap("global_costmap", parameters.global_costmap, config.global_costmap),
-        local_costmap=file.costmap("local_costmap", parameters.local_costmap, config.local_costmap),
+        global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
+        local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
         planner=file.applied(
             "planner_server", parameters.planner, prefix="GridBased.", keep=_given(config.planner)
         ),
@@ -219,75 +87,5 @@ def _given(group: ParameterGroup) -> frozenset[str]:
     return frozenset(group.overrides())
 
 
-def _renamed(values: dict[str, _Value]) -> dict[str, _Value]:
-    """Give the sections of the first plugins the names that they have here."""
-    new_names = {
-        f"{values[key].value[0]}.": f"{name}."
-        for key, name in _SECTIONS.items()
-        if key in values and isinstance(values[key].value, list) and values[key].value
-    }
-
-    def renamed(name: str) -> str:
-        for old, new in new_names.items():
-            if name.startswith(old):
-                return new + name.removeprefix(old)
-        return name
-
-    out = {renamed(name): entry for name, entry in values.items()}
-    if "error_code_names" in out and isinstance(out["error_code_names"].value, list):
-        entry = out.pop("error_code_names")
-        prefixes = [str(name).removesuffix("_error_code") for name in entry.value]
-        out["error_code_name_prefixes"] = entry._replace(value=prefixes)
-    return out
-
-
-def _by_axis(values: dict[str, _Value]) -> dict[str, _Value]:
-    """Return the smoother's parameters with its lists [x, y, yaw] taken apart, as they are declared here."""
-    out = dict(values)
-    for said, name in (
-        ("max_velocity", "max_velocity"),
-        ("max_accel", "max_acceleration"),
-        ("max_decel", "max_deceleration"),
-    ):
-        entry = out.get(said)
-        if entry is None or not isinstance(entry.value, list) or len(entry.value) != 3:
-            continue
-        x, _, yaw = out.pop(said).value
-        out[f"linear.{name}"] = entry._replace(value=abs(x))
-        out[f"angular.{name}"] = entry._replace(value=abs(yaw))
-    return out
-
-
-def _flat(name: str, known: tuple[str, ...]) -> str:
-    """Return a layer's or behaviour's parameter by its last part: here they share one set."""
-    layer, last = name.partition(".")[0], name.rpartition(".")[2]
-    if layer not in _LAYERS + _BEHAVIORS:
-        return name
-    return next((other for other in known if other.rpartition(".")[2] == last), name)
-
-
-def _is_same(plugin: str, config: Any) -> bool:
-    """Whether a plugin is of a config's kind, as RegulatedPurePursuitController is."""
-    kind = type(config).__name__.removesuffix("Config").casefold()
-    return kind in plugin.rpartition("::")[2].casefold()
-
-
-def _lines(path: Path) -> dict[tuple[str, str], int]:
-    """Return the line of every value: (node, parameter) -> line."""
-    root = yaml.compose(path.read_text("utf-8"), Loader=yaml.SafeLoader)
-    return dict(_walk(root, "", None)) if root is not None else {}
-
-
-def _walk(node: yaml.Node, name: str, parameter: str | None) -> Iterator[tuple[tuple[str, str], int]]:
-    if not isinstance(node, yaml.MappingNode):
-        return
-    for key, value in node.value:
-        text = str(key.value)
-        if parameter is None and text == files.KEY:
-            yield from _walk(value, name, "")
-        elif parameter is None:
-            yield from _walk(value, f"{name}/{text.strip('/')}", None)
-        else:
-            full = f"{parameter}.{text}" if parameter else text
-            yield (name, full), key.start_mark.line + 1
-            yield from _walk(value, name, full)
+def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: ParameterGroup) -> CostmapNodeConfig:
+    return file.applied(f"{config.name}/{config.name}", config, {"layers": ""}, keep=_given(group))

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
-from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.planner import PlannerConfig
+from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
+from twin.runtime.controller_config import controller_server_config
+from twin.runtime.overrides import overridden as overridden
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
 
@@ -28,7 +27,6 @@ C = TypeVar("C")
 
 _GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
 _LOCAL_COSTMAP_PERIOD_NS = 200_000_000
-_CONTROLLER_PERIOD_NS = 60_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +36,8 @@ class NavigationParameters:
     smoother: VelocitySmootherConfig
     global_costmap: CostmapNodeConfig
     local_costmap: CostmapNodeConfig
-    planner: PlannerConfig
+    planner: PlannerPluginConfig
+    planner_server: PlannerServerConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
     navigator: BtNavigatorConfig
@@ -46,7 +45,7 @@ class NavigationParameters:
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -55,23 +54,26 @@ def navigation_parameters(
         drive: Whose limits hold where the scenario gives none.
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
+        mapping: Whether the map is made on the way: paths may lead through what is unknown.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
     angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
     layers = CostmapConfig(
         footprint=polygon,
+        footprint_padding=0.0,  # it is in the footprint already
         inflation_radius=0.8,
         cost_scaling_factor=4.0,
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
     rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    smoother = VelocitySmootherConfig(
+        linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
+        angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+    )
     return NavigationParameters(
-        smoother=VelocitySmootherConfig(
-            linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-            angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
-        ),
+        smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
         global_costmap=replace(
             _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
@@ -80,34 +82,14 @@ def navigation_parameters(
         local_costmap=_costmap(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
-        planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
-        controller_server=_controller_server(config.controller.overrides(), linear, angular),
+        planner=overridden(
+            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
+        ),
+        planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
+        controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
-    )
-
-
-def _controller_server(overrides: Mapping[str, Any], linear: float, angular: float) -> ControllerServerConfig:
-    """Return tolerances that docking can start from, and a lookahead that grows with speed."""
-    goal_checker = overridden(GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.05), overrides)
-    controller = RegulatedPurePursuitConfig(
-        desired_linear_vel=linear,
-        use_velocity_scaled_lookahead_dist=True,
-        min_lookahead_dist=0.35,
-        max_lookahead_dist=1.0,
-        lookahead_time=1.0,
-        rotate_to_heading_angular_vel=min(1.2, angular),
-        max_angular_accel=1.2,
-        rotate_to_heading_min_angle=0.6,
-        approach_velocity_scaling_dist=0.8,
-        xy_goal_tolerance=goal_checker.xy_goal_tolerance,
-    )
-    return ControllerServerConfig(
-        controller=overridden(controller, overrides),
-        goal_checker=goal_checker,
-        progress_checker=overridden(ProgressCheckerConfig(), overrides),
-        controller_period_ns=_period_ns(overrides.get("controller_frequency"), _CONTROLLER_PERIOD_NS),
     )
 
 
@@ -119,16 +101,10 @@ def _costmap(
         name=name,
         frame=frame,
         layers=overridden(layers, overrides),
+        range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )
 
 
 def _period_ns(frequency: float | None, default: int) -> int:
     return default if frequency is None else round(1e9 / frequency)
-
-
-def overridden(config: C, overrides: Mapping[str, Any]) -> C:
-    """Return a config with those overrides that are fields of its own and are given."""
-    own = {field.name for field in fields(config)}  # type: ignore[arg-type]
-    given = {key: value for key, value in overrides.items() if key in own and value is not None}
-    return replace(config, **given)  # type: ignore[type-var]

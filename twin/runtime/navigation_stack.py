@@ -11,12 +11,14 @@ from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
-from twin.runtime.nav2_parameters import with_file
+from twin.runtime.nav2_parameters import with_file, with_plugins
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
+from twin.runtime.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
 
 
@@ -33,14 +35,28 @@ def build_navigation(
     """
     bus, namespace, description = context.bus, context.namespace, context.handle.description
     assert description.drive is not None
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    localisation = context.config.localisation
+    mapping = localisation is not None and localisation.type == "slam"
+    config = with_plugins(config, namespace)
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
-    global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
-    local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
-    PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
+    build_zones(bus, config, pose.frames.map, namespace=namespace)
+    in_map = with_filters(parameters.global_costmap, config, speed=False)
+    global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
+    around = with_filters(parameters.local_costmap, config, speed=True)
+    local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
+    PlannerServerNode(
+        bus,
+        pose,
+        global_costmap,
+        config=parameters.planner,
+        server=parameters.planner_server,
+        namespace=namespace,
+    )
+    SmootherServerNode(bus, global_costmap, namespace=namespace)
     ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )

@@ -7,45 +7,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
-
-
-class PlannerParameters(ParameterGroup):
-    """Parameters of `/planner_server`."""
-
-    tolerance: Annotated[Metres, NotNegative] | None = None
-    """How far from the requested goal a plan may end [m]."""
-    allow_unknown: bool | None = None
-    """Whether a plan may cross unknown cells."""
-
-
-class ControllerParameters(ParameterGroup):
-    """Parameters of `/controller_server` (regulated pure pursuit and its goal and progress checkers)."""
-
-    controller_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of the velocity commands [Hz]."""
-    desired_linear_vel: Annotated[MetresPerSecond, Positive] | None = None
-    """Cruise speed [m/s]."""
-    lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Distance of the point that is followed [m]."""
-    min_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its lower bound when scaled by speed [m]."""
-    max_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its upper bound when scaled by speed [m]."""
-    lookahead_time: Annotated[Seconds, Positive] | None = None
-    """Time that the point lies ahead when scaled by speed [s]."""
-    rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
-    """Turn rate on the spot [rad/s]."""
-    xy_goal_tolerance: Annotated[Metres, Positive] | None = None
-    """Position tolerance of the goal checker [m]."""
-    yaw_goal_tolerance: Annotated[Radians, Positive] | None = None
-    """Heading tolerance of the goal checker [rad]."""
-    required_movement_radius: Annotated[Metres, Positive] | None = None
-    """Progress checker: movement that counts [m]."""
-    movement_time_allowance: Annotated[Seconds, Positive] | None = None
-    """Progress checker: time allowed for it [s]."""
+from twin.scenario.planners import PlannerParameters
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
 
 
 class CostmapParameters(ParameterGroup):
@@ -53,16 +19,34 @@ class CostmapParameters(ParameterGroup):
 
     resolution: Annotated[Metres, Positive] | None = None
     """Cell size [m]."""
+    width: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along x [m]."""
+    height: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along y [m]."""
+    footprint_padding: Annotated[Metres, NotNegative] | None = None
+    """Added to the footprint on every side [m]; the robot's own has 0.01 m already."""
     inflation_radius: Annotated[Metres, NotNegative] | None = None
     """Distance from obstacles within which cells cost [m]."""
     cost_scaling_factor: Annotated[float, Positive] | None = None
     """Decay of that cost [1/m]."""
     update_frequency: Annotated[Hertz, Positive] | None = None
     """Rate of updates [Hz]."""
+    obstacle_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    raytrace_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam clears cells [m]."""
+    inf_is_valid: bool | None = None
+    """Whether a beam without return (inf) clears cells."""
+    footprint_clearing_enabled: bool | None = None
+    """Whether the cells under the robot are free."""
+    keepout_before_inflation: bool | None = None
+    """Whether keep-out zones are inflated, so that no part of the robot enters them."""
+    range_topics: tuple[str, ...] | None = None
+    """Topics of sensor_msgs/Range for the range sensor layer."""
 
 
 class NavigatorParameters(ParameterGroup):
@@ -85,6 +69,10 @@ class NavigationConfig(StrictModel):
     """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
     """Overrides of the navigator."""
+    keepout_mask: NameOrPath | None = None
+    """Mask of the zones that no path may cross: a YAML file of map_server."""
+    speed_mask: NameOrPath | None = None
+    """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()

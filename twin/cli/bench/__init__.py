@@ -1,1 +1,18 @@
-"""`twin bench`: public navigation benchmarks, a module each."""
+"""`twin bench`: public benchmarks of navigation, a module each."""
+
+from __future__ import annotations
+
+import typer
+
+from twin.cli.bench.grid import grid
+from twin.cli.bench.slam import slam
+
+app = typer.Typer(no_args_is_help=True, help="Public benchmarks of navigation; exit code 1 below the bar.")
+
+_COMMANDS = (
+    ("grid", grid, "twin bench grid maze-32-32-2.json"),
+    ("slam", slam, "twin bench slam aces.npz csail.npz --out slam"),
+)
+
+for _name, _function, _example in _COMMANDS:
+    app.command(_name, no_args_is_help=True, epilog=f"Example: [bold]{_example}[/bold]")(_function)
