@@ -12,10 +12,12 @@ from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.runtime.overrides import overridden as overridden
 from twin.scenario.navigation import NavigationConfig
@@ -38,6 +40,8 @@ class NavigationParameters:
     planner_server: PlannerServerConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
+    navigator: BtNavigatorConfig
+    waypoints: WaypointFollowerConfig
 
 
 def navigation_parameters(
@@ -84,6 +88,8 @@ def navigation_parameters(
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
+        navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
+        waypoints=WaypointFollowerConfig(),
     )
 
 

@@ -16,6 +16,7 @@ from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
+from twin.runtime.nav2_parameters import with_file, with_plugins
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
@@ -37,7 +38,9 @@ def build_navigation(
     assert description.drive is not None
     localisation = context.config.localisation
     mapping = localisation is not None and localisation.type == "slam"
+    config = with_plugins(config, namespace)
     parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
+    parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
     build_commands(context, config.collision_monitor, pose, footprint)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
@@ -65,6 +68,8 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    navigator = BtNavigatorNode(bus, pose, namespace=namespace)
-    WaypointFollowerNode(bus, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
+    for sentence in not_understood:
+        navigator.node.get_logger().warn(sentence)
     return navigator

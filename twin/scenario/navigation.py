@@ -50,6 +50,15 @@ class CostmapParameters(ParameterGroup):
     """Topics of sensor_msgs/Range for the range sensor layer."""
 
 
+class NavigatorParameters(ParameterGroup):
+    """Parameters of `/bt_navigator`."""
+
+    default_nav_to_pose_bt_xml: NameOrPath | None = None
+    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
+    default_nav_through_poses_bt_xml: NameOrPath | None = None
+    """The same for goals through poses."""
+
+
 class NavigationConfig(StrictModel):
     """The navigation of one robot; `navigation: {}` takes every default."""
 
@@ -59,6 +68,10 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
     collision_monitor: CollisionMonitorParameters | None = None
     """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
+    params_file: NameOrPath | None = None
+    """A Nav2 parameter file; keys below go before its values."""
+    navigator: NavigatorParameters = NavigatorParameters()
+    """Overrides of the navigator."""
     keepout_mask: NameOrPath | None = None
     """Mask of the zones that no path may cross: a YAML file of map_server."""
     speed_mask: NameOrPath | None = None
