@@ -98,6 +98,8 @@ def roll_out(
     check: NDArray[np.int64],
     circles: F32,
     outline: F32,
+    padded: F32,
+    near_cost: np.float32,
     goal: F32,
     extra: F32,
     state: F32,
@@ -121,6 +123,8 @@ def roll_out(
         check: Steps between looks at the costmap (0: none), least cost of a collision, circles' least cost.
         circles: Shape (n, 2): centres of circles that cover the footprint, in cells.
         outline: Shape (n, 2): points of the outline, in cells.
+        padded: The same of the outline with its padding.
+        near_cost: Added to CostCritic where only the padding touches something.
         goal: x, y, yaw; whether GoalCritic, GoalAngleCritic count; whether the opposite heading is as good;
             length of the local path.
         extra: Whether TwirlingCritic counts; dead bands of v and w.
@@ -226,9 +230,11 @@ def roll_out(
             cost = int(costs[int(uy), int(ux)])
             if cost == 0 or cost == 255:
                 continue
-            if cost >= check[1] and collides(costs, cost, circles, check[2], outline, ux, uy, c[k], s[k]):
-                hit[k] = 1
-                continue
+            if cost >= check[1] and collides(costs, cost, circles, check[2], padded, ux, uy, c[k], s[k]):
+                if padded.shape[0] == 0 or cost == 254 or outline_hits(costs, outline, ux, uy, c[k], s[k]):
+                    hit[k] = 1
+                    continue
+                raw[COST, k] += near_cost
             raw[COST, k] += tables[0, cost]
             raw[OBSTACLES, k] += tables[1, cost]
             raw[SPEED, k] += max(abs(v[k]) - tables[2, cost], zero)
