@@ -68,9 +68,11 @@ def navigation_parameters(
         raytrace_max_range=5.0,
     )
     rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    # No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
     smoother = VelocitySmootherConfig(
-        linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-        angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+        linear=_limits(linear, 0.8, 1.2, drive.max_linear_acceleration),
+        angular=_limits(angular, 2.0, 3.0, drive.max_angular_acceleration),
+        scale_velocities=True,
     )
     return NavigationParameters(
         smoother=smoother,
@@ -90,6 +92,14 @@ def navigation_parameters(
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
+    )
+
+
+def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
+    return AxisLimits(
+        max_velocity=speed,
+        max_acceleration=min(acceleration, drive or acceleration),
+        max_deceleration=min(deceleration, drive or deceleration),
     )
 
 

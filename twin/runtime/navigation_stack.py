@@ -42,7 +42,7 @@ def build_navigation(
     parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    build_commands(context, config.collision_monitor, pose, footprint)
+    build_commands(context, config.collision_monitor, pose, footprint, parameters.smoother.linear)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)

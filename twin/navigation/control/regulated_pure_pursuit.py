@@ -81,6 +81,10 @@ class RegulatedPurePursuitConfig:
     """[m/s²]"""
     min_distance_to_obstacle: float = -1.0
     """Shortest way that is checked for collisions, also where it takes longer; negative: none [m]."""
+    max_linear_decel: float = 0.0
+    """Of the robot: the way to a stop from the present speed is always checked; 0: it is not [m/s²]."""
+    reaction_time: float = 0.3
+    """Part of the way to a stop: age of what the costmap shows, and a command's way to the wheels [s]."""
 
 
 @dataclass(kw_only=True)
@@ -198,7 +202,7 @@ class RegulatedPurePursuit:
             w = v * curvature
         self._stopped = self._cancelling and v == 0.0
         if costmap is not None and config.use_collision_detection:
-            self._check(costmap_pose or pose, v, w, distance, costmap)
+            self._check(costmap_pose or pose, v, w, distance, self._way_to_stop(velocity[0]), costmap)
         return v, w
 
     def _curvature_point(self, local: Array) -> tuple[float, float]:
@@ -248,8 +252,18 @@ class RegulatedPurePursuit:
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
 
-    def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
-        """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""
+    def _way_to_stop(self, v: float) -> float:
+        """Return how far the robot still drives at least [m]."""
+        config = self.config
+        if config.max_linear_decel <= 0.0:
+            return config.min_distance_to_obstacle
+        way = abs(v) * config.reaction_time + v * v / (2.0 * config.max_linear_decel)
+        return max(way, config.min_distance_to_obstacle)
+
+    def _check(
+        self, pose: Pose2, v: float, w: float, carrot_dist: float, least: float, costmap: Costmap
+    ) -> None:
+        """Project the command up to the carrot, a cell at a time (Nav2's CollisionChecker), or `least`."""
         if abs(v) < 0.01 and abs(w) > 0.01:
             step = 2.0 * math.asin(min(1.0, costmap.resolution / 2.0 / self._radius)) / abs(w)
         elif abs(v) >= 0.01:
@@ -257,9 +271,9 @@ class RegulatedPurePursuit:
         else:
             return
         allowed = self.config.max_allowed_time_to_collision_up_to_carrot
-        if self.config.min_distance_to_obstacle > 0.0 and abs(v) >= 0.01:
-            allowed = max(allowed, self.config.min_distance_to_obstacle / abs(v))
-            carrot_dist = max(carrot_dist, self.config.min_distance_to_obstacle)
+        if least > 0.0 and abs(v) >= 0.01:
+            allowed = max(allowed, least / abs(v))
+            carrot_dist = max(carrot_dist, least)
         hit = steps_to_collision(
             costmap.costs,
             self.footprint,

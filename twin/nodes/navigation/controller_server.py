@@ -113,6 +113,8 @@ class ControllerServerNode:
             node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
+        self._preempted: _Task | None = None
+        """What was followed until another path came, which is no new chance: its patience is used up, too."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
@@ -172,6 +174,7 @@ class ControllerServerNode:
             if stop:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
             if finished:
+                self._preempted = None
                 for controller in self.controllers.values():
                     controller.reset()
 
@@ -185,14 +188,16 @@ class ControllerServerNode:
         handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
         handler.accept(path)
         controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
-        return _Task(
+        before = self._preempted
+        self._preempted = task = _Task(
             path=path,
             controller=controller,
             goal_checker=create_goal_checker(goal_checker),
-            progress_checker=create_progress_checker(progress),
+            progress_checker=before.progress_checker if before else create_progress_checker(progress),
             handler=handler,
-            last_valid_ns=self.node.now_ns,
+            last_valid_ns=before.last_valid_ns if before else self.node.now_ns,
         )
+        return task
 
     def _control(self, task: _Task, handle: GoalHandle) -> bool:
         """Command the base once; return whether the goal is reached."""
