@@ -49,6 +49,10 @@ class VelocitySmoother:
         at_rest = self._linear.value == 0.0 and self._angular.value == 0.0
         return at_rest and self._age > self.config.velocity_timeout
 
+    def reset(self) -> None:
+        """Start from rest."""
+        self._linear.value = self._angular.value = 0.0
+
     def update(self, dt: float) -> tuple[float, float]:
         """Advance by `dt` [s] and return the smoothed command [m/s, rad/s]."""
         timed_out = self._age > self.config.velocity_timeout

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import LidarSpec
 from twin.navigation.control.collision_monitor import (
@@ -29,7 +30,7 @@ def build_commands(
     config: CollisionMonitorParameters,
     pose: RobotPose,
     footprint: Array,
-    limits: AxisLimits,
+    brakes: VelocitySmootherConfig,
 ) -> None:
     """Create the multiplexer, and behind it the collision monitor if the robot has what it looks with.
 
@@ -38,7 +39,7 @@ def build_commands(
         config: What the scenario overrides.
         pose: What the robot believes about its pose.
         footprint: Corners in the base frame, shape (n, 2) [m].
-        limits: Of its linear velocity.
+        brakes: What its drive can do.
     """
     bus, namespace = context.bus, context.namespace
     sensors = context.handle.description.sensors
@@ -47,7 +48,7 @@ def build_commands(
         TwistMuxNode(bus, namespace=namespace)
         return
     TwistMuxNode(bus, output=_GUARDED, namespace=namespace)
-    polygons: tuple[MonitorPolygon, ...] = (_approach(limits),)
+    polygons: tuple[MonitorPolygon, ...] = (_approach(brakes.linear),)
     if config.polygons is not None:
         polygons = tuple(MonitorPolygon(**polygon.model_dump()) for polygon in config.polygons)
     CollisionMonitorNode(
@@ -55,6 +56,7 @@ def build_commands(
         pose,
         footprint,
         CollisionMonitorConfig(polygons=polygons, source_timeout_ns=round(config.source_timeout * 1e9)),
+        brakes=brakes,
         cmd_vel_in=_GUARDED,
         scan_topics=(_SCAN,) if scans else (),
         range_topics=config.range_topics,

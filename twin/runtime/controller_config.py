@@ -28,7 +28,7 @@ from twin.runtime.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 
 _PERIOD_NS = 60_000_000
-_PATIENCE_NS = 6_000_000_000
+_PATIENCE_NS = 4_000_000_000
 """How long somebody in the way is waited for: until they have walked past, or are planned around."""
 _TOLERANCE = 0.05
 """Of position [m] and heading [rad]: what docking can start from."""
@@ -84,6 +84,7 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
         max_linear_decel=_braking(smoother.linear),
+        cost_scaling_dist=0.7,
     )
 
 

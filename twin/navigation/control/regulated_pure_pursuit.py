@@ -196,7 +196,9 @@ class RegulatedPurePursuit:
             v, w = 0.0, self._rotate(bearing, velocity[1], dt)
         else:
             curvature = 2.0 * y / (x * x + y * y) if x * x + y * y > 0.001 else 0.0
-            v = sign * self._regulate(curvature, costmap_pose or pose, local[-1], ahead.length, costmap)
+            v = sign * self._regulate(
+                curvature, costmap_pose or pose, local, ahead.length, costmap, velocity[0]
+            )
             if self._cancelling and config.use_cancel_deceleration:
                 v = sign * max(0.0, sign * velocity[0] - config.cancel_deceleration * dt)
             w = v * curvature
@@ -231,7 +233,13 @@ class RegulatedPurePursuit:
         )
 
     def _regulate(
-        self, curvature: float, pose: Pose2, end: Array, length: float, costmap: Costmap | None
+        self,
+        curvature: float,
+        pose: Pose2,
+        local: Array,
+        length: float,
+        costmap: Costmap | None,
+        v_now: float,
     ) -> float:
         """Return the linear velocity: slower in turns, near obstacles and at the end."""
         config = self.config
@@ -239,16 +247,13 @@ class RegulatedPurePursuit:
         if config.use_regulated_linear_velocity_scaling and curvature != 0.0:
             v = min(v, limit * abs(1.0 / curvature) / config.regulated_linear_scaling_min_radius)
         if config.use_cost_regulated_linear_velocity_scaling and costmap is not None:
-            cost = costmap.cost_at(pose.x, pose.y)
-            if cost not in (NO_INFORMATION, FREE_SPACE):
-                decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
-                clearance = costmap.inscribed_radius - decay / costmap.cost_scaling_factor
-                if clearance < config.cost_scaling_dist:
-                    v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
+            clearance = self._clearance(pose, local, costmap, self._way_to_stop(v_now))
+            if clearance < config.cost_scaling_dist:
+                v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
         v = max(v, config.regulated_linear_scaling_min_speed)
         approach = config.approach_velocity_scaling_dist
         if length < approach:
-            remaining = math.hypot(end[0], end[1])
+            remaining = math.hypot(*local[-1])
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
 
@@ -259,6 +264,19 @@ class RegulatedPurePursuit:
             return config.min_distance_to_obstacle
         way = abs(v) * config.reaction_time + v * v / (2.0 * config.max_linear_decel)
         return max(way, config.min_distance_to_obstacle)
+
+    def _clearance(self, pose: Pose2, local: Array, costmap: Costmap, way: float) -> float:
+        """Return how near the robot and the next `way` of its path come to an obstacle, from the costs."""
+        points = [(pose.x, pose.y)]
+        if way > 0.0:
+            near = local[np.hypot(local[:, 0], local[:, 1]) < way]
+            points += [tuple(point) for point in pose.apply(near[::2]).tolist()]
+        costs = [costmap.cost_at(x, y) for x, y in points]
+        cost = max((cost for cost in costs if cost not in (NO_INFORMATION, FREE_SPACE)), default=FREE_SPACE)
+        if cost == FREE_SPACE:
+            return math.inf
+        decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
+        return costmap.inscribed_radius - decay / costmap.cost_scaling_factor
 
     def _check(
         self, pose: Pose2, v: float, w: float, carrot_dist: float, least: float, costmap: Costmap
