@@ -16,6 +16,7 @@ from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitC
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
@@ -39,6 +40,7 @@ class NavigationParameters:
     planner: PlannerConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
+    navigator: BtNavigatorConfig
 
 
 def navigation_parameters(
@@ -65,8 +67,16 @@ def navigation_parameters(
     rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
     return NavigationParameters(
         smoother=VelocitySmootherConfig(
-            linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-            angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+            linear=AxisLimits(
+                max_velocity=linear,
+                max_acceleration=config.max_linear_acceleration or 0.8,
+                max_deceleration=config.max_linear_deceleration or 1.2,
+            ),
+            angular=AxisLimits(
+                max_velocity=angular,
+                max_acceleration=config.max_angular_acceleration or 2.0,
+                max_deceleration=config.max_angular_acceleration or 3.0,
+            ),
         ),
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
         global_costmap=replace(
@@ -79,6 +89,16 @@ def navigation_parameters(
         planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
         controller_server=_controller_server(config.controller.overrides(), linear, angular),
         behaviors=BehaviorConfig(footprint=polygon),
+        navigator=_navigator(config.navigator.overrides()),
+    )
+
+
+def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
+    defaults = BtNavigatorConfig()
+    return replace(
+        overridden(defaults, overrides),
+        bt_loop_duration_ns=_period_ns(overrides.get("bt_loop_frequency"), defaults.bt_loop_duration_ns),
+        replanning_period_ns=_period_ns(overrides.get("replanning_frequency"), defaults.replanning_period_ns),
     )
 
 

@@ -46,4 +46,4 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    return BtNavigatorNode(bus, pose, namespace=namespace)
+    return BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)

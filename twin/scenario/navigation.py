@@ -63,6 +63,23 @@ class CostmapParameters(ParameterGroup):
     """Range within which a beam marks obstacles [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam clears cells [m]."""
+    rolling_window: bool | None = None
+    """Whether the grid follows the robot, without a static map."""
+    width: Annotated[Metres, Positive] | None = None
+    """Extent of a rolling grid [m]."""
+    height: Annotated[Metres, Positive] | None = None
+    """Extent of a rolling grid [m]."""
+
+
+class NavigatorParameters(ParameterGroup):
+    """Parameters of `/bt_navigator`."""
+
+    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    """Rate of the behaviour tree's ticks [Hz]."""
+    replanning_frequency: Annotated[Hertz, Positive] | None = None
+    """How often the path is looked at, or planned anew [Hz]."""
+    keep_valid_path: bool | None = None
+    """Whether a path is kept while it is free; otherwise it is planned anew each time."""
 
 
 class NavigationConfig(StrictModel):
@@ -72,6 +89,14 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [m/s]; absent: the robot's own."""
     max_angular_speed: Annotated[RadiansPerSecond, Positive] | None = None
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
+    max_linear_acceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother when speeding up [m/s²]."""
+    max_linear_deceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother when braking [m/s²]."""
+    max_angular_acceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother, also when braking [rad/s²]."""
+    navigator: NavigatorParameters = NavigatorParameters()
+    """Overrides of the navigator."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()

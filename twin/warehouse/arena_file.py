@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -27,6 +28,8 @@ class Hall(StrictModel):
     y: Interval
     wall_height: Length = 1.0
     wall_thickness: Length = 0.2
+    walls: bool = True
+    """False: a floor of this extent, open on all sides."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Hall:
@@ -117,6 +120,15 @@ class ObstacleEntry(StrictModel):
         return Rectangle(Pose2(*self.pose), self.size[0], self.size[1])
 
 
+class CylindersEntry(StrictModel):
+    """Cylinders of one size that stand upright; they may touch each other."""
+
+    centres: Annotated[tuple[Point, ...], Field(min_length=1)]
+    radius: Length
+    height: Length = 1.0
+    colour: Colour = "grey"
+
+
 class ToteKind(StrictModel):
     """What all totes have in common."""
 
@@ -187,6 +199,7 @@ class ArenaFile(StrictModel):
     racks: dict[str, RackEntry] = Field(default_factory=dict)
     pallets: dict[str, PalletEntry] = Field(default_factory=dict)
     obstacles: dict[str, ObstacleEntry] = Field(default_factory=dict)
+    cylinders: dict[str, CylindersEntry] = Field(default_factory=dict)
     tote: ToteKind = ToteKind()
     totes: dict[str, ToteEntry] = Field(default_factory=dict)
     stock: Stock | None = None
@@ -206,7 +219,7 @@ def slot_count(length: float, spacing: float) -> int:
     return int(length / spacing + 1e-9)
 
 
-_SECTIONS = ("partitions", "pillars", "racks", "pallets", "obstacles", "totes", "zones")
+_SECTIONS = ("partitions", "pillars", "racks", "pallets", "obstacles", "cylinders", "totes", "zones")
 
 
 def _names(arena: ArenaFile) -> Iterator[Fault]:
@@ -280,6 +293,12 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
     for loc, what, rectangle in _solids(arena):
         if not hall.contains(rectangle.corners):
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
+    for name, group in arena.cylinders.items():
+        for index, (x, y) in enumerate(group.centres):
+            if not Rectangle(hall.centre, hall.size_x - 2.0 * group.radius, hall.size_y - 2.0 * group.radius
+                             ).contains([(x, y)]):
+                loc = ("cylinders", name, "centres", index)
+                yield Fault(loc, f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})")
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]
@@ -289,6 +308,9 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
         for _, solid, rectangle in _solids(arena):
             if rectangle.contains([pose[:2]]):
                 yield Fault(loc, f"{what} is inside {solid}; move one of them")
+        for name, group in arena.cylinders.items():
+            if min(math.dist(pose[:2], centre) for centre in group.centres) <= group.radius:
+                yield Fault(loc, f"{what} is inside a cylinder of '{name}'; move one of them")
 
 
 def _overlaps(arena: ArenaFile) -> Iterator[Fault]:

@@ -40,6 +40,8 @@ class BtNavigatorConfig:
     """Time between ticks of the tree."""
     replanning_period_ns: int = 1_000_000_000
     """Time between checks whether the path still holds."""
+    keep_valid_path: bool = True
+    """Whether a path is kept while it is free; otherwise it is planned anew each time."""
     number_of_retries: int = 6
     """Recoveries before the goal is given up."""
     spin_angle: float = 1.57
@@ -156,7 +158,7 @@ class BtNavigatorNode:
         keep = sequence(
             "KeepValidPath",
             [
-                Condition("HasPath", lambda: self._path is not None),
+                Condition("HasPath", lambda: self._path is not None and self.config.keep_valid_path),
                 CallService(
                     "IsPathValid",
                     self._is_path_valid,

@@ -1,0 +1,59 @@
+"""Runs worlds, each as the scenario that is written for it, in processes beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+from twin.benchmarks.barn.referee import Referee, Trial
+from twin.benchmarks.barn.scenarios import BarnOptions, write
+from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
+from twin.runtime import run
+from twin.scenario import schema
+
+
+def run_world(
+    world: BarnWorld, rules: BarnSet, options: BarnOptions, folder: Path, *, record: bool = False
+) -> Trial:
+    """Write a world's files into `folder`, drive through it, and return how it went."""
+    path = write(folder, world, rules, options)
+    scenario = schema.load(path, dict(options.overrides))
+    referee = Referee(world, rules)
+    verdict = run(scenario, out=folder, record=record, watch=referee.watch)
+    return referee.trial(
+        recoveries=int(verdict.metrics["recoveries"]), real_time_factor=verdict.metrics["real_time_factor"]
+    )
+
+
+def run_worlds(
+    rules: BarnSet, options: BarnOptions, folder: Path, *, workers: int, record: bool = False
+) -> Iterator[Trial]:
+    """Yield the trial of each world as it ends.
+
+    Args:
+        rules: The worlds and their rules.
+        options: Of all runs.
+        folder: Each world gets a folder in it.
+        workers: Processes at a time.
+        record: Whether to write Rerun recordings.
+    """
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        futures = [
+            pool.submit(
+                run_world,
+                world,
+                BarnSet(**{**vars(rules), "worlds": ()}),
+                options,
+                folder / f"world_{world.id:03d}",
+                record=record,
+            )
+            for world in rules.worlds
+        ]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            for future in futures:
+                future.cancel()
