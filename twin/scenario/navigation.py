@@ -19,6 +19,8 @@ class PlannerParameters(ParameterGroup):
     """How far from the requested goal a plan may end [m]."""
     allow_unknown: bool | None = None
     """Whether a plan may cross unknown cells."""
+    cost_factor: Annotated[float, NotNegative] | None = None
+    """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
 
 
 class ControllerParameters(ParameterGroup):
@@ -36,6 +38,18 @@ class ControllerParameters(ParameterGroup):
     """Its upper bound when scaled by speed [m]."""
     lookahead_time: Annotated[Seconds, Positive] | None = None
     """Time that the point lies ahead when scaled by speed [s]."""
+    regulated_linear_scaling_min_radius: Annotated[Metres, Positive] | None = None
+    """Turns tighter than this are driven slower [m]."""
+    regulated_linear_scaling_min_speed: Annotated[MetresPerSecond, Positive] | None = None
+    """But no slower than this, there and near obstacles [m/s]."""
+    cost_scaling_dist: Annotated[Metres, Positive] | None = None
+    """Closer to an obstacle than this the robot slows down [m]."""
+    cost_scaling_gain: Annotated[float, Positive] | None = None
+    """Of that slowing down."""
+    use_rotate_to_heading: bool | None = None
+    """Whether the robot turns on the spot where the path starts or ends in another direction."""
+    max_allowed_time_to_collision_up_to_carrot: Annotated[Seconds, Positive] | None = None
+    """A command that would collide within this is not given [s]."""
     rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
     """Turn rate on the spot [rad/s]."""
     xy_goal_tolerance: Annotated[Metres, Positive] | None = None

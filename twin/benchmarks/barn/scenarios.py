@@ -71,7 +71,7 @@ def scenario(world: BarnWorld, rules: BarnSet, options: BarnOptions) -> dict[str
         "model": ROBOT,
         "start": "start",
         "command_latency": options.command_latency,
-        "localisation": {"type": "odometry"},
+        "localisation": {"type": "odometry", "use_imu": True},
         "navigation": navigation(options),
     }
     if not options.noise:
@@ -113,7 +113,7 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
         "max_linear_deceleration": 3.0,
         "max_angular_acceleration": 8.0,
         "navigator": {"bt_loop_frequency": 50.0, "replanning_frequency": 5.0, "keep_valid_path": False},
-        "planner": {"tolerance": 0.5, "allow_unknown": True},
+        "planner": {"tolerance": 0.5, "allow_unknown": True, "cost_factor": 6.0},
         "global_costmap": {
             "rolling_window": True,
             "width": 22.0,
@@ -135,10 +135,14 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
         },
         "controller": {
             "controller_frequency": 25.0,
-            "desired_linear_vel": options.max_speed,
-            "min_lookahead_dist": 0.4,
-            "max_lookahead_dist": 1.0,
+            "desired_linear_vel": min(1.4, options.max_speed),
+            "min_lookahead_dist": 0.35,
+            "max_lookahead_dist": 0.8,
             "lookahead_time": 0.5,
+            "regulated_linear_scaling_min_radius": 0.9,
+            "regulated_linear_scaling_min_speed": 0.3,
+            "cost_scaling_dist": 0.6,
+            "cost_scaling_gain": 1.0,
             "xy_goal_tolerance": 0.25,
             "yaw_goal_tolerance": 3.14,
         },
