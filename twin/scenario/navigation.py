@@ -50,6 +50,8 @@ class ControllerParameters(ParameterGroup):
     """Whether the robot turns on the spot where the path starts or ends in another direction."""
     max_allowed_time_to_collision_up_to_carrot: Annotated[Seconds, Positive] | None = None
     """A command that would collide within this is not given [s]."""
+    turn_before_collision: bool | None = None
+    """Where the arc to the followed point is blocked: whether to turn towards it on the spot or to creep."""
     rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
     """Turn rate on the spot [rad/s]."""
     xy_goal_tolerance: Annotated[Metres, Positive] | None = None
@@ -77,6 +79,8 @@ class CostmapParameters(ParameterGroup):
     """Range within which a beam marks obstacles [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam clears cells [m]."""
+    robot_radius: Annotated[Metres, Positive] | None = None
+    """Takes the robot as a circle of this radius instead of by its footprint [m]."""
     rolling_window: bool | None = None
     """Whether the grid follows the robot, without a static map."""
     width: Annotated[Metres, Positive] | None = None

@@ -61,6 +61,11 @@ class RegulatedPurePursuitConfig:
     use_collision_detection: bool = True
     max_allowed_time_to_collision_up_to_carrot: float = 1.0
     """[s]"""
+    turn_before_collision: bool = False
+    """Where the arc to the lookahead point is blocked: whether to turn towards it on the spot, or to creep along
+    the arc, before giving up (ours, not Nav2's)."""
+    creep_speed: float = 0.15
+    """Of that creeping [m/s]."""
     xy_goal_tolerance: float = 0.25
     """The goal checker's: closer than this the robot only turns to the goal's heading [m]."""
     max_robot_pose_search_dist: float = 3.0
@@ -137,9 +142,13 @@ class RegulatedPurePursuit:
             curvature = 2.0 * y / distance**2 if distance**2 > 0.001 else 0.0
             v = self._regulate(curvature, costmap_pose or pose, local, costmap)
             w = v * curvature
-        if costmap is not None and config.use_collision_detection:
-            self._check(costmap_pose or pose, v, w, distance, costmap)
-        return v, w
+        if costmap is None or not config.use_collision_detection:
+            return v, w
+        commands = [(v, w)]
+        if config.turn_before_collision and v > 0.0:
+            commands.append((0.0, self._rotate(bearing, velocity[1], dt)))
+            commands.append((config.creep_speed, w * config.creep_speed / v))
+        return self._first_free(commands, costmap_pose or pose, distance, costmap)
 
     def _accept(self, path: Array) -> None:
         """Start over when the path is another array than last time."""
@@ -194,6 +203,23 @@ class RegulatedPurePursuit:
             remaining = math.hypot(local[-1, 0], local[-1, 1])
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
+
+    def _first_free(
+        self, commands: list[tuple[float, float]], pose: Pose2, carrot_dist: float, costmap: Costmap
+    ) -> tuple[float, float]:
+        """Return the first command that does not collide; raises NoValidControl for the first one if all do."""
+        blocked: NoValidControl | None = None
+        for v, w in commands:
+            if blocked is not None and abs(v) < 0.01 and abs(w) < 0.05:
+                continue  # standing still leads nowhere
+            try:
+                self._check(pose, v, w, carrot_dist, costmap)
+            except NoValidControl as failure:
+                blocked = blocked or failure
+            else:
+                return v, w
+        assert blocked is not None
+        raise blocked
 
     def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
         """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""

@@ -60,6 +60,9 @@ class ControllerServerNode:
         self._controller = RegulatedPurePursuit(config=self.config.controller, footprint=footprint)
         declare_config(self.node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
+        self._finished = True
+        """False while a goal is followed, and after one that was preempted by the next."""
+        self._last_valid_ns = 0
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = self.node.create_publisher(PointStamped, "lookahead_point", 1)
         self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
@@ -84,13 +87,16 @@ class ControllerServerNode:
         goal_checker = SimpleGoalChecker(config=self.config.goal_checker)
         progress_checker = SimpleProgressChecker(config=self.config.progress_checker)
         dt = self.config.controller_period_ns * 1e-9
-        due = last_valid = self.node.now_ns
+        due = self.node.now_ns
+        if self._finished:
+            self._last_valid_ns = due
+        self._finished = False
         finished = False
         try:
             while True:
                 if handle.is_cancel_requested:
                     handle.canceled()
-                    finished = True
+                    finished = self._finished = True
                     return new(FollowPath.Result, error_msg="canceled")
                 if self.node.now_ns < due:
                     yield
@@ -98,15 +104,15 @@ class ControllerServerNode:
                 due += self.config.controller_period_ns
                 outcome = self._control(path, goal_checker, progress_checker, dt)
                 if outcome is None:
-                    last_valid = self.node.now_ns
+                    self._last_valid_ns = self.node.now_ns
                 elif outcome.error_code == 0:
-                    finished = True
+                    finished = self._finished = True
                     return outcome
                 elif (
                     outcome.error_code != _NO_VALID_CONTROL
-                    or self.node.now_ns - last_valid > self.config.failure_tolerance_ns
+                    or self.node.now_ns - self._last_valid_ns > self.config.failure_tolerance_ns
                 ):
-                    finished = True
+                    finished = self._finished = True
                     handle.abort()
                     return outcome
                 yield
