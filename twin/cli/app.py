@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
+from twin.cli import batch, bench, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.console import print_error
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
@@ -24,7 +24,7 @@ app = typer.Typer(
 )
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_SCENARIOS, _ROBOTS, _GRAPH = "Scenarios", "Robot files", "ROS 2 graph"
+_SCENARIOS, _ROBOTS, _GRAPH, _NAVIGATION = "Scenarios", "Robot files", "ROS 2 graph", "Navigation"
 
 _COMMANDS = (
     ("run", run.run, _SCENARIOS, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
@@ -65,6 +65,8 @@ for _name, _function, _panel, _example in _COMMANDS:
 
 for _name, _group in _GROUPS:
     app.add_typer(_group, name=_name, rich_help_panel=_GRAPH)
+
+app.add_typer(bench.app, name="bench", rich_help_panel=_NAVIGATION)
 
 
 @app.callback()

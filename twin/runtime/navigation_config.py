@@ -132,7 +132,9 @@ def _costmap(
     return CostmapNodeConfig(
         name=name,
         frame=frame,
-        layers=overridden(replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides),
+        layers=overridden(
+            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
+        ),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )
 

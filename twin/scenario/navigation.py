@@ -52,6 +52,10 @@ class ControllerParameters(ParameterGroup):
     """A command that would collide within this is not given [s]."""
     turn_before_collision: bool | None = None
     """Where the arc to the followed point is blocked: whether to turn towards it on the spot or to creep."""
+    rotate_to_heading_min_angle: Annotated[Radians, Positive] | None = None
+    """The robot turns on the spot towards points further aside than this [rad]."""
+    max_angular_accel: Annotated[float, Positive] | None = None
+    """Of that turning [rad/s²]."""
     rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
     """Turn rate on the spot [rad/s]."""
     xy_goal_tolerance: Annotated[Metres, Positive] | None = None

@@ -63,7 +63,7 @@ class Hardware:
         config: HardwareConfig | None = None,
         command_latency: float = 0.0,
     ) -> None:
-        """Bind the names of a robot to a compiled model; commands take `command_latency` [s] to their motors."""
+        """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
         self._data = data
         self._timestep = float(model.opt.timestep)

@@ -295,10 +295,13 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
     for name, group in arena.cylinders.items():
         for index, (x, y) in enumerate(group.centres):
-            if not Rectangle(hall.centre, hall.size_x - 2.0 * group.radius, hall.size_y - 2.0 * group.radius
-                             ).contains([(x, y)]):
+            if not Rectangle(
+                hall.centre, hall.size_x - 2.0 * group.radius, hall.size_y - 2.0 * group.radius
+            ).contains([(x, y)]):
                 loc = ("cylinders", name, "centres", index)
-                yield Fault(loc, f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})")
+                yield Fault(
+                    loc, f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})"
+                )
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]

@@ -1,4 +1,4 @@
-"""Who watches a run and says how it ended, by the rules of the challenge (its `run.py` and `report_test.py`)."""
+"""Who watches a run and says how it ended, by the rules of the challenge (its `run.py`)."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ class Trial:
     """How one world went."""
 
     world: int
+    seed: int
     outcome: Outcome
     reason: str
     """Empty for a success."""
@@ -107,7 +108,9 @@ class Referee:
             if math.dist(pose[:2], self._rules.goal) <= self._rules.goal_radius:
                 return self._end("success", "", elapsed, run)
         if elapsed >= self._rules.timeout_s:
-            return self._end("timeout", f"after {elapsed:.0f} s at ({pose.x:.2f}, {pose.y:.2f})", elapsed, run)
+            return self._end(
+                "timeout", f"after {elapsed:.0f} s at ({pose.x:.2f}, {pose.y:.2f})", elapsed, run
+            )
         if run.parts.mission.done:
             return self._end("timeout", f"gave up: {run.parts.mission.reason}", elapsed, run)
         return False
@@ -120,11 +123,12 @@ class Referee:
             self.drift = believed.distance(true)
         return True
 
-    def trial(self, *, recoveries: int, real_time_factor: float) -> Trial:
+    def trial(self, *, seed: int, recoveries: int, real_time_factor: float) -> Trial:
         """Return the result."""
         optimal = self._world.optimal_time
         return Trial(
             world=self._world.id,
+            seed=seed,
             outcome=self.outcome,
             reason=self.reason,
             score=score(self.outcome, self.time_s, optimal),

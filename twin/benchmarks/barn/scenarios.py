@@ -20,7 +20,9 @@ class BarnOptions:
     """What may be different from one benchmark run to the next."""
 
     seed: int = 1
-    """Of all noise."""
+    """Of all noise, in the first run of a world."""
+    runs: int = 1
+    """Of each world; each has the seed after the one before."""
     max_speed: float = 2.0
     """Of the robot [m/s]."""
     noise: bool = True
@@ -146,6 +148,9 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
             "cost_scaling_dist": 0.6,
             "cost_scaling_gain": 1.0,
             "turn_before_collision": True,
+            "rotate_to_heading_min_angle": 1.2,
+            "rotate_to_heading_angular_vel": 2.0,
+            "max_angular_accel": 6.0,
             "xy_goal_tolerance": 0.25,
             "yaw_goal_tolerance": 3.14,
         },

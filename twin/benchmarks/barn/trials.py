@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -23,7 +25,9 @@ def run_world(
     referee = Referee(world, rules)
     verdict = run(scenario, out=folder, record=record, watch=referee.watch)
     return referee.trial(
-        recoveries=int(verdict.metrics["recoveries"]), real_time_factor=verdict.metrics["real_time_factor"]
+        seed=options.seed,
+        recoveries=int(verdict.metrics["recoveries"]),
+        real_time_factor=verdict.metrics["real_time_factor"],
     )
 
 
@@ -35,20 +39,24 @@ def run_worlds(
     Args:
         rules: The worlds and their rules.
         options: Of all runs.
-        folder: Each world gets a folder in it.
+        folder: Each run gets a folder in it.
         workers: Processes at a time.
         record: Whether to write Rerun recordings.
     """
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    common = replace(rules, worlds=())  # a world need not know the others
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts
+    ) as pool:
         futures = [
             pool.submit(
                 run_world,
                 world,
-                BarnSet(**{**vars(rules), "worlds": ()}),
-                options,
-                folder / f"world_{world.id:03d}",
+                common,
+                replace(options, seed=seed, runs=1),
+                folder / (f"world_{world.id:03d}" + (f"_seed_{seed}" if options.runs > 1 else "")),
                 record=record,
             )
+            for seed in range(options.seed, options.seed + options.runs)
             for world in rules.worlds
         ]
         try:
@@ -57,3 +65,8 @@ def run_worlds(
         finally:
             for future in futures:
                 future.cancel()
+
+
+def _ignore_interrupts() -> None:
+    """Leave Ctrl-C to the process that waits for this one; the present world is driven to its end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

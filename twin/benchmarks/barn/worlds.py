@@ -1,11 +1,11 @@
-"""The worlds of BARN (Perille, Truong, Xiao, Stone 2020) as cylinders, read from a file of format `twin-barn/1`."""
+"""The worlds of BARN (Perille, Truong, Xiao, Stone 2020), read from a file of format `twin-barn/1`."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,9 +63,11 @@ class BarnSet:
         known = {world.id: world for world in self.worlds}
         for wanted in ids:
             if wanted not in known:
-                raise BenchmarkError(f"no world {wanted} in the file; {nearest(str(wanted), map(str, known))}")
+                raise BenchmarkError(
+                    f"no world {wanted} in the file; {nearest(str(wanted), map(str, known))}"
+                )
         chosen = tuple(known[wanted] for wanted in dict.fromkeys(ids))
-        return BarnSet(**{**vars(self), "worlds": chosen})
+        return replace(self, worlds=chosen)
 
 
 def load(path: Path) -> BarnSet:

@@ -62,8 +62,8 @@ class RegulatedPurePursuitConfig:
     max_allowed_time_to_collision_up_to_carrot: float = 1.0
     """[s]"""
     turn_before_collision: bool = False
-    """Where the arc to the lookahead point is blocked: whether to turn towards it on the spot, or to creep along
-    the arc, before giving up (ours, not Nav2's)."""
+    """Where the arc to the lookahead point is blocked: whether to turn towards that point on the spot, or to
+    creep along the arc, before giving up (ours, not Nav2's)."""
     creep_speed: float = 0.15
     """Of that creeping [m/s]."""
     xy_goal_tolerance: float = 0.25
@@ -207,7 +207,7 @@ class RegulatedPurePursuit:
     def _first_free(
         self, commands: list[tuple[float, float]], pose: Pose2, carrot_dist: float, costmap: Costmap
     ) -> tuple[float, float]:
-        """Return the first command that does not collide; raises NoValidControl for the first one if all do."""
+        """Return the first command that does not collide; raises NoValidControl if all do."""
         blocked: NoValidControl | None = None
         for v, w in commands:
             if blocked is not None and abs(v) < 0.01 and abs(w) < 0.05:
