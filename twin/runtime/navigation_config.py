@@ -14,6 +14,7 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.planning.commitment import CommitmentConfig
 from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
@@ -38,6 +39,7 @@ class NavigationParameters:
     global_costmap: CostmapNodeConfig
     local_costmap: CostmapNodeConfig
     planner: PlannerConfig
+    commitment: CommitmentConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
     navigator: BtNavigatorConfig
@@ -87,6 +89,7 @@ def navigation_parameters(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
         planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
+        commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         controller_server=_controller_server(config.controller.overrides(), linear, angular),
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=_navigator(config.navigator.overrides()),

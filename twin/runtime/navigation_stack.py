@@ -37,7 +37,14 @@ def build_navigation(
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
     local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
-    PlannerServerNode(bus, pose, global_costmap, config=parameters.planner, namespace=namespace)
+    PlannerServerNode(
+        bus,
+        pose,
+        global_costmap,
+        config=parameters.planner,
+        commitment=parameters.commitment,
+        namespace=namespace,
+    )
     ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from pydantic import Field
+
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
@@ -19,6 +21,10 @@ class PlannerParameters(ParameterGroup):
     """How far from the requested goal a plan may end [m]."""
     allow_unknown: bool | None = None
     """Whether a plan may cross unknown cells."""
+    commitment_cost: Annotated[int, Field(ge=0, le=252)] | None = None
+    """Added to the cost of each cell off the last path, so that routes are not changed lightly."""
+    commitment_width: Annotated[Metres, Positive] | None = None
+    """To each side of the last path that counts as on it [m]."""
     cost_factor: Annotated[float, NotNegative] | None = None
     """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
 

@@ -14,8 +14,10 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.srvs import IsPathValid
+from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
 from twin.navigation.failures import PlanningFailure
+from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
 from twin.nodes.messages import path_array, path_msg
@@ -29,6 +31,7 @@ class PlannerParameters:
     """Parameters of the server's plugins."""
 
     planner: PlannerConfig
+    commitment: CommitmentConfig
     smoother: SmootherConfig
 
 
@@ -43,6 +46,7 @@ class PlannerServerNode:
         *,
         config: PlannerConfig | None = None,
         smoother: SmootherConfig | None = None,
+        commitment: CommitmentConfig | None = None,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("planner_server", namespace)
@@ -50,8 +54,14 @@ class PlannerServerNode:
         self._costmap = costmap
         self._planner = Planner(config=config or PlannerConfig())
         self._smoother = SimpleSmoother(config=smoother or SmootherConfig())
-        parameters = PlannerParameters(planner=self._planner.config, smoother=self._smoother.config)
-        declare_config(self.node, parameters, self._reconfigure, {"planner": "GridBased"})
+        self._commitment = commitment or CommitmentConfig()
+        self._last: tuple[Pose2, Array] | None = None
+        """The goal of the last plan, and that plan."""
+        parameters = PlannerParameters(
+            planner=self._planner.config, commitment=self._commitment, smoother=self._smoother.config
+        )
+        names = {"planner": "GridBased", "commitment": "GridBased"}
+        declare_config(self.node, parameters, self._reconfigure, names)
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._execute)
@@ -59,6 +69,7 @@ class PlannerServerNode:
     def _reconfigure(self, parameters: PlannerParameters) -> None:
         """Plan the next path with other parameters."""
         self._planner.config = parameters.planner
+        self._commitment = parameters.commitment
         self._smoother = SimpleSmoother(config=parameters.smoother)
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
@@ -70,14 +81,18 @@ class PlannerServerNode:
             what = "map" if costmap is None else "localisation"
             return new(ComputePathToPose.Result, error_code=202, error_msg=f"no plan without {what}")
         yield
+        goal = pose2_from_pose(request.goal.pose)
+        if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
+            costmap = committed(costmap, self._last[1], self._commitment)
         try:
-            raw = self._planner.plan(costmap, start, pose2_from_pose(request.goal.pose))
+            raw = self._planner.plan(costmap, start, goal)
         except PlanningFailure as failure:
             handle.abort()
             return new(ComputePathToPose.Result, error_code=failure.error_code, error_msg=str(failure))
         smooth = self._smoother.smooth(raw, costmap)
         # A smooth path needs no point per cell; the message costs by the point.
         thinned = np.concatenate([smooth[:-1:2], smooth[-1:]])
+        self._last = (goal, thinned)
         path = path_msg(thinned, self._robot_pose.frames.map, self.node.now_ns)
         self._publisher.publish(path)
         return new(ComputePathToPose.Result, path=path, planning_time=duration(0))
