@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.strict_yaml import Fault, Faults, Kilograms, Metres, Radians, StrictModel
+from twin.strict_yaml import Fault, Faults, Kilograms, Metres, StrictModel
+from twin.warehouse.arena_types import Colour, Interval, Length, Point, PoseList
+from twin.warehouse.cylinders import CylindersEntry, outside
 from twin.warehouse.footprint import Rectangle, overlap
-
-Length = Annotated[Metres, Field(gt=0.0)]
-Point = tuple[Metres, Metres]
-PoseList = tuple[Metres, Metres, Radians]
-Interval = tuple[Metres, Metres]
-Colour = Literal["red", "yellow", "green", "blue", "orange", "grey", "white", "wood"]
 
 
 class Hall(StrictModel):
@@ -118,15 +113,6 @@ class ObstacleEntry(StrictModel):
     def rectangle(self) -> Rectangle:
         """What it covers of the floor."""
         return Rectangle(Pose2(*self.pose), self.size[0], self.size[1])
-
-
-class CylindersEntry(StrictModel):
-    """Cylinders of one size that stand upright; they may touch each other."""
-
-    centres: Annotated[tuple[Point, ...], Field(min_length=1)]
-    radius: Length
-    height: Length = 1.0
-    colour: Colour = "grey"
 
 
 class ToteKind(StrictModel):
@@ -293,15 +279,7 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
     for loc, what, rectangle in _solids(arena):
         if not hall.contains(rectangle.corners):
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
-    for name, group in arena.cylinders.items():
-        for index, (x, y) in enumerate(group.centres):
-            if not Rectangle(
-                hall.centre, hall.size_x - 2.0 * group.radius, hall.size_y - 2.0 * group.radius
-            ).contains([(x, y)]):
-                loc = ("cylinders", name, "centres", index)
-                yield Fault(
-                    loc, f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})"
-                )
+    yield from outside(arena.cylinders, arena.hall.x, arena.hall.y)
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]
@@ -312,7 +290,7 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
             if rectangle.contains([pose[:2]]):
                 yield Fault(loc, f"{what} is inside {solid}; move one of them")
         for name, group in arena.cylinders.items():
-            if min(math.dist(pose[:2], centre) for centre in group.centres) <= group.radius:
+            if group.covers(*pose[:2]):
                 yield Fault(loc, f"{what} is inside a cylinder of '{name}'; move one of them")
 
 

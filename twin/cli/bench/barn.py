@@ -81,8 +81,8 @@ def barn(
             show(trials)
     report = BarnReport(sorted(trials, key=lambda trial: (trial.world, trial.seed)), options)
     text = json_module.dumps(report.to_dict(), indent=2) + "\n"
-    write_atomically(folder / "report.json", text)
-    write_atomically(folder / "trajectories.svg", svg(rules, report.trials))
+    write_atomically(folder / "report.json", text.encode())
+    write_atomically(folder / "trajectories.svg", svg(rules, report.trials).encode())
     if json:
         sys.stdout.write(text)
     else:

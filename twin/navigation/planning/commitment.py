@@ -1,6 +1,6 @@
 """Staying with a route: what keeps a robot that plans anew all the time from going back and forth.
 
-Where two routes cost nearly the same, noise or each newly seen obstacle makes now one, now the other the cheaper.
+Where two routes cost nearly the same, noise and newly seen obstacles make now one, now the other the cheaper.
 So every cell off the last path costs a little more. The path itself stays free to be improved.
 """
 
