@@ -9,7 +9,15 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_REORDER = {"reassoc", "contract", "nsz", "arcp"}
+"""What may change in the last bit; that NaN and infinity are none of its business is not among it."""
+
 
 def jit(function: F) -> F:
     """Return `function` compiled at its first call; the machine code is cached beside the source."""
     return cast(F, numba.njit(cache=True)(function))
+
+
+def fast_jit(function: F) -> F:
+    """As `jit`, for loops over many numbers: sums may be taken in another order, and so eight at a time."""
+    return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=_REORDER)(function))

@@ -34,7 +34,7 @@ def declare_config(
     """Declare the numbers, texts and lists of a config as parameters of a node, in one parameter event.
 
     A field is a parameter of its name, `period_ns` is `frequency` [Hz], `timeout_ns` is `timeout` [s]; a
-    config in a config gives 'outer.inner'. Fields that are None or arrays are left out.
+    config in a config gives 'outer.inner', as do configs by name. What is None or an array is left out.
 
     Args:
         node: Whose parameters.
@@ -58,7 +58,7 @@ def declare_config(
         for parameter in parameters:
             if parameter.name in found:
                 path, unit, _ = found[parameter.name]
-                _check(parameter, unit.tell(reduce(getattr, path, current)))
+                _check(parameter, unit.tell(reduce(_part, path, current)))
                 following = _with(following, path, unit.read(parameter.value))
         return following
 
@@ -83,11 +83,12 @@ def declare_config(
 def _fields(
     config: Any, names: Mapping[str, str], path: tuple[str, ...] = (), prefix: str = ""
 ) -> Iterator[tuple[tuple[str, ...], _Unit, Any]]:
-    for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        here = (*path, field.name)
-        name = names.get(field.name, field.name)
-        if dataclasses.is_dataclass(value):
+    keys = config if isinstance(config, Mapping) else [field.name for field in dataclasses.fields(config)]
+    for key in keys:
+        value = _part(config, key)
+        here = (*path, key)
+        name = names.get(key, key)
+        if dataclasses.is_dataclass(value) or isinstance(value, Mapping):
             yield from _fields(value, names, here, f"{prefix}{name}." if name else prefix)
         elif _is_plain(value):
             yield here, _unit(prefix, name, value), value
@@ -122,5 +123,11 @@ def _check(parameter: Parameter, old: Any) -> None:
 
 def _with(config: Any, path: tuple[str, ...], value: Any) -> Any:
     head, *rest = path
-    inner = _with(getattr(config, head), tuple(rest), value) if rest else value
+    inner = _with(_part(config, head), tuple(rest), value) if rest else value
+    if isinstance(config, Mapping):
+        return {**config, head: inner}
     return dataclasses.replace(config, **{head: inner})
+
+
+def _part(config: Any, name: str) -> Any:
+    return config[name] if isinstance(config, Mapping) else getattr(config, name)

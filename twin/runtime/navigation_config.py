@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
-from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.commitment import CommitmentConfig
 from twin.navigation.planning.planner import PlannerConfig
@@ -21,6 +18,8 @@ from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.runtime.controller_config import controller_server_config
+from twin.runtime.overrides import overridden as overridden
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
 
@@ -28,7 +27,6 @@ C = TypeVar("C")
 
 _GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
 _LOCAL_COSTMAP_PERIOD_NS = 200_000_000
-_CONTROLLER_PERIOD_NS = 60_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,19 +65,20 @@ def navigation_parameters(
         raytrace_max_range=5.0,
     )
     rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
-    return NavigationParameters(
-        smoother=VelocitySmootherConfig(
-            linear=AxisLimits(
-                max_velocity=linear,
-                max_acceleration=config.max_linear_acceleration or 0.8,
-                max_deceleration=config.max_linear_deceleration or 1.2,
-            ),
-            angular=AxisLimits(
-                max_velocity=angular,
-                max_acceleration=config.max_angular_acceleration or 2.0,
-                max_deceleration=config.max_angular_acceleration or 3.0,
-            ),
+    smoother = VelocitySmootherConfig(
+        linear=AxisLimits(
+            max_velocity=linear,
+            max_acceleration=config.max_linear_acceleration or 0.8,
+            max_deceleration=config.max_linear_deceleration or 1.2,
         ),
+        angular=AxisLimits(
+            max_velocity=angular,
+            max_acceleration=config.max_angular_acceleration or 2.0,
+            max_deceleration=config.max_angular_acceleration or 3.0,
+        ),
+    )
+    return NavigationParameters(
+        smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
         global_costmap=replace(
             _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
@@ -90,7 +89,7 @@ def navigation_parameters(
         ),
         planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=_controller_server(config.controller.overrides(), linear, angular),
+        controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=_navigator(config.navigator.overrides()),
     )
@@ -102,29 +101,6 @@ def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
         overridden(defaults, overrides),
         bt_loop_duration_ns=_period_ns(overrides.get("bt_loop_frequency"), defaults.bt_loop_duration_ns),
         replanning_period_ns=_period_ns(overrides.get("replanning_frequency"), defaults.replanning_period_ns),
-    )
-
-
-def _controller_server(overrides: Mapping[str, Any], linear: float, angular: float) -> ControllerServerConfig:
-    """Return tolerances that docking can start from, and a lookahead that grows with speed."""
-    goal_checker = overridden(GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.05), overrides)
-    controller = RegulatedPurePursuitConfig(
-        desired_linear_vel=linear,
-        use_velocity_scaled_lookahead_dist=True,
-        min_lookahead_dist=0.35,
-        max_lookahead_dist=1.0,
-        lookahead_time=1.0,
-        rotate_to_heading_angular_vel=min(1.2, angular),
-        max_angular_accel=1.2,
-        rotate_to_heading_min_angle=0.6,
-        approach_velocity_scaling_dist=0.8,
-        xy_goal_tolerance=goal_checker.xy_goal_tolerance,
-    )
-    return ControllerServerConfig(
-        controller=overridden(controller, overrides),
-        goal_checker=goal_checker,
-        progress_checker=overridden(ProgressCheckerConfig(), overrides),
-        controller_period_ns=_period_ns(overrides.get("controller_frequency"), _CONTROLLER_PERIOD_NS),
     )
 
 
@@ -144,10 +120,3 @@ def _costmap(
 
 def _period_ns(frequency: float | None, default: int) -> int:
     return default if frequency is None else round(1e9 / frequency)
-
-
-def overridden(config: C, overrides: Mapping[str, Any]) -> C:
-    """Return a config with those overrides that are fields of its own and are given."""
-    own = {field.name for field in fields(config)}  # type: ignore[arg-type]
-    given = {key: value for key, value in overrides.items() if key in own and value is not None}
-    return replace(config, **given)  # type: ignore[type-var]

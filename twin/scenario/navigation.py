@@ -9,9 +9,10 @@ from typing import Annotated
 
 from pydantic import Field
 
+from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
 
 
 class PlannerParameters(ParameterGroup):
@@ -27,51 +28,6 @@ class PlannerParameters(ParameterGroup):
     """To each side of the last path that counts as on it [m]."""
     cost_factor: Annotated[float, NotNegative] | None = None
     """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
-
-
-class ControllerParameters(ParameterGroup):
-    """Parameters of `/controller_server` (regulated pure pursuit and its goal and progress checkers)."""
-
-    controller_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of the velocity commands [Hz]."""
-    desired_linear_vel: Annotated[MetresPerSecond, Positive] | None = None
-    """Cruise speed [m/s]."""
-    lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Distance of the point that is followed [m]."""
-    min_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its lower bound when scaled by speed [m]."""
-    max_lookahead_dist: Annotated[Metres, Positive] | None = None
-    """Its upper bound when scaled by speed [m]."""
-    lookahead_time: Annotated[Seconds, Positive] | None = None
-    """Time that the point lies ahead when scaled by speed [s]."""
-    regulated_linear_scaling_min_radius: Annotated[Metres, Positive] | None = None
-    """Turns tighter than this are driven slower [m]."""
-    regulated_linear_scaling_min_speed: Annotated[MetresPerSecond, Positive] | None = None
-    """But no slower than this, there and near obstacles [m/s]."""
-    cost_scaling_dist: Annotated[Metres, Positive] | None = None
-    """Closer to an obstacle than this the robot slows down [m]."""
-    cost_scaling_gain: Annotated[float, Positive] | None = None
-    """Of that slowing down."""
-    use_rotate_to_heading: bool | None = None
-    """Whether the robot turns on the spot where the path starts or ends in another direction."""
-    max_allowed_time_to_collision_up_to_carrot: Annotated[Seconds, Positive] | None = None
-    """A command that would collide within this is not given [s]."""
-    turn_before_collision: bool | None = None
-    """Where the arc to the followed point is blocked: whether to turn towards it on the spot or to creep."""
-    rotate_to_heading_min_angle: Annotated[Radians, Positive] | None = None
-    """The robot turns on the spot towards points further aside than this [rad]."""
-    max_angular_accel: Annotated[float, Positive] | None = None
-    """Of that turning [rad/s²]."""
-    rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
-    """Turn rate on the spot [rad/s]."""
-    xy_goal_tolerance: Annotated[Metres, Positive] | None = None
-    """Position tolerance of the goal checker [m]."""
-    yaw_goal_tolerance: Annotated[Radians, Positive] | None = None
-    """Heading tolerance of the goal checker [rad]."""
-    required_movement_radius: Annotated[Metres, Positive] | None = None
-    """Progress checker: movement that counts [m]."""
-    movement_time_allowance: Annotated[Seconds, Positive] | None = None
-    """Progress checker: time allowed for it [s]."""
 
 
 class CostmapParameters(ParameterGroup):

@@ -17,7 +17,6 @@ from twin.bridge.srvs import ClearEntireCostmap, GetMap, IsPathValid
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
@@ -57,8 +56,9 @@ class Stack:
             self.local_costmap,
             np.array(FOOTPRINT),
             ControllerServerConfig(
-                controller=RegulatedPurePursuitConfig(xy_goal_tolerance=0.05),
-                goal_checker=GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.1),
+                goal_checkers={
+                    "general_goal_checker": GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.1)
+                },
                 **controller,
             ),
         )
@@ -283,7 +283,7 @@ def test_it_follows_a_planned_path_to_its_goal(bench: Bench, stack: Stack) -> No
 
 def test_a_stuck_robot_is_no_progress(bench: Bench) -> None:
     checker = ProgressCheckerConfig(required_movement_radius=0.3, movement_time_allowance=2.0)
-    stack = Stack(bench, progress_checker=checker)
+    stack = Stack(bench, progress_checkers={"progress_checker": checker})
     stack.robot.stuck = True
     began = bench.now_s
     goal = stack.drive(np.array([[0, 0, 0], [2, 0, 0]], dtype=float))
@@ -322,7 +322,8 @@ def test_it_stops_before_what_blocks_its_path(bench: Bench, stack: Stack) -> Non
     bench.run(0.5)
     goal = stack.drive(np.array([[0, 0, 0], [2, 0, 0]], dtype=float))
     bench.until(lambda: goal.done)
-    assert goal.result.error_code == 106
+    assert goal.result.error_code == 104
+    assert "no valid control for 0.3 s: collision in" in goal.result.error_msg
     assert stack.robot.pose.x < 1.0 - HALF
     assert stack.robot.commands[-1] == (0.0, 0.0)
 

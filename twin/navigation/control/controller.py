@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
@@ -11,14 +11,31 @@ from twin.navigation.costmaps.costmap import Costmap
 class Controller(Protocol):
     """Follows one path at a time; a new path array starts it over."""
 
+    config: Any
+    """Its parameters, frozen; see `configure`."""
     carrot: tuple[float, float] | None
     """The point that the last command steered for, in the path's frame [m]; None if it steers for none."""
+    trajectory: Array | None
+    """Where the last command begins to lead, in the path's frame: shape (n, 3); None if it plans none."""
+
+    @property
+    def max_speed(self) -> float:
+        """The speed that percentages of a speed limit are of [m/s]."""
+
+    def configure(self, config: Any) -> None:
+        """Go on with other parameters of the same kind; lifts the speed limit."""
 
     def reset(self) -> None:
         """Forget the path, and what was learnt on it."""
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than `limit` [m/s]; None lifts the limit (nav2's SpeedLimit)."""
+
+    def set_goal_tolerance(self, xy: float) -> None:
+        """Tell how near the goal counts as there [m]: what only turns at the goal does it from there on."""
+
+    def cancel(self) -> bool:
+        """Come to rest; return whether the robot may be stopped now (nav2_core::Controller::cancel)."""
 
     def compute_velocity(
         self,

@@ -1,29 +1,74 @@
-"""When a goal counts as reached: nav2_controller's SimpleGoalChecker."""
+"""When a goal counts as reached: nav2_controller's goal checkers."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from twin.geometry import Pose2, wrap_angle
 
+_AT_REST = (0.0, 0.0)
+
+
+class GoalChecker(Protocol):
+    """Asked once per control period."""
+
+    def reset(self) -> None:
+        """Start on a new goal."""
+
+    def is_goal_reached(
+        self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
+    ) -> bool:
+        """Return whether `pose` is at `goal`, both in one frame.
+
+        Args:
+            pose: Of the base.
+            goal: The path's last pose.
+            velocity: (v [m/s], w [rad/s]).
+            remaining: Length of the path from the nearest pose on [m]; a path may pass by its own goal.
+        """
+
 
 @dataclass(frozen=True, kw_only=True)
-class GoalCheckerConfig:
+class PositionGoalCheckerConfig:
     """Parameters; names and defaults are Nav2's."""
 
     xy_goal_tolerance: float = 0.25
     """[m]"""
-    yaw_goal_tolerance: float = 0.25
-    """[rad]"""
+    xy_goal_tolerance_buffer: float = 0.0
+    """A position once reached stays so within this more; 0: everywhere [m]."""
+    path_length_tolerance: float = 1.0
+    """With more of the path left, the goal is only passed by [m]."""
     stateful: bool = True
     """Whether a position once reached stays reached while the robot turns."""
 
 
-@dataclass(kw_only=True)
-class SimpleGoalChecker:
-    """Position first, then yaw."""
+@dataclass(frozen=True, kw_only=True)
+class GoalCheckerConfig(PositionGoalCheckerConfig):
+    """Parameters of SimpleGoalChecker; names and defaults are Nav2's."""
 
-    config: GoalCheckerConfig = field(default_factory=GoalCheckerConfig)
+    yaw_goal_tolerance: float = 0.25
+    """[rad]"""
+    symmetric_yaw_tolerance: bool = False
+    """Whether the opposite heading is as good."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoppedGoalCheckerConfig(GoalCheckerConfig):
+    """Parameters of StoppedGoalChecker; names and defaults are Nav2's."""
+
+    trans_stopped_velocity: float = 0.25
+    """[m/s]"""
+    rot_stopped_velocity: float = 0.25
+    """[rad/s]"""
+
+
+@dataclass(kw_only=True)
+class PositionGoalChecker:
+    """Position alone."""
+
+    config: PositionGoalCheckerConfig = field(default_factory=PositionGoalCheckerConfig)
 
     def __post_init__(self) -> None:
         self.reset()
@@ -32,9 +77,52 @@ class SimpleGoalChecker:
         """Start on a new goal."""
         self._reached_xy = False
 
-    def is_goal_reached(self, pose: Pose2, goal: Pose2) -> bool:
-        """Return whether `pose` is at `goal`, both in one frame."""
+    def is_goal_reached(
+        self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
+    ) -> bool:
+        """Return whether the position is reached; see `GoalChecker.is_goal_reached`."""
         config = self.config
-        reached_xy = self._reached_xy or pose.distance(goal) <= config.xy_goal_tolerance
-        self._reached_xy = reached_xy and config.stateful
-        return reached_xy and abs(wrap_angle(goal.yaw - pose.yaw)) <= config.yaw_goal_tolerance
+        if remaining > config.path_length_tolerance:
+            return False
+        distance = pose.distance(goal)
+        if self._reached_xy:
+            buffer = config.xy_goal_tolerance_buffer
+            self._reached_xy = buffer <= 0.0 or distance <= config.xy_goal_tolerance + buffer
+        reached = self._reached_xy or distance <= config.xy_goal_tolerance
+        self._reached_xy = reached and config.stateful
+        return reached
+
+
+@dataclass(kw_only=True)
+class SimpleGoalChecker(PositionGoalChecker):
+    """Position first, then yaw."""
+
+    config: GoalCheckerConfig = field(default_factory=GoalCheckerConfig)
+
+    def is_goal_reached(
+        self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
+    ) -> bool:
+        """Return whether position and heading are reached; see `GoalChecker.is_goal_reached`."""
+        if not super().is_goal_reached(pose, goal, velocity, remaining):
+            return False
+        off = abs(wrap_angle(goal.yaw - pose.yaw))
+        if self.config.symmetric_yaw_tolerance:
+            off = min(off, math.pi - off)
+        return off <= self.config.yaw_goal_tolerance
+
+
+@dataclass(kw_only=True)
+class StoppedGoalChecker(SimpleGoalChecker):
+    """Position, yaw, and rest."""
+
+    config: StoppedGoalCheckerConfig = field(default_factory=StoppedGoalCheckerConfig)
+
+    def is_goal_reached(
+        self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
+    ) -> bool:
+        """Return whether the robot stands at the goal; see `GoalChecker.is_goal_reached`."""
+        return (
+            super().is_goal_reached(pose, goal, velocity, remaining)
+            and abs(velocity[0]) <= self.config.trans_stopped_velocity
+            and abs(velocity[1]) <= self.config.rot_stopped_velocity
+        )

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
     INSCRIBED_INFLATED_OBSTACLE,
@@ -16,11 +18,7 @@ from twin.navigation.costmaps.costmap import (
 )
 from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import steps_to_collision
-from twin.navigation.failures import InvalidPath, NoValidControl
-from twin.navigation.planning.planner import path_length
-
-MAX_SPACING = 0.1
-"""Sparser paths are filled up to this spacing [m], so that "nearest point" means what it says."""
+from twin.navigation.failures import NoValidControl
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +68,24 @@ class RegulatedPurePursuitConfig:
     """The goal checker's: closer than this the robot only turns to the goal's heading [m]."""
     max_robot_pose_search_dist: float = 3.0
     """How far along the path the nearest pose is searched each time [m]."""
+    use_fixed_curvature_lookahead: bool = False
+    """Whether curvature is that of the arc to a point curvature_lookahead_dist ahead."""
+    curvature_lookahead_dist: float = 0.6
+    """[m]"""
+    interpolate_curvature_after_goal: bool = False
+    """Whether that point may lie beyond the goal, in the path's last direction."""
+    allow_reversing: bool = False
+    """Whether parts of the path whose headings point backwards are driven backwards, from cusp to cusp."""
+    inversion_xy_tolerance: float = 0.2
+    """How near a cusp is reached [m]."""
+    inversion_yaw_tolerance: float = 0.4
+    """[rad]"""
+    use_cancel_deceleration: bool = False
+    """Whether a cancelled robot follows the path until it stands."""
+    cancel_deceleration: float = 3.2
+    """[m/s²]"""
+    min_distance_to_obstacle: float = -1.0
+    """Shortest way that is checked for collisions, also where it takes longer; negative: none [m]."""
 
 
 @dataclass(kw_only=True)
@@ -83,25 +99,55 @@ class RegulatedPurePursuit:
     """Current speed limit [m/s]; see `set_speed_limit`."""
     carrot: tuple[float, float] | None = field(init=False, default=None)
     """The lookahead point of the last command, in the path's frame [m]."""
+    trajectory: None = field(init=False, default=None)
+    """None: it plans none."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
         self._radius = max(radii(self.footprint)[1], 0.05)
-        self.desired_linear_vel = self.config.desired_linear_vel
+        self.configure(self.config)
+
+    @property
+    def max_speed(self) -> float:
+        """desired_linear_vel without limit [m/s]."""
+        return self.config.desired_linear_vel
+
+    def configure(self, config: RegulatedPurePursuitConfig) -> None:
+        """Go on with other parameters; lifts the speed limit."""
+        self.config = config
+        self.desired_linear_vel = config.desired_linear_vel
+        self._tolerance = config.xy_goal_tolerance
+        self._handler = PathHandler(
+            config=PathHandlerConfig(
+                prune_distance=math.inf,
+                max_robot_pose_search_dist=config.max_robot_pose_search_dist,
+                enforce_path_inversion=config.allow_reversing,
+                inversion_xy_tolerance=config.inversion_xy_tolerance,
+                inversion_yaw_tolerance=config.inversion_yaw_tolerance,
+            )
+        )
         self.reset()
 
     def reset(self) -> None:
         """Forget the path."""
-        self._path: Array | None = None
-        self._points = np.zeros((0, 2))
-        self._nearest = 0
+        self._handler.reset()
         self._reached_xy = False
+        self._cancelling = self._stopped = False
         self.carrot = None
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than `limit` [m/s]; None lifts the limit (nav2's SpeedLimit)."""
         maximum = self.config.desired_linear_vel
         self.desired_linear_vel = maximum if limit is None else min(limit, maximum)
+
+    def set_goal_tolerance(self, xy: float) -> None:
+        """Turn to the goal's heading within this distance of it [m]."""
+        self._tolerance = xy
+
+    def cancel(self) -> bool:
+        """Brake along the path if use_cancel_deceleration; return whether the robot may be stopped."""
+        self._cancelling = True
+        return self._stopped or not self.config.use_cancel_deceleration
 
     def compute_velocity(
         self,
@@ -113,7 +159,7 @@ class RegulatedPurePursuit:
         *,
         costmap_pose: Pose2 | None = None,
     ) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]).
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity`.
 
         Args:
             pose: Of the base, in the path's frame.
@@ -128,20 +174,29 @@ class RegulatedPurePursuit:
             NoValidControl: the command would collide within max_allowed_time_to_collision_up_to_carrot.
         """
         config = self.config
-        self._accept(path)
-        local = pose.inverse().apply(self._ahead(pose))
+        if self._handler.accept(path):
+            self._reached_xy = False
+        ahead = self._handler.local(pose)
+        sign = -1.0 if ahead.reversing and config.allow_reversing else 1.0
+        local = pose.inverse().apply(ahead.poses[:, :2])
         x, y = _lookahead_point(local, self._lookahead(velocity[0]))
         self.carrot = (pose @ Pose2(x, y, 0.0))[:2]
-        distance, bearing = math.hypot(x, y), math.atan2(y, x)
-        self._reached_xy |= math.hypot(local[-1, 0], local[-1, 1]) < config.xy_goal_tolerance
+        distance = math.hypot(x, y)
+        if config.use_fixed_curvature_lookahead:
+            x, y = self._curvature_point(local)
+        bearing = math.atan2(sign * y, sign * x)
+        self._reached_xy |= ahead.ends_at_goal and math.hypot(*local[-1]) < self._tolerance
         if config.use_rotate_to_heading and self._reached_xy:
             v, w = 0.0, self._rotate(wrap_angle(float(path[-1, 2]) - pose.yaw), velocity[1], dt)
         elif config.use_rotate_to_heading and abs(bearing) > config.rotate_to_heading_min_angle:
             v, w = 0.0, self._rotate(bearing, velocity[1], dt)
         else:
-            curvature = 2.0 * y / distance**2 if distance**2 > 0.001 else 0.0
-            v = self._regulate(curvature, costmap_pose or pose, local, costmap)
+            curvature = 2.0 * y / (x * x + y * y) if x * x + y * y > 0.001 else 0.0
+            v = sign * self._regulate(curvature, costmap_pose or pose, local[-1], ahead.length, costmap)
+            if self._cancelling and config.use_cancel_deceleration:
+                v = sign * max(0.0, sign * velocity[0] - config.cancel_deceleration * dt)
             w = v * curvature
+        self._stopped = self._cancelling and v == 0.0
         if costmap is None or not config.use_collision_detection:
             return v, w
         commands = [(v, w)]
@@ -150,24 +205,14 @@ class RegulatedPurePursuit:
             commands.append((config.creep_speed, w * config.creep_speed / v))
         return self._first_free(commands, costmap_pose or pose, distance, costmap)
 
-    def _accept(self, path: Array) -> None:
-        """Start over when the path is another array than last time."""
-        if path is self._path:
-            return
-        if path.ndim != 2 or path.shape[1] != 3 or not len(path) or not np.isfinite(path).all():
-            raise InvalidPath(
-                f"a path has shape (n, 3), n >= 1, and finite values; this one has {path.shape}"
-            )
-        self.reset()
-        self._path = path
-        self._points = _dense(path[:, :2], MAX_SPACING)
-
-    def _ahead(self, pose: Pose2) -> Array:
-        """Return the points from the one nearest to the robot on, shape (n, 2)."""
-        reach = 1 + math.ceil(self.config.max_robot_pose_search_dist / MAX_SPACING)
-        near = self._points[self._nearest : self._nearest + reach]
-        self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
-        return self._points[self._nearest :]
+    def _curvature_point(self, local: Array) -> tuple[float, float]:
+        """Return the point that curvature is taken at; beyond the goal, if that is asked for."""
+        distance = self.config.curvature_lookahead_dist
+        if self.config.interpolate_curvature_after_goal and len(local) > 1:
+            along = local[-1] - local[-2]
+            beyond = local[-1] + along / max(float(np.hypot(*along)), 1e-9) * 2.0 * distance
+            local = np.vstack([local, beyond])
+        return _lookahead_point(local, distance)
 
     def _lookahead(self, v: float) -> float:
         config = self.config
@@ -177,14 +222,17 @@ class RegulatedPurePursuit:
 
     def _rotate(self, angle: float, w_now: float, dt: float) -> float:
         """Return w for turning in place by `angle`: reachable from `w_now`, and able to stop in time."""
-        config = self.config
-        change = config.max_angular_accel * dt
-        target = math.copysign(config.rotate_to_heading_angular_vel, angle)
-        w = min(max(target, w_now - change), w_now + change)
-        stoppable = min(math.sqrt(2.0 * config.max_angular_accel * abs(angle)), abs(angle) / dt)
-        return math.copysign(stoppable, angle) if abs(w) > stoppable else w
+        return turn_rate(
+            angle,
+            w_now,
+            dt,
+            max_rate=self.config.rotate_to_heading_angular_vel,
+            acceleration=self.config.max_angular_accel,
+        )
 
-    def _regulate(self, curvature: float, pose: Pose2, local: Array, costmap: Costmap | None) -> float:
+    def _regulate(
+        self, curvature: float, pose: Pose2, end: Array, length: float, costmap: Costmap | None
+    ) -> float:
         """Return the linear velocity: slower in turns, near obstacles and at the end."""
         config = self.config
         v = limit = self.desired_linear_vel
@@ -199,8 +247,8 @@ class RegulatedPurePursuit:
                     v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
         v = max(v, config.regulated_linear_scaling_min_speed)
         approach = config.approach_velocity_scaling_dist
-        if len(local) <= 1 + approach / MAX_SPACING or path_length(local) < approach:
-            remaining = math.hypot(local[-1, 0], local[-1, 1])
+        if length < approach:
+            remaining = math.hypot(end[0], end[1])
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
 
@@ -230,6 +278,9 @@ class RegulatedPurePursuit:
         else:
             return
         allowed = self.config.max_allowed_time_to_collision_up_to_carrot
+        if self.config.min_distance_to_obstacle > 0.0 and abs(v) >= 0.01:
+            allowed = max(allowed, self.config.min_distance_to_obstacle / abs(v))
+            carrot_dist = max(carrot_dist, self.config.min_distance_to_obstacle)
         hit = steps_to_collision(
             costmap.costs,
             self.footprint,
@@ -245,17 +296,6 @@ class RegulatedPurePursuit:
         )
         if hit >= 0:
             raise NoValidControl(f"collision in {hit * step:.2f} s at {v:.2f} m/s, {w:.2f} rad/s")
-
-
-def _dense(points: Array, spacing: float) -> Array:
-    """Return points, shape (n, 2), with more between them where they are farther apart than `spacing` [m]."""
-    length = np.hypot(*np.diff(points, axis=0).T)
-    if not len(length) or length.max() <= spacing:
-        return points.copy()
-    pieces = np.maximum(1, np.ceil(length / spacing)).astype(np.int64)
-    knots = np.concatenate([[0], np.cumsum(pieces)])
-    at = np.arange(knots[-1] + 1)
-    return np.column_stack([np.interp(at, knots, points[:, 0]), np.interp(at, knots, points[:, 1])])
 
 
 def _lookahead_point(local: Array, distance: float) -> tuple[float, float]:

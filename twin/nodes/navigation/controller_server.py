@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,32 +12,80 @@ from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import Odometry, Point, PointStamped, Twist, header, new
+from twin.bridge.msgs import Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
 from twin.geometry import Array, Pose2
-from twin.navigation.control.goal_checker import GoalCheckerConfig, SimpleGoalChecker
-from twin.navigation.control.progress_checker import ProgressCheckerConfig, SimpleProgressChecker
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit, RegulatedPurePursuitConfig
-from twin.navigation.failures import ControlFailure
-from twin.nodes.messages import path_array
+from twin.navigation.control.controller import Controller
+from twin.navigation.control.goal_checker import GoalChecker, GoalCheckerConfig, PositionGoalCheckerConfig
+from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.plugins import (
+    ControllerConfig,
+    create_controller,
+    create_goal_checker,
+    create_progress_checker,
+)
+from twin.navigation.control.progress_checker import ProgressChecker, ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.failures import ControlFailure, NoValidControl
+from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
-_TF_ERROR, _INVALID_PATH, _FAILED_TO_MAKE_PROGRESS, _NO_VALID_CONTROL = 102, 103, 105, 106
+P = TypeVar("P")
 
-_PARAMETER_NAMES = {"controller": "FollowPath", "goal_checker": "general_goal_checker"}
+_INVALID_CONTROLLER, _TF_ERROR, _INVALID_PATH = 101, 102, 103
+_PATIENCE_EXCEEDED, _FAILED_TO_MAKE_PROGRESS = 104, 105
+
+_PARAMETER_NAMES = {
+    "controllers": "",
+    "goal_checkers": "",
+    "progress_checkers": "",
+    "primary_controller": "",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerServerConfig:
-    """Parameters of the server and of its plugins."""
+    """Parameters of the server and of its plugins by name; the first of a kind is taken unless named."""
 
-    controller: RegulatedPurePursuitConfig = field(default_factory=RegulatedPurePursuitConfig)
-    goal_checker: GoalCheckerConfig = field(default_factory=GoalCheckerConfig)
-    progress_checker: ProgressCheckerConfig = field(default_factory=ProgressCheckerConfig)
+    controllers: Mapping[str, ControllerConfig] = field(
+        default_factory=lambda: {"FollowPath": RegulatedPurePursuitConfig()}
+    )
+    goal_checkers: Mapping[str, PositionGoalCheckerConfig] = field(
+        default_factory=lambda: {"general_goal_checker": GoalCheckerConfig()}
+    )
+    progress_checkers: Mapping[str, ProgressCheckerConfig] = field(
+        default_factory=lambda: {"progress_checker": ProgressCheckerConfig()}
+    )
     controller_period_ns: int = 60_000_000
     failure_tolerance_ns: int = 300_000_000
-    """How long no valid control is accepted before the goal is aborted [ns]."""
+    """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
+    min_x_velocity_threshold: float = 0.0001
+    """Measured speeds below this count as none [m/s]."""
+    min_theta_velocity_threshold: float = 0.0001
+    """[rad/s]"""
+    publish_zero_velocity: bool = True
+    """Whether the robot is stopped at a goal that is reached; at any other end it always is."""
+
+
+@dataclass(kw_only=True)
+class _Task:
+    """What is followed now, and with what."""
+
+    path: Array
+    controller: Controller
+    goal_checker: GoalChecker
+    progress_checker: ProgressChecker
+    handler: PathHandler
+    last_valid_ns: int
+
+
+class _Abort(Exception):
+    """Ends the action with an error code of nav2_msgs/action/FollowPath."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class ControllerServerNode:
@@ -53,100 +101,162 @@ class ControllerServerNode:
         *,
         namespace: str = "",
     ) -> None:
-        self.node = bus.create_node("controller_server", namespace)
+        self.node = node = bus.create_node("controller_server", namespace)
         self.config = config or ControllerServerConfig()
         self._robot_pose = robot_pose
         self._costmap = costmap
-        self._controller = RegulatedPurePursuit(config=self.config.controller, footprint=footprint)
-        declare_config(self.node, self.config, self._reconfigure, _PARAMETER_NAMES)
+        self.controllers = {
+            name: create_controller(plugin, footprint) for name, plugin in self.config.controllers.items()
+        }
+        """By name."""
+        for kind in ("controller", "goal_checker", "progress_checker"):
+            node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
+        declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
-        self._finished = True
-        """False while a goal is followed, and after one that was preempted by the next."""
-        self._last_valid_ns = 0
-        self._publisher = self.node.create_publisher(Twist, "cmd_vel_nav", 1)
-        self._lookahead = self.node.create_publisher(PointStamped, "lookahead_point", 1)
-        self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
-        ActionServer(self.node, FollowPath, "follow_path", self._execute)
+        self._preempted: _Task | None = None
+        """What the next goal goes on from, if it comes before this one is over."""
+        self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
+        self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
+        self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
+        self._optimal = node.create_publisher(Path, "optimal_path", 1)
+        node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
+        ActionServer(node, FollowPath, "follow_path", self._execute)
 
     def _reconfigure(self, config: ControllerServerConfig) -> None:
         """Go on with other parameters: the checkers from the next goal on, the rest at once."""
-        self.config = config
-        self._controller.config = config.controller
-        self._controller.set_speed_limit(None)
+        before, self.config = self.config, config
+        for name, plugin in config.controllers.items():
+            if plugin != before.controllers[name]:
+                self.controllers[name].configure(plugin)
 
     def _on_odom(self, message: Odometry) -> None:
-        self._velocity = (message.twist.twist.linear.x, message.twist.twist.angular.z)
+        v, w = message.twist.twist.linear.x, message.twist.twist.angular.z
+        self._velocity = (
+            v if abs(v) > self.config.min_x_velocity_threshold else 0.0,
+            w if abs(w) > self.config.min_theta_velocity_threshold else 0.0,
+        )
+
+    def _on_speed_limit(self, message: SpeedLimit) -> None:
+        """Limit every controller: 0 lifts the limit, as costmap filters send it at a zone's end."""
+        limit = message.speed_limit
+        if not (np.isfinite(limit) and limit >= 0.0):
+            self.node.get_logger().error(f"speed_limit refused: {limit} is not finite and at least 0")
+            return
+        for controller in self.controllers.values():
+            absolute = controller.max_speed * limit / 100.0 if message.percentage else limit
+            controller.set_speed_limit(absolute if limit > 0.0 else None)
+
+    # The action
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
-        path = path_array(handle.request.path)
-        if not len(path) or not np.isfinite(path).all():
-            handle.abort()
-            return new(
-                FollowPath.Result, error_code=_INVALID_PATH, error_msg="the path is empty or not finite"
-            )
-        goal_checker = SimpleGoalChecker(config=self.config.goal_checker)
-        progress_checker = SimpleProgressChecker(config=self.config.progress_checker)
-        dt = self.config.controller_period_ns * 1e-9
-        due = self.node.now_ns
-        if self._finished:
-            self._last_valid_ns = due
-        self._finished = False
-        finished = False
+        finished = stop = False
         try:
+            task = self._task(handle.request)
+            if self._preempted is not None:
+                # A path that is planned anew all the time is no news about progress, nor about valid control.
+                task.last_valid_ns = self._preempted.last_valid_ns
+                if task.progress_checker == self._preempted.progress_checker:  # of the same parameters
+                    task.progress_checker = self._preempted.progress_checker
+            self._preempted = task
+            due = self.node.now_ns
             while True:
-                if handle.is_cancel_requested:
+                if handle.is_cancel_requested and task.controller.cancel():
                     handle.canceled()
-                    finished = self._finished = True
+                    finished = stop = True
                     return new(FollowPath.Result, error_msg="canceled")
-                if self.node.now_ns < due:
-                    yield
-                    continue
-                due += self.config.controller_period_ns
-                outcome = self._control(path, goal_checker, progress_checker, dt)
-                if outcome is None:
-                    self._last_valid_ns = self.node.now_ns
-                elif outcome.error_code == 0:
-                    finished = self._finished = True
-                    return outcome
-                elif (
-                    outcome.error_code != _NO_VALID_CONTROL
-                    or self.node.now_ns - self._last_valid_ns > self.config.failure_tolerance_ns
-                ):
-                    finished = self._finished = True
-                    handle.abort()
-                    return outcome
+                if self.node.now_ns >= due:
+                    due += self.config.controller_period_ns
+                    if self._control(task, handle):
+                        finished, stop = True, self.config.publish_zero_velocity
+                        return new(FollowPath.Result)
                 yield
+        except _Abort as failure:
+            finished = stop = True
+            handle.abort()
+            return new(FollowPath.Result, error_code=failure.code, error_msg=str(failure))
         finally:
             # A goal that preempts this one goes on from the present speed.
-            if finished:
+            if stop:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
+            if finished:
+                self._preempted = None
+                for controller in self.controllers.values():
+                    controller.reset()
 
-    def _control(
-        self, path: Array, goal_checker: SimpleGoalChecker, progress_checker: SimpleProgressChecker, dt: float
-    ) -> Any | None:
-        """Command the base once; return the result when the goal is over."""
+    def _task(self, request: Any) -> _Task:
+        controller = _chosen("controller", self.controllers, request.controller_id)
+        goal_checker = _chosen("goal checker", self.config.goal_checkers, request.goal_checker_id)
+        progress = _chosen("progress checker", self.config.progress_checkers, request.progress_checker_id)
+        path = path_array(request.path)
+        if not len(path) or not np.isfinite(path).all():
+            raise _Abort(_INVALID_PATH, "the path is empty or not finite")
+        handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
+        handler.accept(path)
+        controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
+        return _Task(
+            path=path,
+            controller=controller,
+            goal_checker=create_goal_checker(goal_checker),
+            progress_checker=create_progress_checker(progress),
+            handler=handler,
+            last_valid_ns=self.node.now_ns,
+        )
+
+    def _control(self, task: _Task, handle: GoalHandle) -> bool:
+        """Command the base once; return whether the goal is reached."""
         in_map, in_odom = self._robot_pose.in_map(), self._robot_pose.in_odom()
         if in_map is None or in_odom is None:
-            return new(FollowPath.Result, error_code=_TF_ERROR, error_msg="the robot is not localised")
-        if goal_checker.is_goal_reached(in_map, Pose2(*path[-1])):
-            return new(FollowPath.Result)
-        if not progress_checker.check(in_map, self.node.now_ns):
-            return new(
-                FollowPath.Result, error_code=_FAILED_TO_MAKE_PROGRESS, error_msg="failed to make progress"
-            )
+            raise _Abort(_TF_ERROR, "the robot is not localised")
+        ahead = task.handler.local(in_map)
+        goal = Pose2(*task.path[-1].tolist())
+        if task.goal_checker.is_goal_reached(in_map, goal, self._velocity, task.handler.remaining):
+            return True
+        if not task.progress_checker.check(in_map, self.node.now_ns):
+            raise _Abort(_FAILED_TO_MAKE_PROGRESS, "failed to make progress")
+        dt = self.config.controller_period_ns * 1e-9
         try:
-            v, w = self._controller.compute_velocity(
-                in_map, self._velocity, path, self._costmap.costmap, dt, costmap_pose=in_odom
+            command = task.controller.compute_velocity(
+                in_map, self._velocity, task.path, self._costmap.costmap, dt, costmap_pose=in_odom
             )
+            task.last_valid_ns = self.node.now_ns
+        except NoValidControl as failure:
+            self._be_patient(task, failure)
+            command = (0.0, 0.0)
         except ControlFailure as failure:
-            self._publisher.publish(twist_from_planar(0.0, 0.0))
-            return new(FollowPath.Result, error_code=failure.error_code, error_msg=str(failure))
-        self._publisher.publish(twist_from_planar(v, w))
-        if self._controller.carrot is not None:
-            x, y = self._controller.carrot
-            self._lookahead.publish(
-                PointStamped(
-                    header=header(self.node.now_ns, self._robot_pose.frames.map), point=Point(x=x, y=y, z=0.0)
-                )
-            )
-        return None
+            raise _Abort(failure.error_code, str(failure)) from failure
+        self._publisher.publish(twist_from_planar(*command))
+        self._show(task.controller, ahead.poses)
+        handle.publish_feedback(
+            new(FollowPath.Feedback, distance_to_goal=in_map.distance(goal), speed=abs(self._velocity[0]))
+        )
+        return False
+
+    def _be_patient(self, task: _Task, failure: NoValidControl) -> None:
+        """Wait for a valid control for as long as the tolerance says; raises _Abort."""
+        tolerance = self.config.failure_tolerance_ns
+        if tolerance == 0:
+            raise _Abort(failure.error_code, str(failure))
+        if 0 < tolerance < self.node.now_ns - task.last_valid_ns:
+            raise _Abort(_PATIENCE_EXCEEDED, f"no valid control for {tolerance * 1e-9:g} s: {failure}")
+
+    def _show(self, controller: Controller, ahead: Array) -> None:
+        """Publish what is followed, to those who look at it."""
+        now, frame = self.node.now_ns, self._robot_pose.frames.map
+        if controller.carrot is not None:
+            x, y = controller.carrot
+            self._lookahead.publish(PointStamped(header=header(now, frame), point=Point(x=x, y=y, z=0.0)))
+        if self._plan.has_subscribers:
+            self._plan.publish(path_msg(ahead, frame, now))
+        if controller.trajectory is not None and self._optimal.has_subscribers:
+            self._optimal.publish(path_msg(controller.trajectory, frame, now))
+
+
+def _chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:
+    """Return the plugin that a goal names; without a name the first."""
+    if not name:
+        return next(iter(plugins.values()))
+    if name not in plugins:
+        valid = ", ".join(plugins)
+        raise _Abort(_INVALID_CONTROLLER, f"there is no {kind} '{name}'; valid: {valid}")
+    return plugins[name]

@@ -1,0 +1,1 @@
+"""Model predictive path integral control: many noisy rollouts, averaged by how well they do."""

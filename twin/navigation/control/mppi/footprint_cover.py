@@ -1,0 +1,82 @@
+"""A footprint as the compiled loops take it: points of its outline, and circles that cover it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+from twin.navigation.control.mppi.kernels import F32
+from twin.navigation.costmaps.costmap import Costmap, inflation_costs
+from twin.navigation.costmaps.footprint import radii
+
+_SLACK = math.sqrt(2.0)
+"""Between two cells whose points are `d` apart lie at most `d` plus so many cells."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootprintCover:
+    """In cells of one resolution."""
+
+    outline: F32
+    """Shape (n, 2), at most half a cell apart; empty: the centre alone is checked."""
+    circles: F32
+    """Shape (m, 2)."""
+    costs: NDArray[np.int64]
+    """The least cost of the centre at which a collision is possible, and that of a circle's centre."""
+
+    @staticmethod
+    def of(footprint: Array, costmap: Costmap, *, consider_footprint: bool) -> FootprintCover:
+        """Return the cover of a footprint, shape (n, 2) [m], for a costmap.
+
+        Args:
+            footprint: Corners in the base frame; a single corner is a robot known by its radius alone.
+            costmap: Its inflation tells how far from an obstacle a cell is; where it ends too early to tell,
+                every look is at the outline.
+            consider_footprint: False checks the centre for inscribed cost alone.
+        """
+        if not consider_footprint or len(footprint) < 3:
+            none = np.zeros((0, 2), dtype=np.float32)
+            return FootprintCover(outline=none, circles=none, costs=np.array([253, 253]))
+        centres, radius = _circles(footprint)
+        outside = radii(footprint)[1]
+        return FootprintCover(
+            outline=(_outline(footprint, costmap.resolution / 2.0) / costmap.resolution).astype(np.float32),
+            circles=(centres / costmap.resolution).astype(np.float32),
+            costs=np.array([_cost(costmap, outside), _cost(costmap, radius)]),
+        )
+
+
+def _cost(costmap: Costmap, distance: float) -> int:
+    """Return the least cost of cells that may have an obstacle within `distance` [m]."""
+    farthest = distance + _SLACK * costmap.resolution
+    return int(
+        inflation_costs(
+            farthest,
+            inscribed_radius=costmap.inscribed_radius,
+            inflation_radius=math.inf,
+            cost_scaling_factor=costmap.cost_scaling_factor,
+        )
+    )
+
+
+def _outline(corners: Array, spacing: float) -> Array:
+    points = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        pieces = max(1, math.ceil(float(np.hypot(*(b - a))) / spacing))
+        points.append(a + np.arange(pieces)[:, None] / pieces * (b - a))
+    return np.concatenate(points)
+
+
+def _circles(corners: Array) -> tuple[Array, float]:
+    """Return centres and radius of three circles along the longer side that cover the bounding box."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, size = (low + high) / 2.0, high - low
+    axis = int(np.argmax(size))
+    piece = size[axis] / 3.0
+    centres = np.tile(middle, (3, 1))
+    centres[:, axis] += np.array([-piece, 0.0, piece])
+    return centres, float(math.hypot(piece, size[1 - axis]) / 2.0)

@@ -1,0 +1,72 @@
+"""From the raw scores of the critics to one total per rollout, as the parameters weigh them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twin.navigation.control.mppi import kernels
+from twin.navigation.control.mppi.config import MPPIConfig
+from twin.navigation.control.mppi.kernels import F32
+from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+
+ROWS = {
+    "ConstraintCritic": kernels.CONSTRAINT,
+    "CostCritic": kernels.COST,
+    "ObstaclesCritic": kernels.OBSTACLES,
+    "GoalCritic": kernels.GOAL,
+    "GoalAngleCritic": kernels.GOAL_ANGLE,
+    "PathAlignCritic": kernels.ALIGN,
+    "PathFollowCritic": kernels.FOLLOW,
+    "PathAngleCritic": kernels.ANGLE,
+    "PreferForwardCritic": kernels.FORWARD,
+    "TwirlingCritic": kernels.TWIRLING,
+    "VelocityDeadbandCritic": kernels.DEADBAND,
+    "SpeedCritic": kernels.SPEED,
+}
+
+
+def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
+    """Return, by cost, shape (3, 256): CostCritic, ObstaclesCritic, and the speed that is allowed [m/s]."""
+    cost = np.arange(256, dtype=np.float64)
+    critic = config.CostCritic
+    clearance = costmap.inscribed_radius - np.log(np.maximum(cost, 1.0) / 252.0) / costmap.cost_scaling_factor
+    clearance = np.where(cost >= INSCRIBED_INFLATED_OBSTACLE, 0.0, clearance)
+    pointwise = np.where(cost >= critic.near_collision_cost, critic.critical_cost, 0.0 if near_goal else cost)
+    obstacles, speed = config.ObstaclesCritic, config.SpeedCritic
+    surface = clearance - costmap.inscribed_radius
+    margin = np.maximum(obstacles.collision_margin_distance - surface, 0.0)
+    repulsion = 0.0 if near_goal else obstacles.repulsion_weight
+    # Scores matter by their differences: Nav2's inflation radius in the repulsion drops out.
+    keep_off = obstacles.critical_weight * margin - repulsion * surface
+    allowed = vx_max * speed.cost_scaling_gain * clearance / speed.cost_scaling_dist
+    tables = np.stack([pointwise, keep_off - keep_off[1], np.clip(allowed, speed.min_speed, math.inf)])
+    for unknown in (FREE_SPACE, NO_INFORMATION):
+        tables[:, unknown] = (0.0, 0.0, vx_max)
+    return tables.astype(np.float32)
+
+
+def total(config: MPPIConfig, raw: F32, hit: np.ndarray, active: dict[str, bool], out: F32) -> None:
+    """Write the weighted sum of the raw scores, shape (CRITIC_COUNT, batch), to `out`, shape (batch).
+
+    Args:
+        config: Names, weights and powers of the critics.
+        raw: What the compiled loops found.
+        hit: Which rollouts collide: they get CostCritic's collision cost.
+        active: Critics that score now; others that are not named do too.
+        out: Written.
+    """
+    out[:] = 0.0
+    for name, row in ROWS.items():
+        critic = getattr(config, name)
+        if not config.scores(name) or not active.get(name, True):
+            continue
+        # Nav2 weighs costs as fractions of 254.
+        weight = critic.cost_weight / 254.0 if name == "CostCritic" else critic.cost_weight
+        if critic.cost_power == 1:
+            out += np.float32(weight) * raw[row]
+        else:
+            out += (np.float32(weight) * raw[row]) ** critic.cost_power
+    if hit.any():
+        out[hit != 0] += np.float32(config.CostCritic.collision_cost)

@@ -1,0 +1,160 @@
+"""The part of a path that a controller follows now: Nav2's FeasiblePathHandler.
+
+From the pose nearest to the robot to `prune_distance` ahead, but never past a cusp before the robot has
+reached it: a path that turns back over itself has two nearest poses.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
+from twin.navigation.failures import InvalidPath
+
+SPACING = 0.05
+"""Of the poses of a local path [m]: critics count in them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathHandlerConfig:
+    """Parameters; names and defaults are Nav2's."""
+
+    prune_distance: float = 2.0
+    """How far ahead the local path reaches [m]."""
+    max_robot_pose_search_dist: float = 3.0
+    """How far along the path the nearest pose is searched each time [m]."""
+    enforce_path_inversion: bool = True
+    """Whether the local path ends at a cusp until that is reached."""
+    inversion_xy_tolerance: float = 0.2
+    """[m]"""
+    inversion_yaw_tolerance: float = 0.4
+    """[rad]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalPath:
+    """What lies ahead of the robot, in the frame of the path."""
+
+    poses: Array
+    """Shape (n, 3), n >= 1: x, y, yaw; the first is the nearest one."""
+    length: float
+    """[m]"""
+    reversing: bool
+    """Whether it is to be driven backwards: its headings point against its direction."""
+    ends_at_goal: bool
+    """Whether the last pose is the path's, not a cusp or the end of the window."""
+
+
+@dataclass(kw_only=True)
+class PathHandler:
+    """Follows one path at a time; a new path array starts it over."""
+
+    config: PathHandlerConfig = field(default_factory=PathHandlerConfig)
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the path."""
+        self.path: Array | None = None
+        self._poses = np.zeros((0, 3))
+        self._along = np.zeros(0)
+        self._segments: list[tuple[int, bool]] = []
+        self._nearest = 0
+
+    def accept(self, path: Array) -> bool:
+        """Start over, and return True, when the path is another array than last time.
+
+        Raises:
+            InvalidPath: the path is empty, not finite or not of shape (n, 3).
+        """
+        if path is self.path:
+            return False
+        if path.ndim != 2 or path.shape[1] != 3 or not len(path) or not np.isfinite(path).all():
+            raise InvalidPath(
+                f"a path has shape (n, 3), n >= 1, and finite values; this one has {path.shape}"
+            )
+        self.reset()
+        self.path = path
+        self._poses, knots = dense(path, SPACING)
+        self._along = _arc_length(self._poses)
+        turns = cusps(path) if self.config.enforce_path_inversion else []
+        for first, last in itertools.pairwise([0, *turns, len(path) - 1]):
+            self._segments.append((int(knots[last]), _reversing(path[first : last + 1])))
+        return True
+
+    @property
+    def remaining(self) -> float:
+        """Length of the path from the nearest pose to its end [m]."""
+        return float(self._along[-1] - self._along[self._nearest])
+
+    def local(self, pose: Pose2) -> LocalPath:
+        """Return what lies ahead of the robot at `pose`; moves on along the path."""
+        last, reversing = self._segments[0]
+        self._advance(pose, last)
+        if len(self._segments) > 1 and self._reached(pose, last):
+            self._segments.pop(0)
+            self._nearest = last
+            last, reversing = self._segments[0]
+            self._advance(pose, last)
+        first = self._nearest
+        reach = self._along[first] + self.config.prune_distance
+        end = min(last, int(np.searchsorted(self._along, reach, side="right")))
+        poses = self._poses[first : end + 1]
+        return LocalPath(
+            poses=poses,
+            length=float(self._along[end] - self._along[first]),
+            reversing=reversing,
+            ends_at_goal=end == len(self._poses) - 1,
+        )
+
+    def _advance(self, pose: Pose2, last: int) -> None:
+        reach = self._along[self._nearest] + self.config.max_robot_pose_search_dist
+        end = min(last, int(np.searchsorted(self._along, reach, side="right")))
+        near = self._poses[self._nearest : end + 1]
+        self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
+
+    def _reached(self, pose: Pose2, index: int) -> bool:
+        x, y, yaw = self._poses[index].tolist()
+        return (
+            math.hypot(pose.x - x, pose.y - y) <= self.config.inversion_xy_tolerance
+            and abs(wrap_angle(pose.yaw - yaw)) <= self.config.inversion_yaw_tolerance
+        )
+
+
+def dense(path: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
+    """Return poses at most `spacing` [m] apart, shape (n, 3), and at which of them those of `path` are."""
+    if len(path) < 2:
+        return path.copy(), np.arange(len(path))
+    length = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    pieces = np.maximum(1, np.ceil(length / spacing - 1e-6)).astype(np.int64)
+    knots = np.concatenate([[0], np.cumsum(pieces)])
+    at = np.arange(knots[-1] + 1)
+    columns = [np.interp(at, knots, column) for column in (path[:, 0], path[:, 1], np.unwrap(path[:, 2]))]
+    return np.column_stack([columns[0], columns[1], wrap_angles(columns[2])]), knots
+
+
+def cusps(poses: Array) -> list[int]:
+    """Return the indices of poses, shape (n, 3), at which the path turns back by more than a right angle."""
+    if len(poses) < 3:
+        return []
+    step = np.diff(poses[:, :2], axis=0)
+    moved = np.flatnonzero(np.hypot(step[:, 0], step[:, 1]) > 1e-6)
+    a, b = step[moved[:-1]], step[moved[1:]]
+    return [int(i) for i in moved[1:][np.einsum("ij,ij->i", a, b) < 0.0]]
+
+
+def _arc_length(poses: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+
+
+def _reversing(poses: Array) -> bool:
+    """Whether headings point against the way from one pose to the next; the last one is free to choose."""
+    step = np.diff(poses[:, :2], axis=0)
+    yaw = poses[: len(step), 2]
+    return bool(np.sum(step[:, 0] * np.cos(yaw) + step[:, 1] * np.sin(yaw)) < 0.0)

@@ -1,0 +1,183 @@
+"""Turns to a path in place before another controller drives along it: Nav2's RotationShimController."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.controller import Controller
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.mppi.config import MPPIConfig
+from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation import turn_rate
+from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, Costmap, footprint_cost
+from twin.navigation.failures import NoValidControl
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotationShimConfig:
+    """Parameters; names and defaults are those of nav2_rotation_shim_controller."""
+
+    primary_controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig = field(
+        default_factory=RegulatedPurePursuitConfig
+    )
+    """Of what drives."""
+    angular_dist_threshold: float = 0.785
+    """Farther off the path's direction than this the robot turns in place [rad]."""
+    angular_disengage_threshold: float = 0.3925
+    """A turn ends nearer to it than this [rad]."""
+    forward_sampling_distance: float = 0.5
+    """Where along the path its direction is taken [m]."""
+    rotate_to_heading_angular_vel: float = 1.8
+    """[rad/s]"""
+    max_angular_accel: float = 3.2
+    """[rad/s²]"""
+    max_cost_threshold: float = float(LETHAL_OBSTACLE)
+    """Costs under the footprint from which a turn is refused."""
+    simulate_ahead_time: float = 1.0
+    """How much of a turn is looked at for collisions [s]."""
+    rotate_to_goal_heading: bool = False
+    """Whether the robot turns in place at the goal, too."""
+    rotate_to_heading_once: bool = False
+    """Whether only the beginning of a path is turned to."""
+    closed_loop: bool = True
+    """Whether the measured turn rate counts, not the last commanded one."""
+    use_path_orientations: bool = False
+    """Whether the path's headings count, not where its poses are."""
+
+
+@dataclass(kw_only=True)
+class RotationShim:
+    """Wraps any controller."""
+
+    config: RotationShimConfig
+    primary: Controller
+    footprint: Array = field(default_factory=lambda: np.zeros((1, 2)))
+    """Shape (n, 2) [m]."""
+    carrot: tuple[float, float] | None = field(init=False, default=None)
+    """The point of the path that the robot turns to, or that the primary controller steers for."""
+    trajectory: Array | None = field(init=False, default=None)
+    """That of the primary controller."""
+
+    def __post_init__(self) -> None:
+        self._handler = PathHandler(config=PathHandlerConfig())
+        self._tolerance = 0.0
+        self._forget()
+
+    @property
+    def max_speed(self) -> float:
+        """The primary controller's [m/s]."""
+        return self.primary.max_speed
+
+    def configure(self, config: RotationShimConfig) -> None:
+        """Go on with other parameters; lifts the speed limit."""
+        self.config = config
+        self.primary.configure(config.primary_controller)
+
+    def reset(self) -> None:
+        """Forget the path."""
+        self._forget()
+        self.primary.reset()
+
+    def _forget(self) -> None:
+        self._handler.reset()
+        self._turning = False
+        self._aligned = False
+        self._at_goal = False
+        self._last_w: float | None = None
+        self.carrot, self.trajectory = None, None
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        """Pass the limit [m/s] on."""
+        self.primary.set_speed_limit(limit)
+
+    def set_goal_tolerance(self, xy: float) -> None:
+        """Turn to the goal's heading within this distance of it [m]."""
+        self._tolerance = xy
+        self.primary.set_goal_tolerance(xy)
+
+    def cancel(self) -> bool:
+        """Leave it to the primary controller."""
+        return self.primary.cancel()
+
+    def compute_velocity(
+        self,
+        pose: Pose2,
+        velocity: tuple[float, float],
+        path: Array,
+        costmap: Costmap | None,
+        dt: float,
+        *,
+        costmap_pose: Pose2 | None = None,
+    ) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity`.
+
+        Raises:
+            InvalidPath: the path is empty, not finite or not of shape (n, 3).
+            NoValidControl: the turn, or whatever the primary controller could do, collides.
+        """
+        if self._handler.accept(path):
+            self._turning = self._aligned = self._at_goal = False
+        angle = self._angle(pose, path)
+        if angle is None:
+            self._turning = False
+            command = self.primary.compute_velocity(
+                pose, velocity, path, costmap, dt, costmap_pose=costmap_pose
+            )
+            self.carrot, self.trajectory = self.primary.carrot, self.primary.trajectory
+        else:
+            known = velocity[1] if self.config.closed_loop or self._last_w is None else self._last_w
+            w = turn_rate(
+                angle,
+                known,
+                dt,
+                max_rate=self.config.rotate_to_heading_angular_vel,
+                acceleration=self.config.max_angular_accel,
+            )
+            self._check(costmap_pose or pose, w, angle, dt, costmap)
+            command, self.trajectory = (0.0, w), None
+        self._last_w = command[1]
+        return command
+
+    def _angle(self, pose: Pose2, path: Array) -> float | None:
+        """Return by how much to turn in place [rad]; None: drive."""
+        config, local = self.config, self._handler.local(pose)
+        goal = Pose2(*path[-1].tolist())
+        if config.rotate_to_goal_heading:
+            self._at_goal |= local.ends_at_goal and pose.distance(goal) <= self._tolerance
+            if self._at_goal:
+                self.carrot = goal[:2]
+                return wrap_angle(goal.yaw - pose.yaw)
+        if config.rotate_to_heading_once and self._aligned:
+            return None
+        far = np.hypot(*(local.poses[:, :2] - local.poses[0, :2]).T) >= config.forward_sampling_distance
+        if not far.any() and pose.distance(goal) <= self._tolerance:
+            return None
+        x, y, yaw = local.poses[int(np.argmax(far)) if far.any() else -1].tolist()
+        if config.use_path_orientations:
+            angle = wrap_angle(yaw - pose.yaw)
+        else:
+            angle = wrap_angle(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
+            if local.reversing:
+                angle = wrap_angle(angle + math.pi)
+        limit = config.angular_disengage_threshold if self._turning else config.angular_dist_threshold
+        if abs(angle) <= limit or (not far.any() and not self._turning and self._aligned):
+            self._aligned = True
+            return None
+        self._turning, self.carrot = True, (x, y)
+        return angle
+
+    def _check(self, pose: Pose2, w: float, angle: float, dt: float, costmap: Costmap | None) -> None:
+        """Look at the footprint while it turns; raises NoValidControl."""
+        if costmap is None or w == 0.0:
+            return
+        steps = math.ceil(min(self.config.simulate_ahead_time, abs(angle / w)) / dt)
+        for step in range(1, steps + 1):
+            at = Pose2(pose.x, pose.y, pose.yaw + w * dt * step)
+            cost = footprint_cost(costmap, self.footprint, at)
+            if self.config.max_cost_threshold <= cost != NO_INFORMATION:
+                raise NoValidControl(f"collision after turning for {step * dt:.2f} s at {w:.2f} rad/s")

@@ -1,0 +1,304 @@
+"""What a scenario may override of a robot's path following; names are Nav2's.
+
+The keys of every plugin stand side by side, as they do under FollowPath in a Nav2 file; one that the chosen
+plugin does not have is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from twin.errors import nearest
+from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.parameter_group import ParameterGroup
+from twin.strict_yaml import (
+    Fault,
+    Faults,
+    Hertz,
+    Metres,
+    MetresPerSecond,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+)
+
+Plugin = Literal["regulated_pure_pursuit", "mppi"]
+_Negative = Field(le=0.0)
+_Weight = Annotated[float, NotNegative]
+_Power = Annotated[int, Field(ge=1)]
+
+
+class PurePursuitParameters(ParameterGroup):
+    """Parameters of regulated pure pursuit."""
+
+    desired_linear_vel: Annotated[MetresPerSecond, Positive] | None = None
+    """Cruise speed [m/s]."""
+    lookahead_dist: Annotated[Metres, Positive] | None = None
+    """Distance of the point that is followed [m]."""
+    min_lookahead_dist: Annotated[Metres, Positive] | None = None
+    """Its lower bound when scaled by speed [m]."""
+    max_lookahead_dist: Annotated[Metres, Positive] | None = None
+    """Its upper bound when scaled by speed [m]."""
+    lookahead_time: Annotated[Seconds, Positive] | None = None
+    """Time that the point lies ahead when scaled by speed [s]."""
+    use_velocity_scaled_lookahead_dist: bool | None = None
+    """Whether that distance is scaled by speed."""
+    use_fixed_curvature_lookahead: bool | None = None
+    """Whether curvature is taken at curvature_lookahead_dist."""
+    curvature_lookahead_dist: Annotated[Metres, Positive] | None = None
+    """Distance of the point for the curvature [m]."""
+    interpolate_curvature_after_goal: bool | None = None
+    """Whether that point may lie beyond the goal."""
+    regulated_linear_scaling_min_radius: Annotated[Metres, Positive] | None = None
+    """Tighter turns are driven slower [m]."""
+    regulated_linear_scaling_min_speed: Annotated[MetresPerSecond, Positive] | None = None
+    """But not slower than this [m/s]."""
+    use_rotate_to_heading: bool | None = None
+    """Whether the robot turns in place to a path behind it, and at the goal."""
+    rotate_to_heading_min_angle: Annotated[Radians, Positive] | None = None
+    """Off the path's direction by more than this [rad]."""
+    approach_velocity_scaling_dist: Annotated[Metres, Positive] | None = None
+    """Nearer to the goal the robot slows down [m]."""
+    min_approach_linear_velocity: Annotated[MetresPerSecond, Positive] | None = None
+    """But not below this [m/s]."""
+    max_allowed_time_to_collision_up_to_carrot: Annotated[Seconds, Positive] | None = None
+    """How far ahead a command is checked for collisions [s]."""
+    turn_before_collision: bool | None = None
+    """Whether, where the arc ahead is blocked, the robot turns in place or creeps before following fails."""
+    use_collision_detection: bool | None = None
+    """Whether commands are checked for collisions."""
+    cost_scaling_dist: Annotated[Metres, Positive] | None = None
+    """Closer to an obstacle the robot slows down [m]."""
+    cost_scaling_gain: Annotated[float, Positive] | None = None
+    """Above 1: less."""
+    allow_reversing: bool | None = None
+    """Whether paths are driven backwards where their headings say so."""
+    use_cancel_deceleration: bool | None = None
+    """Whether a cancelled robot follows its path until it stands."""
+    cancel_deceleration: Annotated[float, Positive] | None = None
+    """Its deceleration then [m/s²]."""
+
+
+class RotationParameters(ParameterGroup):
+    """Parameters of turning in place: of regulated pure pursuit, and of the rotation shim."""
+
+    rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] | None = None
+    """Turn rate on the spot [rad/s]."""
+    max_angular_accel: Annotated[float, Positive] | None = None
+    """Its acceleration [rad/s²]."""
+
+
+class ShimParameters(ParameterGroup):
+    """Parameters of the rotation shim."""
+
+    angular_dist_threshold: Annotated[Radians, Positive] | None = None
+    """Farther off the path's direction the robot turns in place [rad]."""
+    angular_disengage_threshold: Annotated[Radians, Positive] | None = None
+    """Until it is nearer to it than this [rad]."""
+    forward_sampling_distance: Annotated[Metres, Positive] | None = None
+    """Where along the path its direction is taken [m]."""
+    simulate_ahead_time: Annotated[Seconds, Positive] | None = None
+    """How much of a turn is checked for collisions [s]."""
+    rotate_to_goal_heading: bool | None = None
+    """Whether the robot turns in place at the goal, too."""
+    rotate_to_heading_once: bool | None = None
+    """Whether only the beginning of a path is turned to."""
+
+
+class CriticParameters(ParameterGroup):
+    """What every critic of MPPI has."""
+
+    enabled: bool | None = None
+    """Whether it scores."""
+    cost_weight: _Weight | None = None
+    """What its score is multiplied by."""
+    cost_power: _Power | None = None
+    """And then raised to."""
+
+
+class NearCriticParameters(CriticParameters):
+    """A critic that scores only near to the goal, or only far from it."""
+
+    threshold_to_consider: Annotated[Metres, NotNegative] | None = None
+    """Length of the local path where that changes [m]."""
+
+
+class PathCriticParameters(NearCriticParameters):
+    """A critic of the path."""
+
+    offset_from_furthest: Annotated[int, Field(ge=0)] | None = None
+    """Poses of the path, 5 cm apart, past the furthest that a rollout reaches; see docs."""
+    trajectory_point_step: _Power | None = None
+    """Every so many points of a rollout are looked at (PathAlignCritic)."""
+
+
+class CostCriticParameters(CriticParameters):
+    """The critic of the costmap."""
+
+    critical_cost: _Weight | None = None
+    """Of a point in the inscribed zone."""
+    consider_footprint: bool | None = None
+    """Whether the outline is checked, not the centre."""
+    near_goal_distance: Annotated[Metres, NotNegative] | None = None
+    """Nearer to the goal only collisions count [m]."""
+    trajectory_point_step: _Power | None = None
+    """Every so many points of a rollout are looked at."""
+
+
+class SpeedCriticParameters(CriticParameters):
+    """The critic of speed near obstacles."""
+
+    cost_scaling_dist: Annotated[Metres, Positive] | None = None
+    """With more clearance there is no limit [m]."""
+    cost_scaling_gain: Annotated[float, Positive] | None = None
+    """Above 1: faster near obstacles."""
+    min_speed: Annotated[MetresPerSecond, Positive] | None = None
+    """Allowed everywhere [m/s]."""
+
+
+class MPPIParameters(ParameterGroup):
+    """Parameters of MPPI."""
+
+    batch_size: Annotated[int, Field(ge=8)] | None = None
+    """Number of rollouts."""
+    time_steps: Annotated[int, Field(ge=4)] | None = None
+    """Steps of each."""
+    model_dt: Annotated[Seconds, Positive] | None = None
+    """Length of a step; absent: the control period [s]."""
+    iteration_count: _Power | None = None
+    """Rounds per command."""
+    vx_max: Annotated[MetresPerSecond, Positive] | None = None
+    """Cruise speed [m/s]."""
+    vx_min: Annotated[MetresPerSecond, _Negative] | None = None
+    """Fastest way back, negative [m/s]."""
+    wz_max: Annotated[RadiansPerSecond, Positive] | None = None
+    """Fastest turn [rad/s]."""
+    ax_max: Annotated[float, Positive] | None = None
+    """Acceleration [m/s²]."""
+    ax_min: Annotated[float, _Negative] | None = None
+    """Deceleration, negative [m/s²]."""
+    az_max: Annotated[float, Positive] | None = None
+    """Angular acceleration [rad/s²]."""
+    vx_std: Annotated[MetresPerSecond, Positive] | None = None
+    """Of the noise [m/s]."""
+    wz_std: Annotated[RadiansPerSecond, Positive] | None = None
+    """Of the noise [rad/s]."""
+    temperature: Annotated[float, Positive] | None = None
+    """The lower, the more the best rollouts count."""
+    gamma: _Weight | None = None
+    """Price of changing the controls."""
+    noise_time_constant: Annotated[Seconds, NotNegative] | None = None
+    """Of the noise; 0: white, as in Nav2 [s]."""
+    regenerate_noises: bool | None = None
+    """Whether the noise changes from command to command."""
+    retry_attempt_limit: Annotated[int, Field(ge=0)] | None = None
+    """Starts from rest when every rollout collides."""
+    motion_model: Literal["DiffDrive", "Ackermann"] | None = None
+    """What the drive can do."""
+    min_turning_r: Annotated[Metres, Positive] | None = None
+    """Of motion model Ackermann [m]."""
+    model_delay_vx: Annotated[Seconds, NotNegative] | None = None
+    """From a command to its effect [s]."""
+    model_delay_wz: Annotated[Seconds, NotNegative] | None = None
+    """The same for turning [s]."""
+    ConstraintCritic: CriticParameters = CriticParameters()
+    """Speeds beyond the limits."""
+    CostCritic: CostCriticParameters = CostCriticParameters()
+    """Costs and collisions."""
+    GoalCritic: NearCriticParameters = NearCriticParameters()
+    """Distance to the goal."""
+    GoalAngleCritic: NearCriticParameters = NearCriticParameters()
+    """Angle to the goal's heading."""
+    PathAlignCritic: PathCriticParameters = PathCriticParameters()
+    """Distance to the path."""
+    PathFollowCritic: PathCriticParameters = PathCriticParameters()
+    """Getting on along the path."""
+    PathAngleCritic: PathCriticParameters = PathCriticParameters()
+    """Looking along the path."""
+    PreferForwardCritic: NearCriticParameters = NearCriticParameters()
+    """Driving backwards."""
+    SpeedCritic: SpeedCriticParameters = SpeedCriticParameters()
+    """Speed near obstacles."""
+
+
+class ServerParameters(ParameterGroup):
+    """Parameters of the server, and of its goal and progress checkers."""
+
+    plugin: Plugin | None = None
+    """What follows the path; absent: `regulated_pure_pursuit`."""
+    rotation_shim: bool | None = None
+    """Whether the robot turns in place to a path's direction, and at the goal; absent: with all but regulated
+    pure pursuit, which does that itself."""
+    controller_frequency: Annotated[Hertz, Positive] | None = None
+    """Rate of the velocity commands [Hz]."""
+    failure_tolerance: Annotated[Seconds, NotNegative] | None = None
+    """How long the robot waits for a way to open before following fails [s]."""
+    goal_checker: Literal["simple", "stopped", "position"] | None = None
+    """What a goal asks for: position and heading, rest too, or position alone; absent: `simple`."""
+    xy_goal_tolerance: Annotated[Metres, Positive] | None = None
+    """Position tolerance of the goal checker [m]."""
+    yaw_goal_tolerance: Annotated[Radians, Positive] | None = None
+    """Heading tolerance of the goal checker [rad]."""
+    progress_checker: Literal["simple", "pose"] | None = None
+    """What progress is: a movement, or a turn too; absent: `simple`."""
+    required_movement_radius: Annotated[Metres, Positive] | None = None
+    """Progress checker: movement that counts [m]."""
+    required_movement_angle: Annotated[Radians, Positive] | None = None
+    """Progress checker `pose`: turn that counts [rad]."""
+    movement_time_allowance: Annotated[Seconds, Positive] | None = None
+    """Progress checker: time allowed for it [s]."""
+
+
+_OF_PLUGIN: dict[str, tuple[type[ParameterGroup], ...]] = {
+    "regulated_pure_pursuit": (PurePursuitParameters, RotationParameters),
+    "mppi": (MPPIParameters,),
+}
+
+
+class ControllerParameters(
+    ServerParameters,
+    PurePursuitParameters,
+    RotationParameters,
+    ShimParameters,
+    MPPIParameters,
+):
+    """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
+
+    @property
+    def chosen(self) -> Plugin:
+        """The plugin, given or not."""
+        return self.plugin or "regulated_pure_pursuit"
+
+    @property
+    def shim(self) -> bool:
+        """Whether the rotation shim is in front of it."""
+        return self.chosen != "regulated_pure_pursuit" if self.rotation_shim is None else self.rotation_shim
+
+    @model_validator(mode="after")
+    def _keys_of_the_plugin(self) -> ControllerParameters:
+        faults = list(self._foreign())
+        if faults:
+            raise Faults(faults)
+        return self
+
+    def _foreign(self) -> Iterator[Fault]:
+        groups: list[type[ParameterGroup]] = [ServerParameters, *_OF_PLUGIN[self.chosen]]
+        if self.shim:
+            groups += [ShimParameters, RotationParameters]
+        valid = {name for group in groups for name in group.model_fields}
+        for name in type(self).model_fields:
+            if name in self.model_fields_set and name not in valid:
+                owner = "the rotation shim" if name in ShimParameters.model_fields else "another plugin"
+                told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
+                yield Fault((name,), f"'{name}' is of {owner}, not of {told}; {nearest(name, sorted(valid))}")
+
+    def overrides(self) -> dict[str, Any]:
+        """Return only the parameters that the file gives, by name; a critic's as a mapping."""
+        found = super().overrides()
+        return {
+            name: value.overrides() if isinstance(value, ParameterGroup) else value
+            for name, value in found.items()
+        }
