@@ -20,8 +20,6 @@ def clearance(pose: Pose2, corners: Array, centres: Array, radius: float) -> flo
         return float("inf")
     local = pose.inverse().apply(centres)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    outside = np.maximum(np.maximum(low - local, local - high), 0.0)
-    inside = np.minimum(np.minimum(local - low, high - local).min(axis=1), 0.0 + np.inf)
-    distance = np.hypot(outside[:, 0], outside[:, 1])
-    distance = np.where(distance > 0.0, distance, -np.maximum(inside, 0.0))
-    return float(distance.min() - radius)
+    aside = np.maximum(low - local, local - high)
+    outside, inside = np.maximum(aside, 0.0), np.minimum(aside.max(axis=1), 0.0)
+    return float(np.min(np.hypot(outside[:, 0], outside[:, 1]) + inside)) - radius

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -14,6 +15,7 @@ from twin.benchmarks.barn.scenarios import BarnOptions, write
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
 from twin.runtime import run
 from twin.scenario import schema
+from twin.scenario.verdict import write_atomically
 
 
 def run_world(
@@ -24,11 +26,13 @@ def run_world(
     scenario = schema.load(path, dict(options.overrides))
     referee = Referee(world, rules)
     verdict = run(scenario, out=folder, record=record, watch=referee.watch)
-    return referee.trial(
+    trial = referee.trial(
         seed=options.seed,
         recoveries=int(verdict.metrics["recoveries"]),
         real_time_factor=verdict.metrics["real_time_factor"],
     )
+    write_atomically(folder / "trial.json", (json.dumps(trial.to_dict(), indent=2) + "\n").encode())
+    return trial
 
 
 def run_worlds(
