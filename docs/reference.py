@@ -24,8 +24,8 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
-from twin.navigation.localisation.amcl import AmclConfig
-from twin.navigation.planning.planner import PlannerConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
@@ -207,7 +207,7 @@ def _flow(text: str) -> str:
 
 PARAMETERS: Mapping[str, type[Any]] = {
     "/amcl": AmclConfig,
-    "/planner_server": PlannerConfig,
+    "/planner_server": ThetaStarConfig,
     "/controller_server, regulated pure pursuit": RegulatedPurePursuitConfig,
     "/controller_server, goal checker": GoalCheckerConfig,
     "/controller_server, progress checker": ProgressCheckerConfig,

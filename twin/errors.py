@@ -5,6 +5,7 @@ TwinError
 ├── ConversionError   a robot description has no faithful MuJoCo model
 ├── ScenarioError     a scenario or arena file is wrong
 ├── MapError          a map file is wrong
+├── NavigationError   a behaviour tree or a file of Nav2 parameters is wrong
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── RecordingError    a recording cannot be written or read
 └── SimulationError   the physics cannot go on (diverged)
@@ -90,6 +91,10 @@ class ScenarioError(TwinError):
 
 class MapError(TwinError):
     """A map file is wrong."""
+
+
+class NavigationError(TwinError):
+    """A behaviour tree or a file of Nav2 parameters is wrong."""
 
 
 class BridgeError(TwinError):

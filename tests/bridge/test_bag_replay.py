@@ -28,7 +28,7 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, stamp
 from twin.bridge.qos import LATCHED
 from twin.errors import RecordingError
-from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode

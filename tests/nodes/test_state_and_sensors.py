@@ -30,7 +30,7 @@ from twin.geometry import Pose2
 from twin.models import load
 from twin.models.kinematics import link_poses
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
-from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import Frames

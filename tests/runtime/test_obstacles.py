@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
+
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
+from twin.geometry import Pose2
+from twin.runtime.obstacles import Walker
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
+from twin.scenario.world import Obstacle
 
 TEXT = """
 name: crate
@@ -41,3 +46,46 @@ def test_an_obstacle_appears_when_the_robot_is_near_and_is_seen_and_touched(
     (check,) = run.checks
     assert "hit crate" in check.result().reason
     assert run.world.pose(stack.handle.base).xyz[0] < 1.8, "and it stops the robot"
+
+
+WALKER = Obstacle(name="walker", size=(0.4, 0.4, 1.0), route=((3.0, 0.0), (3.0, 1.0)), speed=0.5)
+
+
+def test_a_walker_goes_along_its_route_and_back() -> None:
+    walker = Walker(WALKER)
+    places = []
+    for _ in range(161):
+        walker.walk(0.1, [])
+        places.append((walker.pose.x, walker.pose.y))
+    assert places[19] == pytest.approx((1.0, 0.0))
+    assert places[69] == pytest.approx((3.0, 0.5))
+    assert max(y for _, y in places) == 1.0
+    assert places[160] == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_a_walker_stops_before_a_robot_and_turns_back_when_it_does_not_go_away() -> None:
+    walker = Walker(WALKER)
+    robot = Pose2(2.0, 0.0, 0.0)
+    places = [(walker.walk(0.1, [robot]), walker.pose.x)[1] for _ in range(60)]
+    assert max(places) <= 2.0 - 0.2 - 1.0 + 1e-9, "a metre between its footprint and the robot's base"
+    assert places[45:] == sorted(places[45:], reverse=True), "patience is over"
+    near = Walker(WALKER)
+    assert near.walk(0.1, [Pose2(-0.5, 0.0, 0.0)]), "who walks away from a robot need not wait"
+
+
+def test_a_walker_is_seen_by_the_lidar_where_it_walks(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
+) -> None:
+    run = make_run(scenario(TEXT.replace("appears_within: 1 m", "route: [[4, 0]], speed: 0.4")))
+    ahead: list[tuple[float, float]] = []
+
+    def on_sample(sample: object) -> None:
+        if sample.topic == "/scan":  # type: ignore[attr-defined]
+            ranges = sample.message.ranges  # type: ignore[attr-defined]
+            ahead.append((run.world.time_ns * 1e-9, float(ranges[len(ranges) // 2])))
+
+    run.bus.tap(on_sample)
+    while run.world.time_ns < 3e9:
+        run.tick()
+    (early, near), (late, far) = ahead[0], ahead[-1]
+    assert far - near == pytest.approx(0.4 * (late - early), abs=0.05)

@@ -193,6 +193,9 @@ def test_recoveries() -> None:
     assert fold(forced, run(0, 1, 1)).at_s == 2.0, "when it last recovered"
     assert fold(forced, run(0, 0)).reason == "bot recovered 0 times"
     assert fold(forced, run(0, 3)).limit == 2.0
+    km = [at(t, robots=bot(x, 0.0, recoveries=int(x > 0))) for t, x in enumerate((0.0, 900.0, 1100.0))]
+    assert not fold({"recoveries": {"max_per_km": 1}}, km[:2]).passed
+    assert fold({"recoveries": {"max_per_km": 1}}, km).passed
 
 
 def test_driven_distance() -> None:
@@ -250,6 +253,8 @@ def test_closed_loop() -> None:
         {"odometry_drift": {"max": 1}},
         {"driven_distance": {"min": 0}},
         {"recoveries": {"max": 1}},
+        {"map_accuracy": {"mean": 1}},
+        {"map_coverage": {"floor": 0.5}},
         {"energy": {"max": 1}},
         {"final_pose": {"x": 0, "y": 0}},
         {"path_on_circle": {"radius": 1, "tolerance": 1}},

@@ -92,6 +92,7 @@ MarkerArray = ros.visualization_msgs__msg__MarkerArray
 
 CollisionMonitorState: Any = types.get("nav2_msgs/msg/CollisionMonitorState")
 Costmap: Any = types.get("nav2_msgs/msg/Costmap")
+CostmapFilterInfo: Any = types.get("nav2_msgs/msg/CostmapFilterInfo")
 CostmapMetaData: Any = types.get("nav2_msgs/msg/CostmapMetaData")
 CostmapUpdate: Any = types.get("nav2_msgs/msg/CostmapUpdate")
 BehaviorTreeLog: Any = types.get("nav2_msgs/msg/BehaviorTreeLog")
@@ -99,6 +100,7 @@ BehaviorTreeStatusChange: Any = types.get("nav2_msgs/msg/BehaviorTreeStatusChang
 Particle: Any = types.get("nav2_msgs/msg/Particle")
 ParticleCloud: Any = types.get("nav2_msgs/msg/ParticleCloud")
 SpeedLimit: Any = types.get("nav2_msgs/msg/SpeedLimit")
+ExploreStatus: Any = types.get("explore_lite_msgs/msg/ExploreStatus")
 GripperCommandMsg: Any = types.get("control_msgs/msg/GripperCommand")
 JointTolerance: Any = types.get("control_msgs/msg/JointTolerance")
 JointTrajectoryControllerState: Any = types.get("control_msgs/msg/JointTrajectoryControllerState")
@@ -143,12 +145,14 @@ __all__ = [
     "ColorRGBA",
     "CompressedImage",
     "Costmap",
+    "CostmapFilterInfo",
     "CostmapMetaData",
     "CostmapUpdate",
     "DiagnosticArray",
     "DiagnosticStatus",
     "Duration",
     "Empty",
+    "ExploreStatus",
     "Float32",
     "Float64",
     "Float64MultiArray",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -9,7 +10,7 @@ if TYPE_CHECKING:
     from twin.bridge.graph import Graph
 
 
-class NodeGraph:
+class NodeGraph(ABC):
     """Looks at the graph: everything on this bus and, if it is networked, beyond. Each look asks anew."""
 
     bus: Bus
@@ -46,9 +47,9 @@ class NodeGraph:
         """
         return len(self._graph().subscriptions(self.resolve_name(topic)))
 
+    @abstractmethod
     def resolve_name(self, name: str) -> str:
         """Return the absolute, remapped name."""
-        raise NotImplementedError
 
     def _graph(self) -> Graph:
         from twin.bridge.graph import Graph

@@ -8,8 +8,10 @@ import sys
 
 import typer
 
-from twin.cli import batch, bench, check, convert, exec, graph, play, robots, run, schema, tree, view
+from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
+from twin.cli.bench import app as bench_app
 from twin.cli.console import print_error
+from twin.cli.map import app as map_app
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
 
@@ -66,7 +68,8 @@ for _name, _function, _panel, _example in _COMMANDS:
 for _name, _group in _GROUPS:
     app.add_typer(_group, name=_name, rich_help_panel=_GRAPH)
 
-app.add_typer(bench.app, name="bench", rich_help_panel=_NAVIGATION)
+app.add_typer(map_app, name="map", rich_help_panel=_NAVIGATION)
+app.add_typer(bench_app, name="bench", rich_help_panel=_NAVIGATION)
 
 
 @app.callback()

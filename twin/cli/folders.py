@@ -27,6 +27,11 @@ def bag_folder() -> Path:
     return Path(datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S"))
 
 
+def map_name() -> Path:
+    """Return `map_<seconds>`, as nav2's map_saver_cli names a map."""
+    return Path(f"map_{int(datetime.now().timestamp())}")
+
+
 def make_folder(path: Path) -> Path:
     """Make a folder for results, unless it is there; raises RecordingError where that cannot be."""
     try:

@@ -15,7 +15,25 @@ class NavigationFailure(Exception):
 class PlanningFailure(NavigationFailure):
     """No plan; codes of nav2_msgs/action/ComputePathToPose."""
 
+    error_code = 200
+
+
+class InvalidPlanner(PlanningFailure):
+    """There is no planner of that name."""
+
     error_code = 201
+
+
+class NoPose(PlanningFailure):
+    """A pose cannot be brought into the map frame, or there is no map."""
+
+    error_code = 202
+
+
+class NoViapoints(PlanningFailure):
+    """No poses to go through; a code of ComputePathThroughPoses alone, 309, less the offset of its codes."""
+
+    error_code = 209
 
 
 class StartOutsideMap(PlanningFailure):
@@ -40,6 +58,12 @@ class GoalOccupied(PlanningFailure):
     """The goal, and everything within the tolerance around it, is inside an obstacle."""
 
     error_code = 206
+
+
+class PlanningTimeout(PlanningFailure):
+    """The search was given up."""
+
+    error_code = 207
 
 
 class NoValidPath(PlanningFailure):

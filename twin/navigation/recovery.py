@@ -1,4 +1,4 @@
-"""Behaviours that get a robot out of trouble: spin, back up, drive on heading, wait (nav2_behaviors).
+"""Behaviours that get a robot out of trouble (nav2_behaviors): spin, back up, drive, wait, assisted teleop.
 
 Each is made for one execution; `update` is called once per control period until `done` or `failed_reason`.
 """
@@ -49,6 +49,10 @@ class BehaviorConfig:
     """As a magnitude [m/s²]."""
     minimum_speed: float = 0.05
     """[m/s]"""
+    projection_time: float = 1.0
+    """How far ahead assisted teleop looks for collisions [s]."""
+    simulation_time_step: float = 0.1
+    """In steps of this [s]."""
     footprint: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     """[m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
 
@@ -68,6 +72,8 @@ class _Behavior:
         self._last_yaw = 0.0
         self._start: Pose2 | None = None
         self._speed = 0.0
+        self.progress = 0.0
+        """For feedback: turned [rad], driven [m], time left or time steered [s]."""
 
     def _timed_out(self, dt: float) -> bool:
         self._elapsed += dt
@@ -118,6 +124,7 @@ class Spin(_Behavior):
             self._start, self._last_yaw = pose, pose.yaw
         self._turned += wrap_angle(pose.yaw - self._last_yaw)
         self._last_yaw = pose.yaw
+        self.progress = abs(self._turned)
         direction = math.copysign(1.0, self.target_yaw)
         remaining = abs(self.target_yaw) - direction * self._turned
         if remaining <= 1e-3:
@@ -146,7 +153,8 @@ class DriveOnHeading(_Behavior):
         """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
         if self._start is None:
             self._start = pose
-        remaining = abs(self.target_distance) - self._start.distance(pose)
+        self.progress = self._start.distance(pose)
+        remaining = abs(self.target_distance) - self.progress
         if remaining <= 1e-3:
             return BehaviorStep(0.0, 0.0, done=True)
         if self._timed_out(dt):
@@ -179,4 +187,49 @@ class Wait(_Behavior):
         """Return a zero command until the duration is over."""
         del pose, costmap
         self._elapsed += dt
+        self.progress = max(self.duration - self._elapsed, 0.0)
         return BehaviorStep(0.0, 0.0, done=self._elapsed >= self.duration - 1e-9)
+
+
+@dataclass(kw_only=True)
+class AssistedTeleop(_Behavior):
+    """Does what somebody steers, slower the nearer a collision is; until `is_over`, or the time is over."""
+
+    steered: tuple[float, float] = (0.0, 0.0)
+    """The latest command of whoever steers: v [m/s], w [rad/s]."""
+    is_over: bool = False
+    """Whether whoever steers has had enough."""
+
+    def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
+        """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
+        if self.is_over:
+            return BehaviorStep(0.0, 0.0, done=True)
+        if self._timed_out(dt):
+            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
+        self.progress = self._elapsed
+        v, w = self.steered
+        share = self._share(pose, v, w, costmap)
+        return BehaviorStep(v * share, w * share)
+
+    def _share(self, pose: Pose2, v: float, w: float, costmap: Costmap | None) -> float:
+        """Return by how much a command is to be slowed: 1 where nothing is hit within the projection."""
+        if costmap is None or (v == 0.0 and w == 0.0):
+            return 1.0
+        config = self.config
+        steps = max(1, round(config.projection_time / config.simulation_time_step))
+        hit = steps_to_collision(
+            costmap.costs,
+            self._footprint,
+            float(pose.x),
+            float(pose.y),
+            float(pose.yaw),
+            float(v),
+            float(w),
+            float(config.simulation_time_step),
+            math.inf,
+            steps,
+            *costmap.frame,
+        )
+        if hit == -1:
+            return 1.0
+        return 0.0 if hit <= 1 else hit / steps

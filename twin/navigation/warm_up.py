@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import footprint_cost
+from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.exploration.explorer import Explorer
+from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.planner import Planner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
 
@@ -22,11 +24,19 @@ def warm_up() -> None:
     data[0] = data[-1] = 100
     room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
     layered = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room)
-    layered.update([[0.5, 1.0]], (1.0, 1.0))
+    layered.update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
+    layered.update_range(Pose2(1.0, 1.0, 0.0), 0.3, (0.1, 0.5), 0.2)
+    layered.set_keepout(KeepoutFilter(mask=room))
     costmap = layered.costmap
     start, goal = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
-    SimpleSmoother().smooth(Planner(config=PlannerConfig()).plan(costmap, start, goal), costmap)
+    SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
     footprint_cost(costmap, layered.config.polygon, start)
     DriveOnHeading().update(start, 0.1, costmap)
-    field = LikelihoodField(room, sigma_hit=0.1, z_hit=0.5, z_rand=0.5, max_dist=math.sqrt(2.0))
-    field.log_likelihood(np.ones((2, 3)), np.ones((2, 2)))
+    Explorer().update(room, start, 0.0)
+    _localise(room)
+
+
+def _localise(room: OccupancyMap) -> None:
+    beams = chosen_beams([0.5, 0.6], [0.0, 1.0], Pose2(0.0, 0.0, 0.0), most=2, min_range=0.0, max_range=9.0)
+    field = LikelihoodField(SurfaceDistance(room, max_dist=2.0), z_hit=0.5, z_rand=0.5)
+    field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)

@@ -23,6 +23,7 @@ from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack
 from twin.runtime.stack_context import StackContext
+from twin.runtime.surroundings import surroundings
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone
@@ -125,7 +126,7 @@ def build(
             )
             for robot in scenario.robots
         }
-        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces)
+        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces, scenario.seed)
         for place in outside.nodes:
             create_nodes(bus, place)
     except BaseException:
@@ -137,7 +138,7 @@ def build(
         clock=clock,
         stacks=stacks,
         mission=mission,
-        checks=_check_context(scenario, scene, arena),
+        checks=_check_context(scenario, scene, arena, stacks),
         control_period_ns=control_period_ns,
     )
 
@@ -193,6 +194,8 @@ def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
     if obstacle.appears_within is not None:
         hidden = hidden_pose(obstacle)
         return PlacedBody(name=obstacle.name, T_world_body=hidden, shapes=shapes, friction=obstacle.friction)
+    if obstacle.route is not None:
+        return PlacedBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
     if obstacle.mass is None:
         return StaticBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
     return FreeBody(
@@ -237,7 +240,9 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
     return grid
 
 
-def _check_context(scenario: Scenario, scene: Scene, arena: Arena | None) -> CheckContext:
+def _check_context(
+    scenario: Scenario, scene: Scene, arena: Arena | None, stacks: Mapping[str, RobotStack]
+) -> CheckContext:
     zones = {}
     if arena is not None:
         for name, zone in arena.zones.items():
@@ -254,7 +259,10 @@ def _check_context(scenario: Scenario, scene: Scene, arena: Arena | None) -> Che
         for good in scene.goods
     }
     return CheckContext(
-        robots=tuple(robot.id for robot in scenario.robots), zones=zones, good_bottoms=bottoms
+        robots=tuple(stacks),
+        zones=zones,
+        good_bottoms=bottoms,
+        surroundings={name: surroundings(scene, stack) for name, stack in stacks.items()},
     )
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import (
     GoalCheckerConfig,
     PositionGoalCheckerConfig,
@@ -43,6 +45,8 @@ def controller_server_config(
     controller: ControllerConfig
     if parameters.chosen == "mppi":
         controller = overridden(_mppi(smoother, period_ns * 1e-9, overrides), overrides)
+    elif parameters.chosen == "dwb":
+        controller = overridden(_dwb(smoother, overrides), overrides)
     else:
         controller = overridden(_pure_pursuit(smoother, goal_checker.xy_goal_tolerance), overrides)
     if parameters.shim:
@@ -89,7 +93,6 @@ def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[st
     speed = overrides.get("vx_max") or linear.max_velocity
     model_dt = overrides.get("model_dt") or period
     steps = overrides.get("time_steps") or max(8, round(2.4 / model_dt))
-    braking = linear.max_acceleration if linear.max_deceleration is None else linear.max_deceleration
     return MPPIConfig(
         batch_size=600,
         time_steps=steps,
@@ -98,7 +101,7 @@ def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[st
         vx_min=-0.15,
         wz_max=angular.max_velocity,
         ax_max=linear.max_acceleration,
-        ax_min=-braking,
+        ax_min=-_braking(linear),
         az_max=angular.max_acceleration,
         vx_std=max(0.2, 0.2 * speed),
         noise_time_constant=0.6,
@@ -108,6 +111,26 @@ def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[st
         GoalAngleCritic=GoalAngleCriticConfig(enabled=False),
         PathAlignCritic=PathAlignCriticConfig(offset_from_furthest=2, threshold_to_consider=0.05),
     )
+
+
+def _dwb(smoother: VelocitySmootherConfig, overrides: Mapping[str, Any]) -> DWBConfig:
+    """Return a local path as long as a sample drives: a farther end is driven to across the corners."""
+    linear, angular = smoother.linear, smoother.angular
+    speed, sim_time = overrides.get("max_vel_x") or linear.max_velocity, overrides.get("sim_time") or 1.2
+    return DWBConfig(
+        sim_time=sim_time,
+        prune_distance=max(0.6, speed * sim_time),
+        max_vel_x=linear.max_velocity,
+        max_vel_theta=angular.max_velocity,
+        acc_lim_x=linear.max_acceleration,
+        decel_lim_x=-_braking(linear),
+        acc_lim_theta=angular.max_acceleration,
+        decel_lim_theta=-_braking(angular),
+    )
+
+
+def _braking(limits: AxisLimits) -> float:
+    return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
 
 
 def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:

@@ -6,27 +6,37 @@ import math
 from typing import Any
 
 from twin.geometry import Pose2
-from twin.navigation.localisation.amcl import AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 from twin.nodes.navigation.static_localisation import StaticLocalisationNode
 from twin.runtime.navigation_config import overridden
 from twin.runtime.stack_context import StackContext
+from twin.scenario.localisation import SlamLocalisation
 from twin.sim.noise import NoiseStream
 
+_MAP_UPDATE_INTERVAL = 2.0
+"""Time between two maps that a robot plans on while it makes them [s]; slam_toolbox's own is 5 s."""
 
-def build_localisation(context: StackContext, pose: RobotPose) -> None:
-    """Create the nodes that the scenario's `localisation` asks for."""
+
+def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNode | None:
+    """Create the nodes that the scenario's `localisation` asks for; return the one that maps, if any."""
     config = context.config.localisation
     if config is None or config.type == "none":
-        return
+        return None
+    if config.type == "slam":
+        return _slam(context, config, pose)
     guess = _initial_guess(context.start, config.initial_pose_error, context.seed, context.handle.name)
     if config.type == "odometry":
         StaticLocalisationNode(context.bus, pose.frames, guess, namespace=context.namespace)
-        return
+        return None
     assert context.map is not None
     MapServerNode(context.bus, context.map, namespace=context.namespace)
+    MapSaverNode(context.bus, namespace=context.namespace)
     AmclNode(
         context.bus,
         pose,
@@ -35,6 +45,23 @@ def build_localisation(context: StackContext, pose: RobotPose) -> None:
         seed=context.seed,
         namespace=context.namespace,
     )
+    return None
+
+
+def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> SlamToolboxNode:
+    """Create `/slam_toolbox`; its map's frame is the world's, unless the scenario gives another start."""
+    start = context.start if config.map_start_pose is None else config.map_start_pose.pose
+    guess = _initial_guess(start, config.initial_pose_error, context.seed, context.handle.name)
+    overrides = config.parameters.overrides()
+    interval = overrides.pop("map_update_interval", _MAP_UPDATE_INTERVAL)
+    node_config = SlamNodeConfig(
+        mode=config.mode,
+        map_file_name=config.pose_graph or "",
+        map_start_pose=(guess.x, guess.y, guess.yaw),
+        map_update_interval_ns=round(interval * 1e9),
+        slam=overridden(SlamConfig(), overrides),
+    )
+    return SlamToolboxNode(context.bus, pose, node_config, namespace=context.namespace)
 
 
 def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:

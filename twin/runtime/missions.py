@@ -11,17 +11,26 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Point, duration, new
 from twin.errors import ScenarioError
 from twin.geometry import Pose2, Pose3
+from twin.navigation.costmaps import footprint as footprints
+from twin.navigation.exploration.explorer import ExplorerConfig
+from twin.navigation.exploration.frontiers import FrontierConfig
+from twin.nodes.explore_mission import ExploreMissionNode
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import ActionSequenceNode, ActionStep, VelocityProfileNode
+from twin.nodes.navigation.explorer import ExplorerNode, ExplorerNodeConfig
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.nodes.random_goals import RandomGoalsConfig, RandomGoalsNode
+from twin.runtime.navigation_config import overridden
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.missions import (
     Behaviors,
     BehaviorStep,
+    Explore,
     Idle,
     Mission,
     PickAndPlace,
     R2D2StatePublisher,
+    RandomGoals,
     VelocityProfile,
 )
 from twin.warehouse.arena import Arena
@@ -64,6 +73,7 @@ def build_mission(
     stacks: Mapping[str, RobotStack],
     arena: Arena | None,
     namespaces: Mapping[str, str],
+    seed: int,
 ) -> MissionHandle:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
@@ -75,9 +85,19 @@ def build_mission(
         case Behaviors():
             steps = [_behavior(step, stack) for step in mission.steps]
             return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
+        case RandomGoals():
+            goals = RandomGoalsConfig(
+                distance=mission.distance,
+                clearance=mission.clearance,
+                min_goal_distance=mission.min_goal_distance,
+                max_failed=mission.max_failed,
+            )
+            return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():
             profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
             return VelocityProfileNode(bus, profile * mission.repeat, namespace=namespace)
+        case Explore():
+            return _explore(bus, mission, stack, namespace)
         case R2D2StatePublisher():
             return R2D2StatePublisherNode(
                 bus,
@@ -125,6 +145,16 @@ def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
     navigate_goal = new(NavigateToPose.Goal, pose=target)
     label = f"navigate to ({goal.x:g}, {goal.y:g})"
     return ActionStep(label, NavigateToPose, "navigate_to_pose", lambda: navigate_goal)
+
+
+def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
+    overrides = mission.overrides()
+    inner, outer = footprints.radii(stack.footprint)
+    frontiers = overridden(FrontierConfig(robot_radius=outer, inscribed_radius=inner), overrides)
+    explorer = overridden(ExplorerConfig(frontiers=frontiers), overrides)
+    config = ExplorerNodeConfig(return_to_init=mission.return_to_init, explorer=explorer)
+    node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)
+    return ExploreMissionNode(bus, node, namespace=namespace)
 
 
 def _pick_and_place(

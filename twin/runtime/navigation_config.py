@@ -12,11 +12,12 @@ from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.commitment import CommitmentConfig
-from twin.navigation.planning.planner import PlannerConfig
+from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.controller_config import controller_server_config
 from twin.runtime.overrides import overridden as overridden
@@ -36,7 +37,8 @@ class NavigationParameters:
     smoother: VelocitySmootherConfig
     global_costmap: CostmapNodeConfig
     local_costmap: CostmapNodeConfig
-    planner: PlannerConfig
+    planner: PlannerPluginConfig
+    planner_server: PlannerServerConfig
     commitment: CommitmentConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
@@ -44,7 +46,7 @@ class NavigationParameters:
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -53,12 +55,14 @@ def navigation_parameters(
         drive: Whose limits hold where the scenario gives none.
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
+        mapping: Whether the map is made on the way: paths may lead through what is unknown.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
     angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
     layers = CostmapConfig(
         footprint=polygon,
+        footprint_padding=0.0,  # it is in the footprint already
         inflation_radius=0.8,
         cost_scaling_factor=4.0,
         obstacle_max_range=4.0,
@@ -87,7 +91,10 @@ def navigation_parameters(
         local_costmap=_costmap(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
-        planner=overridden(PlannerConfig(tolerance=0.1, allow_unknown=False), config.planner.overrides()),
+        planner=overridden(
+            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
+        ),
+        planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
@@ -97,10 +104,10 @@ def navigation_parameters(
 
 def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
     defaults = BtNavigatorConfig()
+    frequency = overrides.get("bt_loop_frequency")
     return replace(
         overridden(defaults, overrides),
-        bt_loop_duration_ns=_period_ns(overrides.get("bt_loop_frequency"), defaults.bt_loop_duration_ns),
-        replanning_period_ns=_period_ns(overrides.get("replanning_frequency"), defaults.replanning_period_ns),
+        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
     )
 
 
@@ -114,6 +121,7 @@ def _costmap(
         layers=overridden(
             replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
         ),
+        range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )
 

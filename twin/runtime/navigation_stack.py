@@ -11,10 +11,13 @@ from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
+from twin.runtime.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
 
 
@@ -31,20 +34,27 @@ def build_navigation(
     """
     bus, namespace, description = context.bus, context.namespace, context.handle.description
     assert description.drive is not None
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames)
+    localisation = context.config.localisation
+    mapping = localisation is not None and localisation.type == "slam"
+    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     period_ns = context.control_period_ns
     TwistMuxNode(bus, namespace=namespace)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
-    global_costmap = CostmapNode(bus, pose, parameters.global_costmap, namespace=namespace)
-    local_costmap = CostmapNode(bus, pose, parameters.local_costmap, namespace=namespace)
+    build_zones(bus, config, pose.frames.map, namespace=namespace)
+    in_map = with_filters(parameters.global_costmap, config, speed=False)
+    global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
+    around = with_filters(parameters.local_costmap, config, speed=True)
+    local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
     PlannerServerNode(
         bus,
         pose,
         global_costmap,
         config=parameters.planner,
+        server=parameters.planner_server,
         commitment=parameters.commitment,
         namespace=namespace,
     )
+    SmootherServerNode(bus, global_costmap, namespace=namespace)
     ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )
@@ -53,4 +63,6 @@ def build_navigation(
     )
     if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
         DockingServerNode(bus, pose, namespace=namespace)
-    return BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    WaypointFollowerNode(bus, namespace=namespace)
+    return navigator

@@ -85,6 +85,7 @@ class Observer:
             speed=speed,
             power_W=self._power[stack.name] / max(self._gathered, 1),
             recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
+            map=stack.slam.map if stack.slam is not None else None,
         )
 
     def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:

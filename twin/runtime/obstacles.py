@@ -1,7 +1,8 @@
-"""Obstacles that come when a robot is near."""
+"""Obstacles that come when a robot is near, or walk to and fro."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,8 +16,8 @@ _BELOW_M = 20.0
 
 
 def standing_pose(obstacle: Obstacle) -> Pose3:
-    """Return the pose of an obstacle's centre when it stands on the floor."""
-    return Pose3.from_pose2(obstacle.pose.pose, obstacle.size[2] / 2.0)
+    """Return the pose of an obstacle's centre when it stands on the floor where it starts."""
+    return _on_floor(obstacle, obstacle.pose.pose)
 
 
 def hidden_pose(obstacle: Obstacle) -> Pose3:
@@ -31,17 +32,78 @@ class ObstacleSchedule:
     def __init__(self, world: World, obstacles: Sequence[Obstacle]) -> None:
         self._world = world
         self._waiting = [obstacle for obstacle in obstacles if obstacle.appears_within is not None]
+        self._walkers = [Walker(obstacle) for obstacle in obstacles if obstacle.route is not None]
+        self._time_ns = world.time_ns
 
     def update(self, bases: Sequence[Pose2]) -> None:
         """Take the robots' true poses at the world's present time."""
-        for obstacle in [o for o in self._waiting if any(_near(o, base) for base in bases)]:
-            self._waiting.remove(obstacle)
-            self._world.place(obstacle.name, standing_pose(obstacle))
+        for obstacle in list(self._waiting):
+            assert obstacle.appears_within is not None
+            if any(_distance(obstacle, obstacle.pose.pose, base) < obstacle.appears_within for base in bases):
+                self._waiting.remove(obstacle)
+                self._world.place(obstacle.name, standing_pose(obstacle))
+        elapsed = (self._world.time_ns - self._time_ns) * 1e-9
+        self._time_ns = self._world.time_ns
+        for walker in self._walkers:
+            if walker.walk(elapsed, bases):
+                self._world.place(walker.obstacle.name, _on_floor(walker.obstacle, walker.pose))
 
 
-def _near(obstacle: Obstacle, base: Pose2) -> bool:
-    """Whether a robot is within the distance at which an obstacle appears, measured from its footprint."""
-    assert obstacle.appears_within is not None
-    local = obstacle.pose.pose.inverse() @ base
-    outside = np.maximum(np.abs(local[:2]) - np.array(obstacle.size[:2]) / 2.0, 0.0)
-    return float(np.hypot(*outside)) < obstacle.appears_within
+class Walker:
+    """Somebody who walks along a route and back, and gives way to robots as people do."""
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        assert obstacle.route is not None
+        self.obstacle = obstacle
+        start = obstacle.pose.pose
+        self._points = np.array([(start.x, start.y), *obstacle.route])
+        self._knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._points, axis=0).T))])
+        self._along = 0.0
+        self._direction = 1
+        self._waited = 0.0
+
+    @property
+    def pose(self) -> Pose2:
+        """Where its footprint's centre stands; its heading stays that of its start."""
+        return self._at(self._along)
+
+    def walk(self, elapsed: float, bases: Sequence[Pose2]) -> bool:
+        """Walk for `elapsed` [s] unless a robot is in the way; return whether it moved."""
+        end = float(self._knots[-1])
+        along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
+        if self._is_blocked(along, bases):
+            self._waited += elapsed
+            if self._waited >= self.obstacle.patience:
+                self._waited, self._direction = 0.0, -self._direction
+            return False
+        self._waited = 0.0
+        moved = along != self._along
+        self._along = along
+        if along in (0.0, end):
+            self._direction = 1 if along == 0.0 else -1
+        return moved
+
+    def _is_blocked(self, along: float, bases: Sequence[Pose2]) -> bool:
+        """Whether a robot is near, and would be nearer after the step."""
+        here, there = self.pose, self._at(along)
+        for base in bases:
+            now, then = (_distance(self.obstacle, pose, base) for pose in (here, there))
+            if then < self.obstacle.yields_within and then < now:
+                return True
+        return False
+
+    def _at(self, along: float) -> Pose2:
+        x, y = (float(np.interp(along, self._knots, self._points[:, axis])) for axis in (0, 1))
+        return Pose2(x, y, self.obstacle.pose.pose.yaw)
+
+
+def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:
+    return Pose3.from_pose2(pose, obstacle.size[2] / 2.0)
+
+
+def _distance(obstacle: Obstacle, pose: Pose2, base: Pose2) -> float:
+    """Return how far a robot's base is from the footprint of an obstacle at a pose [m]."""
+    local = pose.inverse() @ base
+    return math.hypot(
+        max(abs(local.x) - obstacle.size[0] / 2.0, 0.0), max(abs(local.y) - obstacle.size[1] / 2.0, 0.0)
+    )

@@ -35,6 +35,7 @@ class RobotStack:
         self.handle = handle
         self._context = context
         self.spawn_height = context.spawn_height
+        self.start = context.start
         drive = description.drive
         base_frame = drive.base_frame if drive else description.root
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
@@ -49,7 +50,7 @@ class RobotStack:
         self.manipulator = derive.manipulator(description)
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
-        build_localisation(context, self.robot_pose)
+        self.slam = build_localisation(context, self.robot_pose)
         if context.config.navigation is not None:
             self.navigator = build_navigation(
                 context, context.config.navigation, self.robot_pose, self.footprint

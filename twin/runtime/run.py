@@ -22,6 +22,7 @@ from twin.runtime.build import Parts, build
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
+from twin.runtime.saved_maps import save_maps
 from twin.scenario.checks import Check
 from twin.scenario.outside import ALONE, ClockMode, Outside
 from twin.scenario.provenance import cpu_class, versions
@@ -171,7 +172,8 @@ def run(
 
     Args:
         scenario: What to run.
-        out: Folder for the recording, and for the last states if the physics diverges; None writes neither.
+        out: Folder for the recording, for maps that robots make, and for the last states if the physics
+            diverges; None writes none of them.
         record: Whether to write `<scenario>.rrd`.
         pace: Simulated seconds per second; None is as fast as possible. Changes no result.
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`. Unless the run waits for
@@ -213,6 +215,8 @@ def run(
         warm_up()
         wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
+        if out is not None:
+            save_maps(parts.stacks, out)
         if sink is not None:
             sink.close(verdict.to_dict())
         return verdict

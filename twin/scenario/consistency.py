@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.scenario.checks.check import CheckConfig
-from twin.scenario.missions import Behaviors, Idle, PickAndPlace, R2D2StatePublisher, VelocityProfile
+from twin.scenario.missions import (
+    Behaviors,
+    Explore,
+    Idle,
+    PickAndPlace,
+    R2D2StatePublisher,
+    RandomGoals,
+    VelocityProfile,
+)
 from twin.strict_yaml import Fault, Loc
 
 if TYPE_CHECKING:
@@ -105,8 +113,17 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     at, robot = ("robots", index), scenario.robots[index]
     if isinstance(mission, R2D2StatePublisher) and robot.base != "kinematic":
         yield Fault((*at, "base"), "the mission r2d2_state_publisher needs the base 'kinematic'")
-    if isinstance(mission, PickAndPlace) and robot.navigation is None:
-        yield Fault(at, f"the mission pick_and_place needs a navigation of robot '{robot.id}'")
+    if isinstance(mission, Explore) and (
+        robot.navigation is None or robot.localisation is None or robot.localisation.type != "slam"
+    ):
+        yield Fault(
+            at,
+            f"the mission explore needs a navigation of robot '{robot.id}' and its localisation of type slam",
+        )
+    if isinstance(mission, PickAndPlace | RandomGoals) and robot.navigation is None:
+        yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
+    if isinstance(mission, RandomGoals) and (robot.localisation is None or robot.localisation.type != "amcl"):
+        yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
     if isinstance(mission, Behaviors) and robot.navigation is None:
         for i, step in enumerate(mission.steps):
             if step.navigate_to_pose is not None:

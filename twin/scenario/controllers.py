@@ -25,7 +25,7 @@ from twin.strict_yaml import (
     Seconds,
 )
 
-Plugin = Literal["regulated_pure_pursuit", "mppi"]
+Plugin = Literal["regulated_pure_pursuit", "dwb", "mppi"]
 _Negative = Field(le=0.0)
 _Weight = Annotated[float, NotNegative]
 _Power = Annotated[int, Field(ge=1)]
@@ -224,6 +224,70 @@ class MPPIParameters(ParameterGroup):
     """Speed near obstacles."""
 
 
+class ScaleParameters(ParameterGroup):
+    """What every critic of DWB has."""
+
+    scale: _Weight | None = None
+    """What its score is multiplied by."""
+
+
+class ObstacleParameters(ScaleParameters):
+    """A critic of costs."""
+
+    sum_scores: bool | None = None
+    """Whether the mean along the trajectory counts, not the last cost."""
+
+
+class AlignParameters(ScaleParameters):
+    """A critic of a point before the robot."""
+
+    forward_point_distance: Annotated[Metres, NotNegative] | None = None
+    """How far before [m]."""
+
+
+class DWBParameters(ParameterGroup):
+    """Parameters of DWB."""
+
+    min_vel_x: MetresPerSecond | None = None
+    """Slowest, or fastest way back [m/s]."""
+    max_vel_x: Annotated[MetresPerSecond, Positive] | None = None
+    """Cruise speed [m/s]."""
+    max_vel_theta: Annotated[RadiansPerSecond, Positive] | None = None
+    """Fastest turn [rad/s]."""
+    acc_lim_x: Annotated[float, Positive] | None = None
+    """Acceleration [m/s²]."""
+    decel_lim_x: Annotated[float, _Negative] | None = None
+    """Deceleration, negative [m/s²]."""
+    acc_lim_theta: Annotated[float, Positive] | None = None
+    """Angular acceleration [rad/s²]."""
+    decel_lim_theta: Annotated[float, _Negative] | None = None
+    """Angular deceleration, negative [rad/s²]."""
+    vx_samples: Annotated[int, Field(ge=2)] | None = None
+    """Speeds to try."""
+    vtheta_samples: Annotated[int, Field(ge=2)] | None = None
+    """Turn rates to try with each."""
+    sim_time: Annotated[Seconds, Positive] | None = None
+    """How far ahead each is driven [s]."""
+    BaseObstacle: ObstacleParameters = ObstacleParameters()
+    """Cost under the centre."""
+    ObstacleFootprint: ObstacleParameters = ObstacleParameters()
+    """Cost, and collisions of the outline."""
+    GoalAlign: AlignParameters = AlignParameters()
+    """Nose to the local path's end."""
+    PathAlign: AlignParameters = AlignParameters()
+    """Nose to the path."""
+    PathDist: ScaleParameters = ScaleParameters()
+    """Distance to the path."""
+    GoalDist: ScaleParameters = ScaleParameters()
+    """Distance to the local path's end."""
+    RotateToGoal: ScaleParameters = ScaleParameters()
+    """Heading at the goal."""
+    Twirling: ScaleParameters = ScaleParameters()
+    """Turn rate."""
+    PreferForward: ScaleParameters = ScaleParameters()
+    """Driving backwards."""
+
+
 class ServerParameters(ParameterGroup):
     """Parameters of the server, and of its goal and progress checkers."""
 
@@ -254,6 +318,7 @@ class ServerParameters(ParameterGroup):
 
 _OF_PLUGIN: dict[str, tuple[type[ParameterGroup], ...]] = {
     "regulated_pure_pursuit": (PurePursuitParameters, RotationParameters),
+    "dwb": (DWBParameters,),
     "mppi": (MPPIParameters,),
 }
 
@@ -263,6 +328,7 @@ class ControllerParameters(
     PurePursuitParameters,
     RotationParameters,
     ShimParameters,
+    DWBParameters,
     MPPIParameters,
 ):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""

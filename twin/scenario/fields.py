@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import (
@@ -49,6 +50,12 @@ ArgumentText = Annotated[
 
 NameOrPath = Annotated[str, AfterValidator(_beside_the_file)]
 """A name that ships with twin, or a path (it has a `/` or a suffix) relative to the file that holds it."""
+
+
+FileBeside = Annotated[
+    str, AfterValidator(lambda value, info: str((info.context or {}).get("folder", Path()) / value))
+]
+"""Path of a file, relative to the file that names it."""
 
 
 class PoseConfig(StrictModel):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from twin.scenario.fields import Fraction, NameOrPath, NotNegative, Positive
+from twin.scenario.fields import FileBeside, Fraction, NameOrPath, NotNegative, PoseConfig, Positive
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, Radians, StrictModel
+from twin.strict_yaml import Metres, Radians, Seconds, StrictModel
 
 
 class InitialPoseError(StrictModel):
@@ -82,6 +82,50 @@ class AmclLocalisation(StrictModel):
     """Overrides of the filter's parameters."""
 
 
+class SlamParameters(ParameterGroup):
+    """Parameters of `/slam_toolbox`."""
+
+    resolution: Annotated[Metres, Positive] | None = None
+    """Edge of a cell of the map [m]."""
+    map_update_interval: Annotated[Seconds, Positive] | None = None
+    """Time between two maps [s]."""
+    min_laser_range: Annotated[Metres, NotNegative] | None = None
+    """Shorter readings are not used [m]."""
+    max_laser_range: Annotated[Metres, Positive] | None = None
+    """Longer readings are cut [m]."""
+    minimum_travel_distance: Annotated[Metres, NotNegative] | None = None
+    """A scan is taken after driving so far [m]..."""
+    minimum_travel_heading: Annotated[Radians, NotNegative] | None = None
+    """...or turning so far [rad]."""
+    do_loop_closing: bool | None = None
+    """Whether places that are seen again correct the graph."""
+    loop_search_maximum_distance: Annotated[Metres, Positive] | None = None
+    """How near a place has to be to be looked for [m]."""
+
+
+class SlamLocalisation(StrictModel):
+    """Mapping an unknown place, or localisation in a pose graph made before (`/slam_toolbox`)."""
+
+    type: Literal["slam"]
+    """`slam`"""
+    mode: Literal["mapping", "localization"] = "mapping"
+    """`mapping` makes a map, or goes on with that of `pose_graph`; `localization` leaves it as it is."""
+    pose_graph: FileBeside | None = None
+    """A pose graph that `serialize_map` or an earlier run has written; absent: nothing is known."""
+    map_start_pose: PoseConfig | None = None
+    """The robot's pose in `map` at the start; absent: that in the world, so that both frames are one."""
+    initial_pose_error: InitialPoseError = InitialPoseError()
+    """How wrong that is."""
+    parameters: SlamParameters = SlamParameters()
+    """Overrides of the node's parameters."""
+
+    @model_validator(mode="after")
+    def _has_a_graph(self) -> SlamLocalisation:
+        if self.mode == "localization" and self.pose_graph is None:
+            raise ValueError("localization needs a pose_graph; without one only mapping is possible")
+        return self
+
+
 Localisation = Annotated[
-    NoLocalisation | OdometryLocalisation | AmclLocalisation, Field(discriminator="type")
+    NoLocalisation | OdometryLocalisation | AmclLocalisation | SlamLocalisation, Field(discriminator="type")
 ]

@@ -101,6 +101,23 @@ class Behaviors(StrictModel):
     """How often to run all steps."""
 
 
+class RandomGoals(StrictModel):
+    """Drive to random places of `/map`, one after the other: a soak test of navigation."""
+
+    type: Literal["random_goals"]
+    """`random_goals`"""
+    robot: str
+    """Name of the robot."""
+    distance: Annotated[Metres, Positive]
+    """The mission is done when odometry has counted so much [m]."""
+    clearance: Annotated[Metres, Positive] = 0.7
+    """Distance of a goal from what the map shows [m]."""
+    min_goal_distance: Annotated[Metres, NotNegative] = 3.0
+    """Distance of a goal from the robot, as the crow flies [m]."""
+    max_failed: Annotated[int, NotNegative] = 0
+    """How many goals the navigator may give up; one more ends the mission."""
+
+
 class VelocityStep(StrictModel):
     """A velocity command held for some time."""
 
@@ -140,6 +157,32 @@ class R2D2StatePublisher(StrictModel):
     """Progress on the circle per cycle [deg]."""
 
 
+class Explore(StrictModel):
+    """Drive to the borders of what is known until nothing reachable is unknown (explore_lite)."""
+
+    type: Literal["explore"]
+    """`explore`"""
+    robot: str
+    """Name of the robot; its localisation is of type slam."""
+    return_to_init: bool = False
+    """Whether it drives back to its start at the end."""
+    min_frontier_size: Annotated[Metres, Positive] | None = None
+    """Shorter borders are left alone [m]."""
+    potential_scale: Annotated[float, NotNegative] | None = None
+    """Weight of the way to a border."""
+    gain_scale: Annotated[float, NotNegative] | None = None
+    """Weight of its length."""
+    orientation_scale: Annotated[float, NotNegative] | None = None
+    """Weight of the turn towards it."""
+    progress_timeout: Annotated[Seconds, Positive] | None = None
+    """A goal that gets no nearer for so long is given up [s]."""
+
+    def overrides(self) -> dict[str, float]:
+        """Return the parameters of `/explore` that the file gives, by name."""
+        own = self.model_fields_set - {"type", "robot", "return_to_init"}
+        return {name: getattr(self, name) for name in sorted(own)}
+
+
 class Idle(StrictModel):
     """Nobody does anything; the run lasts its whole duration."""
 
@@ -148,5 +191,6 @@ class Idle(StrictModel):
 
 
 Mission = Annotated[
-    PickAndPlace | Behaviors | VelocityProfile | R2D2StatePublisher | Idle, Field(discriminator="type")
+    PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle,
+    Field(discriminator="type"),
 ]

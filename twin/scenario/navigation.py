@@ -7,27 +7,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
-
 from twin.scenario.controllers import ControllerParameters
-from twin.scenario.fields import NotNegative, Positive
+from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.planners import PlannerParameters
 from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
-
-
-class PlannerParameters(ParameterGroup):
-    """Parameters of `/planner_server`."""
-
-    tolerance: Annotated[Metres, NotNegative] | None = None
-    """How far from the requested goal a plan may end [m]."""
-    allow_unknown: bool | None = None
-    """Whether a plan may cross unknown cells."""
-    commitment_cost: Annotated[int, Field(ge=0, le=252)] | None = None
-    """Added to the cost of each cell off the last path, so that routes are not changed lightly."""
-    commitment_width: Annotated[Metres, Positive] | None = None
-    """To each side of the last path that counts as on it [m]."""
-    cost_factor: Annotated[float, NotNegative] | None = None
-    """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
 
 
 class CostmapParameters(ParameterGroup):
@@ -35,35 +19,47 @@ class CostmapParameters(ParameterGroup):
 
     resolution: Annotated[Metres, Positive] | None = None
     """Cell size [m]."""
+    width: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along x [m]."""
+    height: Annotated[Metres, Positive] | None = None
+    """Of a rolling costmap, along y [m]."""
+    footprint_padding: Annotated[Metres, NotNegative] | None = None
+    """Added to the footprint on every side [m]; the robot's own has 0.01 m already."""
     inflation_radius: Annotated[Metres, NotNegative] | None = None
     """Distance from obstacles within which cells cost [m]."""
     cost_scaling_factor: Annotated[float, Positive] | None = None
     """Decay of that cost [1/m]."""
     update_frequency: Annotated[Hertz, Positive] | None = None
     """Rate of updates [Hz]."""
+    obstacle_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    raytrace_min_range: Annotated[Metres, NotNegative] | None = None
+    """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam clears cells [m]."""
+    inf_is_valid: bool | None = None
+    """Whether a beam without return (inf) clears cells."""
+    footprint_clearing_enabled: bool | None = None
+    """Whether the cells under the robot are free."""
+    keepout_before_inflation: bool | None = None
+    """Whether keep-out zones are inflated, so that no part of the robot enters them."""
+    range_topics: tuple[str, ...] | None = None
+    """Topics of sensor_msgs/Range for the range sensor layer."""
     robot_radius: Annotated[Metres, Positive] | None = None
     """Takes the robot as a circle of this radius instead of by its footprint [m]."""
     rolling_window: bool | None = None
     """Whether the grid follows the robot, without a static map."""
-    width: Annotated[Metres, Positive] | None = None
-    """Extent of a rolling grid [m]."""
-    height: Annotated[Metres, Positive] | None = None
-    """Extent of a rolling grid [m]."""
 
 
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
+    default_nav_to_pose_bt_xml: str | None = None
+    """Behaviour tree of goals that name none: a shipped one by name, or a path."""
     bt_loop_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of the behaviour tree's ticks [Hz]."""
-    replanning_frequency: Annotated[Hertz, Positive] | None = None
-    """How often the path is looked at, or planned anew [Hz]."""
-    keep_valid_path: bool | None = None
-    """Whether a path is kept while it is free; otherwise it is planned anew each time."""
+    """Rate of the tree's ticks [Hz]."""
 
 
 class NavigationConfig(StrictModel):
@@ -81,6 +77,10 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother, also when braking [rad/s²]."""
     navigator: NavigatorParameters = NavigatorParameters()
     """Overrides of the navigator."""
+    keepout_mask: NameOrPath | None = None
+    """Mask of the zones that no path may cross: a YAML file of map_server."""
+    speed_mask: NameOrPath | None = None
+    """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()

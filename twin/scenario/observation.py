@@ -8,6 +8,8 @@ from typing import TypeVar
 
 from twin.errors import ScenarioError, nearest
 from twin.geometry import Pose2, Pose3
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.warehouse.footprint import Rectangle
 
 T = TypeVar("T")
 
@@ -28,6 +30,8 @@ class RobotObservation:
     """Mechanical power that the actuators put in, mean since the last observation [W]."""
     recoveries: int = 0
     """Recovery behaviours that its navigator has started so far."""
+    map: OccupancyMap | None = None
+    """The last map that it made and published; None if it makes none."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -93,6 +97,18 @@ class Zone:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Surroundings:
+    """What a robot's lidar can see and where the robot can get to: the truth, for checks of maps."""
+
+    solids: tuple[Rectangle, ...]
+    """Sections of what never moves with the plane of the lidar, in the world."""
+    start: Pose2
+    """Where the robot starts."""
+    radius: float
+    """Its inscribed radius [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckContext:
     """What checks need to know beforehand; the runtime fills it once."""
 
@@ -101,6 +117,8 @@ class CheckContext:
     zones: Mapping[str, Zone] = field(default_factory=dict)
     good_bottoms: Mapping[str, float] = field(default_factory=dict)
     """Distance from each good's origin down to its underside [m]."""
+    surroundings: Mapping[str, Surroundings] = field(default_factory=dict)
+    """Of each robot that has a lidar."""
 
     def robot(self, name: str | None) -> str:
         """Return the robot a check is about; without a name the only one."""

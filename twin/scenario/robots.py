@@ -51,7 +51,7 @@ class RobotConfig(StrictModel):
         if self.pose is not None and self.start is not None:
             faults.append(Fault(("start",), "give the robot either a pose or the name of a start, not both"))
         if self.navigation is not None and not self.is_localised:
-            message = "navigation needs a localisation of type odometry or amcl"
+            message = "navigation needs a localisation of type odometry, amcl or slam"
             faults.append(Fault(("navigation",), message))
         if self.navigation is not None and self.base != "free":
             faults.append(Fault(("base",), f"navigation needs the base 'free', not '{self.base}'"))

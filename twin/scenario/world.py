@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName
-from twin.strict_yaml import Fault, Faults, Hertz, Kilograms, Metres, Seconds, StrictModel
+from twin.strict_yaml import Fault, Faults, Hertz, Kilograms, Metres, MetresPerSecond, Seconds, StrictModel
 
 Length = Annotated[Metres, Positive]
 
@@ -28,8 +28,20 @@ class Obstacle(StrictModel):
     appears_within: Length | None = None
     """It comes when a robot's base is this near to its footprint [m]; absent: it is there from the start."""
 
+    route: Annotated[tuple[tuple[Metres, Metres], ...], Field(min_length=1)] | None = None
+    """It walks from its pose along these points [x, y] and back again; absent: it stays."""
+    speed: Annotated[MetresPerSecond, Positive] = 0.5
+    """Of walking [m/s]."""
+    yields_within: Length = 1.0
+    """It stops before a robot whose base is this near to its footprint [m] ..."""
+    patience: Annotated[Seconds, NotNegative] = 3.0
+    """... and turns back when that has lasted so long [s]."""
+
     @model_validator(mode="after")
     def _appears_or_moves(self) -> Obstacle:
+        if self.route is not None and (self.mass is not None or self.appears_within is not None):
+            message = "an obstacle that walks is there from the start and cannot be pushed"
+            raise Faults([Fault(("route",), message)])
         if self.appears_within is not None and self.mass is not None:
             message = "an obstacle that appears later cannot be pushed; give it no mass"
             raise Faults([Fault(("appears_within",), message)])

@@ -79,7 +79,7 @@ def test_updating_windows_gives_the_same_grid_as_inflating_it_all(seed: int) -> 
     for _ in range(4):
         sensor = random.uniform((-0.8, -0.3), (1.8, 1.8))
         layered.update(scan_from(*sensor, random.uniform(0.05, 1.5, 50)), sensor)
-    obstacles = layered._obstacles
+    obstacles = layered._obstacles.cells
     raw = np.select([occupancy.data == 100, occupancy.data == -1], [254, 255], 0).astype(np.uint8)
     raw = np.where(obstacles == 254, 254, np.where((raw == 255) & (obstacles == 0), 0, raw)).astype(np.uint8)
     want = slow_inflation(raw, config, 0.05)

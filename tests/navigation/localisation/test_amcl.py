@@ -9,8 +9,11 @@ import pytest
 
 from twin.errors import MapError
 from twin.geometry import Pose2, wrap_angle
-from twin.navigation.localisation.amcl import Amcl, AmclConfig
+from twin.navigation.localisation.amcl import Amcl
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 WAYPOINTS = (
@@ -198,19 +201,21 @@ def test_a_map_without_room() -> None:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
-def test_the_likelihood_field_against_its_definition(yaw: float) -> None:
-    """The gaussian of the distance to the nearest surface cell's centre, along a wall where that is exact."""
+@pytest.mark.parametrize("depth", [0.0, 0.025])
+def test_the_likelihood_field_against_its_definition(yaw: float, depth: float) -> None:
+    """The gaussian of the distance to the surface, `depth` behind the border of the wall's cells."""
     data = np.zeros((40, 60), dtype=np.int8)
-    data[:, 30] = 100
+    data[:, 30:40] = 100
     occupancy = OccupancyMap(data=data, resolution=0.05, origin=Pose2(2.0, -1.0, yaw))
-    field = LikelihoodField(occupancy, sigma_hit=0.1, z_hit=0.8, z_rand=0.2, max_dist=0.5)
-    wall = 30.5 * 0.05
-    for x in np.random.default_rng(0).uniform(1.08, 2.4, 50):
-        robot = occupancy.origin @ Pose2(0.2, 1.0, 0.0)
-        got = field.log_likelihood(np.array([robot]), np.array([[x - 0.2, 0.0]]))[0]
-        distance = min(abs(x - wall), 0.5)
-        z = 0.8 * math.exp(-0.5 * (distance / 0.1) ** 2) + 0.02
-        assert got == pytest.approx(math.log(z / 0.82), abs=0.15)
-    assert field.log_likelihood(np.array([robot]), np.array([[99.0, 0.0]]))[0] == pytest.approx(
-        math.log(0.02 / 0.82), abs=1e-3
-    )
+    field = LikelihoodField(SurfaceDistance(occupancy, max_dist=0.5), z_hit=0.8, z_rand=0.2)
+    robot = occupancy.origin @ Pose2(0.2, 1.0, 0.0)
+
+    def likelihood(x: float) -> float:
+        beams = chosen_beams([x - 0.2], [0.0], NOWHERE, most=1, min_range=0.0, max_range=200.0)
+        return float(field.log_likelihood(np.array([robot]), beams, depth, 0.1)[0])
+
+    for x in np.random.default_rng(0).uniform(1.0, 1.72, 50):
+        z = 0.8 * math.exp(-0.5 * (min(abs(x - 1.5 - depth), 0.5) / 0.1) ** 2) + 0.02
+        assert likelihood(x) == pytest.approx(math.log(z / 0.82), abs=0.15)
+    assert likelihood(1.5 + depth) == pytest.approx(0.0, abs=1e-3)
+    assert likelihood(99.0) == pytest.approx(math.log(0.02 / 0.82), abs=1e-3)

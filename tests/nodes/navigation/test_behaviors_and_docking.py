@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 
 from tests.nodes.conftest import TICK_NS, Bench, Robot, Room, box, open_room, scan
-from twin.bridge.action_types import BackUp, DockRobot, DriveOnHeading, Spin, UndockRobot, Wait
+from twin.bridge.action_types import (
+    AssistedTeleop,
+    BackUp,
+    DockRobot,
+    DriveOnHeading,
+    Spin,
+    UndockRobot,
+    Wait,
+)
 from twin.bridge.actions import ActionClient
-from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
-from twin.bridge.msgs import GoalStatus, LaserScan, Point, PoseArray, duration, header, new
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2, twist_from_planar
+from twin.bridge.msgs import Empty, GoalStatus, LaserScan, Point, PoseArray, Twist, duration, header, new
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
 from twin.bridge.types import ActionType
@@ -84,7 +92,7 @@ def test_driving_into_a_wall_is_refused_before_it(behaviors: Behaviors) -> None:
     ahead = Point(x=2.0, y=0.0, z=0.0)
     goal = behaviors.do(DriveOnHeading, "drive_on_heading", target=ahead, speed=0.2, time_allowance=LONG)
     assert goal.status == GoalStatus.STATUS_ABORTED
-    assert (goal.result.error_code, goal.result.error_msg) == (724, "drive_on_heading: collision ahead")
+    assert (goal.result.error_code, goal.result.error_msg) == (723, "drive_on_heading: collision ahead")
     assert behaviors.robot.pose.x < 0.8 - 0.15
     assert behaviors.robot.commands[-1] == (0.0, 0.0)
 
@@ -113,6 +121,67 @@ def test_a_cancelled_behavior_stops_the_robot(behaviors: Behaviors) -> None:
     assert goal.status == GoalStatus.STATUS_CANCELED
     behaviors.bench.run(0.3)
     assert not behaviors.robot.joints.velocity.any()
+
+
+def test_feedback_tells_how_far_it_is(behaviors: Behaviors) -> None:
+    told: list[Any] = []
+    client = ActionClient(behaviors.bench.node, DriveOnHeading, "drive_on_heading")
+    target = Point(x=0.5, y=0.0, z=0.0)
+    goal = client.send_goal(
+        new(DriveOnHeading.Goal, target=target, speed=0.2, time_allowance=LONG), told.append
+    )
+    behaviors.bench.until(lambda: goal.done)
+    driven = [message.distance_traveled for message in told]
+    assert driven == sorted(driven)
+    assert driven[0] == 0.0
+    assert driven[-1] == pytest.approx(0.5, abs=0.02)
+    assert goal.result.total_elapsed_time.sec >= 2
+
+
+@pytest.mark.parametrize(
+    ("action", "name", "x", "y", "speed", "code"),
+    [
+        (BackUp, "backup", 0.3, 0.1, 0.1, 713),
+        (DriveOnHeading, "drive_on_heading", 0.3, 0.1, 0.1, 724),
+        (DriveOnHeading, "drive_on_heading", 0.3, 0.0, -0.1, 724),
+    ],
+)
+def test_a_goal_that_makes_no_sense_is_aborted(
+    behaviors: Behaviors, action: ActionType, name: str, x: float, y: float, speed: float, code: int
+) -> None:
+    goal = behaviors.do(action, name, target=Point(x=x, y=y, z=0.0), speed=speed, time_allowance=LONG)
+    assert (goal.result.error_code, goal.result.error_msg) == (code, f"{name}: invalid input")
+
+
+# assisted teleop
+
+
+def test_assisted_teleop_does_what_is_steered_but_never_hits(behaviors: Behaviors) -> None:
+    bench, robot = behaviors.bench, behaviors.robot
+    robot.room.add_box(1.0, -1.0, 1.2, 1.0)
+    steer = bench.node.create_publisher(Twist, "cmd_vel_assisted_teleop", 10)
+    goal = behaviors.send(AssistedTeleop, "assisted_teleop", time_allowance=LONG)
+    bench.run(0.5)
+    steer.publish(twist_from_planar(0.3, 0.0))
+    bench.run(0.3)
+    assert robot.commands[-1] == (0.3, 0.0), "far away from everything it does as it is told"
+    bench.run(8.0)
+    assert robot.pose.x < 1.0 - 0.15, "the wall is not touched"
+    assert robot.pose.x > 0.6
+    assert robot.commands[-1] == (0.0, 0.0)
+    steer.publish(twist_from_planar(-0.3, 0.0))
+    bench.run(1.0)
+    assert robot.commands[-1] == (-0.3, 0.0), "away from the wall it may"
+    bench.node.create_publisher(Empty, "preempt_teleop", 10).publish(Empty())
+    bench.until(lambda: goal.done, 0.5)
+    assert goal.succeeded
+    bench.run(0.2)
+    assert robot.commands[-1] == (0.0, 0.0)
+
+
+def test_assisted_teleop_ends_when_its_time_is_over(behaviors: Behaviors) -> None:
+    goal = behaviors.do(AssistedTeleop, "assisted_teleop", time_allowance=duration(1_000_000_000))
+    assert (goal.result.error_code, goal.result.error_msg) == (731, "assisted_teleop: timeout")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Control nodes against nav2_behavior_tree: child results in, own status and number of ticks out."""
+"""Missions' control nodes against nav2_behavior_tree: child results in, own status and ticks out."""
 
 from __future__ import annotations
 
@@ -8,16 +8,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from twin.bridge.clock import Clock
-from twin.nodes.navigation.bt.control import (
-    ControlNode,
-    Fallback,
-    PipelineSequence,
-    RateController,
-    RecoveryNode,
-    RoundRobin,
-    sequence,
-)
+from twin.nodes.navigation.bt.control import ControlNode, RecoveryNode, sequence
 
 STATUS = {"S": Status.SUCCESS, "F": Status.FAILURE, "R": Status.RUNNING}
 LETTER = {status: letter for letter, status in STATUS.items()}
@@ -57,36 +48,6 @@ def tick(node: Behaviour, times: int) -> str:
     return seen
 
 
-# children, statuses of the ticks, ticks of each child
-PIPELINE = [
-    (("S", "S", "S"), "S", (1, 1, 1)),
-    (("S", "R", "S"), "RR", (2, 2, 0)),  # a running child stops those after it, those before are ticked again
-    (("RS", "S"), "RS", (2, 1)),
-    (("S", "RS", "RS"), "RRS", (3, 3, 2)),
-    (("SR", "RRS"), "RRS", (3, 3)),  # an earlier child that runs again does not hold up the later one
-    (("SF", "R"), "RF", (2, 1)),  # but its failure ends everything
-    (("S", "F", "S"), "F", (1, 1, 0)),
-]
-
-
-@pytest.mark.parametrize(("words", "statuses", "ticks"), PIPELINE)
-def test_pipeline_sequence(words: tuple[str, ...], statuses: str, ticks: tuple[int, ...]) -> None:
-    children = leaves(words)
-    assert tick(PipelineSequence("p", children), len(statuses)) == statuses
-    assert tuple(child.ticks for child in children) == ticks
-
-
-def test_pipeline_sequence_halts_what_still_runs_and_starts_afresh() -> None:
-    first, second = leaves(("SRRS", "RFRS"))
-    node = PipelineSequence("p", [first, second])
-    assert tick(node, 2) == "RF"
-    assert first.halts == 1, "it was running when its sibling failed"
-    assert tick(node, 1) == "R", "after a new start the first child's RUNNING holds up the second again"
-    assert second.ticks == 2
-    assert tick(node, 1) == "R"
-    assert second.ticks == 3
-
-
 # retries, main, recovery, statuses, ticks of both
 RECOVERY = [
     (1, "S", "S", "S", (1, 0)),
@@ -122,102 +83,6 @@ def test_recovery_node_succeeds_when_something_later_fails_elsewhere() -> None:
     assert b.ticks == 1
 
 
-ROUND_ROBIN = [
-    (("S", "S", "S"), "SSSS", (2, 1, 1)),  # every entry takes the next child
-    (("F", "S", "S"), "SSSS", (2, 2, 2)),  # a failure goes straight on to the next one
-    (("F", "F", "F"), "F", (1, 1, 1)),
-    (("RS", "S"), "RSS", (2, 1)),  # a running child keeps its turn
-    (("F", "RF", "F"), "RF", (1, 2, 1)),
-]
-
-
-@pytest.mark.parametrize(("words", "statuses", "ticks"), ROUND_ROBIN)
-def test_round_robin(words: tuple[str, ...], statuses: str, ticks: tuple[int, ...]) -> None:
-    children = leaves(words)
-    assert tick(RoundRobin("r", children), len(statuses)) == statuses
-    assert tuple(child.ticks for child in children) == ticks
-
-
-def test_round_robin_goes_on_inside_a_recovery_node() -> None:
-    """The navigator's recoveries: each failure of the main child gets the next one."""
-    actions = leaves(("S", "S", "S"))
-    main = Leaf("F")
-    assert tick(RecoveryNode("r", 5, main, RoundRobin("rr", actions)), 1) == "F"
-    assert [action.ticks for action in actions] == [2, 2, 1]
-
-
-def test_round_robin_begins_with_the_first_child_after_a_halt() -> None:
-    children = leaves(("S", "R", "S"))
-    node = RoundRobin("r", children)
-    assert tick(node, 2) == "SR"
-    node.stop(Status.INVALID)
-    assert children[1].halts == 1
-    assert tick(node, 1) == "S"
-    assert [child.ticks for child in children] == [2, 1, 0]
-
-
-def test_rate_controller_ticks_once_a_period_and_runs_in_between() -> None:
-    clock = Clock()
-    child = Leaf("S")
-    node = RateController("rate", 1000, lambda: clock.now_ns, child)
-    seen = ""
-    for clock.now_ns in range(0, 2500, 250):
-        seen += tick(node, 1)
-    assert seen == "SRRRSRRRSR"
-    assert child.ticks == 3
-
-
-def test_rate_controller_does_not_throttle_a_running_child() -> None:
-    clock = Clock()
-    child = Leaf("RRRS")
-    node = RateController("rate", 1000, lambda: clock.now_ns, child)
-    seen = ""
-    for clock.now_ns in range(0, 2000, 250):
-        seen += tick(node, 1)
-    assert seen == "RRRSRRRS", "the period counts from the child's success"
-    assert child.ticks == 5
-
-
-def test_rate_controller_ticks_at_once_after_a_halt() -> None:
-    child = Leaf("S")
-    node = RateController("rate", 1000, lambda: 0, child)
-    assert tick(node, 2) == "SR"
-    node.stop(Status.INVALID)
-    assert tick(node, 1) == "S"
-
-
-def test_rate_controller_in_a_pipeline_lets_the_later_child_run() -> None:
-    """The navigator's use: the path is followed between two replannings."""
-    clock = Clock()
-    plan, follow = leaves(("S", "RRRRS"))
-    node = PipelineSequence("p", [RateController("rate", 1000, lambda: clock.now_ns, plan), follow])
-    seen = ""
-    for clock.now_ns in range(0, 1250, 250):
-        seen += tick(node, 1)
-    assert seen == "RRRRS"
-    assert (plan.ticks, follow.ticks) == (2, 5)
-
-
-FALLBACK = [
-    (("S", "S"), "S", (1, 0)),
-    (("F", "S"), "S", (1, 1)),
-    (("F", "R"), "RR", (2, 2)),
-    (("FS", "R"), "RS", (2, 1)),
-    (("F", "F"), "F", (1, 1)),
-]
-
-
-@pytest.mark.parametrize(("words", "statuses", "ticks"), FALLBACK)
-def test_fallback_asks_from_the_first_child_every_time(
-    words: tuple[str, ...], statuses: str, ticks: tuple[int, ...]
-) -> None:
-    children = leaves(words)
-    assert tick(Fallback("f", children), len(statuses)) == statuses
-    assert tuple(child.ticks for child in children) == ticks
-    if words == ("FS", "R"):
-        assert children[1].halts == 1, "the lower branch was running when the upper one succeeded"
-
-
 def test_sequence_remembers_where_it_was() -> None:
     children = leaves(("S", "RS", "S"))
     assert tick(sequence("s", children), 2) == "RS"
@@ -227,13 +92,9 @@ def test_sequence_remembers_where_it_was() -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda leaf: PipelineSequence("n", [Leaf("S"), leaf]),
         lambda leaf: RecoveryNode("n", 1, leaf, Leaf("S")),
         lambda leaf: RecoveryNode("n", 1, Leaf("F"), leaf),
-        lambda leaf: RoundRobin("n", [leaf]),
-        lambda leaf: RateController("n", 10, lambda: 0, leaf),
-        lambda leaf: Fallback("n", [Leaf("F"), leaf]),
-        lambda leaf: PipelineSequence("n", [RecoveryNode("m", 1, sequence("s", [leaf]), Leaf("S"))]),
+        lambda leaf: RecoveryNode("m", 1, sequence("s", [leaf]), Leaf("S")),
     ],
 )
 def test_halting_a_control_node_halts_its_running_leaf_once(make: object) -> None:

@@ -137,13 +137,6 @@ def test_a_halted_leaf_sends_a_new_goal_at_its_next_start(
     assert server.log[-1] == "end 3"
 
 
-def test_an_updated_goal_preempts_the_old_one(bench: Bench, client: ActionClient, server: Server) -> None:
-    updates = iter([None, None, None, goal(4)])
-    leaf = CallAction("leaf", client, lambda: goal(100), updated=lambda: next(updates, None))
-    assert finish(bench, leaf) == Status.SUCCESS, "the old goal's end is not the leaf's"
-    assert server.log == ["start 100", "preempted 100", "start 4", "end 4"]
-
-
 def test_a_late_result_of_a_halted_goal_does_not_count(bench: Bench, client: ActionClient) -> None:
     ticks = iter([2, 50])
     leaf = CallAction("leaf", client, lambda: goal(next(ticks)))

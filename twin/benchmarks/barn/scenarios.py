@@ -114,8 +114,14 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
         "max_linear_acceleration": 2.0,
         "max_linear_deceleration": 3.0,
         "max_angular_acceleration": 8.0,
-        "navigator": {"bt_loop_frequency": 50.0, "replanning_frequency": 5.0, "keep_valid_path": False},
-        "planner": {"tolerance": 0.5, "allow_unknown": True, "cost_factor": 6.0, "commitment_cost": 20},
+        "navigator": {"default_nav_to_pose_bt_xml": "navigate_w_replanning", "bt_loop_frequency": 50.0},
+        "planner": {
+            "plugin": "grid_based",
+            "tolerance": 0.5,
+            "allow_unknown": True,
+            "cost_factor": 6.0,
+            "commitment_cost": 20,
+        },
         "global_costmap": {
             "rolling_window": True,
             "resolution": 0.04,

@@ -1,15 +1,20 @@
-"""`twin bench`: public benchmarks of navigation, run in the twin."""
+"""`twin bench`: public benchmarks of navigation, a module each."""
 
 from __future__ import annotations
 
 import typer
 
 from twin.cli.bench.barn import barn
+from twin.cli.bench.grid import grid
+from twin.cli.bench.slam import slam
 
-app = typer.Typer(no_args_is_help=True, help="Public benchmarks of navigation, run in the twin.")
+app = typer.Typer(no_args_is_help=True, help="Public benchmarks of navigation; exit code 1 below the bar.")
 
-app.command(
-    "barn",
-    no_args_is_help=True,
-    epilog="Example: [bold]twin bench barn barn_worlds.json --worlds 3,9,60-90 --out barn[/bold]",
-)(barn)
+_COMMANDS = (
+    ("barn", barn, "twin bench barn barn_worlds.json --worlds 3,9,60-90 --out barn"),
+    ("grid", grid, "twin bench grid maze-32-32-2.json"),
+    ("slam", slam, "twin bench slam aces.npz csail.npz --out slam"),
+)
+
+for _name, _function, _example in _COMMANDS:
+    app.command(_name, no_args_is_help=True, epilog=f"Example: [bold]{_example}[/bold]")(_function)

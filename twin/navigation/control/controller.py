@@ -22,6 +22,10 @@ class Controller(Protocol):
     def max_speed(self) -> float:
         """The speed that percentages of a speed limit are of [m/s]."""
 
+    @property
+    def reverses(self) -> bool:
+        """Whether it drives paths backwards where their headings say so."""
+
     def configure(self, config: Any) -> None:
         """Go on with other parameters of the same kind; lifts the speed limit."""
 

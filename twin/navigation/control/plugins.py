@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from twin.geometry import Array
 from twin.navigation.control.controller import Controller
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.dwb.controller import DWB
 from twin.navigation.control.goal_checker import (
     GoalChecker,
     GoalCheckerConfig,
@@ -25,7 +27,7 @@ from twin.navigation.control.progress_checker import (
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit, RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShim, RotationShimConfig
 
-ControllerConfig = RegulatedPurePursuitConfig | MPPIConfig | RotationShimConfig
+ControllerConfig = RegulatedPurePursuitConfig | MPPIConfig | DWBConfig | RotationShimConfig
 
 
 def create_controller(config: ControllerConfig, footprint: Array) -> Controller:
@@ -35,6 +37,8 @@ def create_controller(config: ControllerConfig, footprint: Array) -> Controller:
         return RotationShim(config=config, primary=primary, footprint=footprint)
     if isinstance(config, MPPIConfig):
         return MPPI(config=config, footprint=footprint)
+    if isinstance(config, DWBConfig):
+        return DWB(config=config, footprint=footprint)
     return RegulatedPurePursuit(config=config, footprint=footprint)
 
 

@@ -99,7 +99,7 @@ class RegulatedPurePursuit:
     """Current speed limit [m/s]; see `set_speed_limit`."""
     carrot: tuple[float, float] | None = field(init=False, default=None)
     """The lookahead point of the last command, in the path's frame [m]."""
-    trajectory: None = field(init=False, default=None)
+    trajectory: Array | None = field(init=False, default=None)
     """None: it plans none."""
 
     def __post_init__(self) -> None:
@@ -111,6 +111,11 @@ class RegulatedPurePursuit:
     def max_speed(self) -> float:
         """desired_linear_vel without limit [m/s]."""
         return self.config.desired_linear_vel
+
+    @property
+    def reverses(self) -> bool:
+        """Whether it drives backwards."""
+        return self.config.allow_reversing
 
     def configure(self, config: RegulatedPurePursuitConfig) -> None:
         """Go on with other parameters; lifts the speed limit."""

@@ -64,9 +64,13 @@ class RotationShim:
     """That of the primary controller."""
 
     def __post_init__(self) -> None:
-        self._handler = PathHandler(config=PathHandlerConfig())
         self._tolerance = 0.0
-        self._forget()
+        self._begin()
+
+    @property
+    def reverses(self) -> bool:
+        """Whether the primary controller drives backwards."""
+        return self.primary.reverses
 
     @property
     def max_speed(self) -> float:
@@ -77,11 +81,16 @@ class RotationShim:
         """Go on with other parameters; lifts the speed limit."""
         self.config = config
         self.primary.configure(config.primary_controller)
+        self._begin()
 
     def reset(self) -> None:
         """Forget the path."""
         self._forget()
         self.primary.reset()
+
+    def _begin(self) -> None:
+        self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
+        self._forget()
 
     def _forget(self) -> None:
         self._handler.reset()
@@ -162,7 +171,7 @@ class RotationShim:
             angle = wrap_angle(yaw - pose.yaw)
         else:
             angle = wrap_angle(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
-            if local.reversing:
+            if local.reversing and self.reverses:
                 angle = wrap_angle(angle + math.pi)
         limit = config.angular_disengage_threshold if self._turning else config.angular_dist_threshold
         if abs(angle) <= limit or (not far.any() and not self._turning and self._aligned):

@@ -29,6 +29,15 @@ def circle(radius: float, *, corners: int = 16) -> Array:
     return radius / math.cos(math.pi / corners) * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
+def padded(footprint: ArrayLike, padding: float) -> Array:
+    """Return the footprint, shape (n, 2), with each coordinate moved away from the base by `padding` [m].
+
+    Source: nav2_costmap_2d padFootprint.
+    """
+    corners = np.asarray(footprint, dtype=np.float64)
+    return corners + np.sign(corners) * padding
+
+
 def radii(footprint: ArrayLike) -> tuple[float, float]:
     """Return the inscribed and the circumscribed radius [m] about the base origin.
 

@@ -1,4 +1,4 @@
-"""The compiled loops of the costmap: ray tracing, inflation, footprints."""
+"""The compiled loops of the costmap: ray tracing and footprints."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ def trace_scan(
     sensor_y: float,
     obstacle_min_range: float,
     obstacle_max_range: float,
+    raytrace_min_range: float,
     raytrace_max_range: float,
     origin_x: float,
     origin_y: float,
@@ -41,6 +42,7 @@ def trace_scan(
         length = math.hypot(dx, dy)
         if not length > 0.0 or length == math.inf:
             continue
+        t_start = raytrace_min_range / (length * resolution)
         t_end = min(1.0, raytrace_max_range / (length * resolution))
         ix, iy = int(sx), int(sy)
         step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
@@ -49,7 +51,8 @@ def trace_scan(
         t_x = ((ix + 1 - sx) if dx > 0.0 else (sx - ix)) * t_dx if dx != 0.0 else math.inf
         t_y = ((iy + 1 - sy) if dy > 0.0 else (sy - iy)) * t_dy if dy != 0.0 else math.inf
         while True:
-            obstacles[iy, ix] = 0
+            if t_x >= t_start and t_y >= t_start:
+                obstacles[iy, ix] = 0
             if t_x < t_y:
                 if t_x > t_end:
                     break
@@ -70,64 +73,6 @@ def trace_scan(
         jy = math.floor((points[k, 1] - origin_y) / resolution)
         if 0 <= jx < width and 0 <= jy < height:
             obstacles[int(jy), int(jx)] = 254
-
-
-@jit
-def combine_and_inflate(
-    costs: Cells,
-    base: Cells,
-    seen_base: Cells,
-    obstacles: Cells,
-    stamp: Cells,
-    inflate_unknown: bool,
-    x0: int,
-    y0: int,
-    x1: int,
-    y1: int,
-) -> None:
-    """Rewrite costs[y0:y1, x0:x1] from the inflated static layer and the obstacle layer.
-
-    Args:
-        costs: The master grid, written.
-        base: Static layer, already inflated.
-        seen_base: The same if none of its cells were unknown: what is below an unknown cell seen free.
-        obstacles: Obstacle layer: 255 never seen, 0 seen free, 254 lethal.
-        stamp: Costs around one lethal cell, shape (2 r + 1, 2 r + 1); 0 beyond the inflation radius.
-        inflate_unknown: Whether inflation writes every cost into unknown cells, not only 253 and above.
-        x0: First column; x1 and y1 are one past the last.
-        y0: First row.
-        x1: Column past the last.
-        y1: Row past the last.
-    """
-    height, width = costs.shape
-    r = stamp.shape[0] // 2
-    for y in range(y0, y1):
-        for x in range(x0, x1):
-            costs[y, x] = seen_base[y, x] if obstacles[y, x] == 0 else base[y, x]
-    for y in range(max(0, y0 - r), min(height, y1 + r)):
-        for x in range(max(0, x0 - r), min(width, x1 + r)):
-            if obstacles[y, x] != 254 or base[y, x] == 254:
-                continue
-            if (
-                0 < x < width - 1
-                and 0 < y < height - 1
-                and obstacles[y, x - 1] == 254
-                and obstacles[y, x + 1] == 254
-                and obstacles[y - 1, x] == 254
-                and obstacles[y + 1, x] == 254
-            ):
-                if x0 <= x < x1 and y0 <= y < y1:
-                    costs[y, x] = 254
-                continue  # an inner cell is never the nearest one to anything outside
-            for v in range(max(y0, y - r), min(y1, y + r + 1)):
-                for u in range(max(x0, x - r), min(x1, x + r + 1)):
-                    cost = stamp[v - y + r, u - x + r]
-                    old = costs[v, u]
-                    if old == 255:
-                        if cost >= 253 or (inflate_unknown and cost > 0):
-                            costs[v, u] = cost
-                    elif cost > old:
-                        costs[v, u] = cost
 
 
 @jit

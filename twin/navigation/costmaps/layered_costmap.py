@@ -1,4 +1,4 @@
-"""Costmaps kept up to date from a static map and scans: Nav2's static, obstacle and inflation layer."""
+"""Costmaps kept up to date from a map, scans, range sensors and masks, layer by layer as Nav2's."""
 
 from __future__ import annotations
 
@@ -6,85 +6,32 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
+from numpy.typing import ArrayLike
 
 from twin.errors import MapError
-from twin.geometry import Array
-from twin.navigation.costmaps import footprint as footprints
-from twin.navigation.costmaps.costmap import (
-    FREE_SPACE,
-    INSCRIBED_INFLATED_OBSTACLE,
-    LETHAL_OBSTACLE,
-    NO_INFORMATION,
-    Costmap,
-    inflation_costs,
-)
-from twin.navigation.costmaps.kernels import Cells, combine_and_inflate, trace_scan
+from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap import FREE_SPACE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.navigation.costmaps.filters import KeepoutFilter
+from twin.navigation.costmaps.inflation import Inflation
+from twin.navigation.costmaps.kernels import Cells
+from twin.navigation.costmaps.obstacle_layer import ObstacleLayer
+from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
+from twin.navigation.costmaps.static_layer import static_costs
+from twin.navigation.costmaps.window import NOTHING, Window, everything, raised
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
+__all__ = ["CostmapConfig", "LayeredCostmap"]
 
-@dataclass(frozen=True, kw_only=True)
-class CostmapConfig:
-    """Parameters of a layered costmap; names and defaults are those of nav2_costmap_2d."""
-
-    resolution: float = 0.05
-    """[m]; ignored with a static map, which brings its own."""
-    rolling_window: bool = False
-    """Whether the grid follows the robot (a local costmap)."""
-    width: float = 5.0
-    """Of a grid without static map [m]."""
-    height: float = 5.0
-    """[m]"""
-    robot_radius: float = 0.1
-    """[m]; ignored with a footprint."""
-    footprint: tuple[tuple[float, float], ...] = ()
-    """Corners in the base frame [m]."""
-    inflation_radius: float = 0.55
-    """[m]"""
-    cost_scaling_factor: float = 10.0
-    """[1/m]"""
-    inflate_unknown: bool = False
-    track_unknown_space: bool = True
-    """Whether -1 of the static map and cells never seen are unknown (255), not free."""
-    lethal_cost_threshold: int = 100
-    """Occupancy from which a cell of the static map is lethal."""
-    trinary_costmap: bool = True
-    """Whether occupancies below that are free, not scaled to costs."""
-    obstacle_min_range: float = 0.0
-    """[m]"""
-    obstacle_max_range: float = 2.5
-    """Points farther away do not mark [m]."""
-    raytrace_max_range: float = 3.0
-    """Rays clear up to here [m]."""
-
-    @property
-    def polygon(self) -> Array:
-        """The footprint, shape (n, 2); the robot's circle if none is given."""
-        return np.array(self.footprint) if self.footprint else footprints.circle(self.robot_radius)
-
-    @property
-    def inscribed_radius(self) -> float:
-        """Of the footprint [m]."""
-        return footprints.radii(self.footprint)[0] if self.footprint else self.robot_radius
-
-
-@dataclass(kw_only=True)
-class _Window:
-    """A rectangle of cells, end exclusive."""
-
-    x0: int
-    y0: int
-    x1: int
-    y1: int
+_SAME_FRAME = Pose2(0.0, 0.0, 0.0)
 
 
 @dataclass(kw_only=True)
 class LayeredCostmap:
-    """A master grid kept up to date from a static map and scans; `costmap` is the result.
+    """Layers, and the master grid that they make: static, obstacles, range sensors, keep-out, inflation.
 
-    The static layer is inflated once; a scan re-inflates only the window in which obstacle cells changed.
-    An obstacle stays until a ray passes through its cell.
+    What comes in only notes the window that it changed; `costmap` combines and inflates that window, once,
+    when it is asked for. So a scan costs what it changed, and a window that rolls twice is inflated once.
 
     Raises:
         MapError: the static map is turned (origin yaw), or the window is to roll over a static map.
@@ -98,56 +45,106 @@ class LayeredCostmap:
         if static is not None and (static.origin.yaw != 0.0 or config.rolling_window):
             raise MapError("a costmap takes a static map only with origin yaw 0 and without rolling_window")
         self._resolution = config.resolution if static is None else static.resolution
-        unknown = NO_INFORMATION if config.track_unknown_space else FREE_SPACE
         if static is None:
             shape = round(config.height / self._resolution), round(config.width / self._resolution)
-            self._base = np.full(shape, FREE_SPACE if config.rolling_window else unknown, dtype=np.uint8)
-            self._seen_base = np.zeros(shape, dtype=np.uint8)
+            unknown = config.track_unknown_space and not config.rolling_window
+            self._static = np.full(shape, NO_INFORMATION if unknown else FREE_SPACE, dtype=np.uint8)
             origin = (-config.width / 2.0, -config.height / 2.0)
         else:
-            self._base = self._inflated_static(static, unknown)
-            self._seen_base = self._inflated_static(static, FREE_SPACE)
+            self._static = static_costs(
+                static,
+                lethal_cost_threshold=config.lethal_cost_threshold,
+                trinary_costmap=config.trinary_costmap,
+                track_unknown_space=config.track_unknown_space,
+            )
             origin = (static.origin.x, static.origin.y)
-        self._stamp = self._make_stamp()
-        self._obstacles: Cells = np.full(self._base.shape, NO_INFORMATION, dtype=np.uint8)
-        self.costmap = self._wrap(self._base.copy(), origin)
+        self._inscribed_radius = config.inscribed_radius
+        self._inflation = Inflation(
+            resolution=self._resolution,
+            inscribed_radius=self._inscribed_radius,
+            inflation_radius=config.inflation_radius,
+            cost_scaling_factor=config.cost_scaling_factor,
+            inflate_unknown=config.inflate_unknown,
+        )
+        self._obstacles = ObstacleLayer(self.shape)
+        self._ranges: RangeSensorLayer | None = None
+        self._keepout: Cells | None = None
+        self._master = self._static.copy()
+        self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._dirty = everything(self.shape)
+        self._all_costs_stale = True
 
-    def update(self, scan_points: ArrayLike, sensor_origin: ArrayLike) -> None:
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width [cells]."""
+        height, width = self._static.shape
+        return height, width
+
+    @property
+    def costmap(self) -> Costmap:
+        """The master grid, up to date; its costs are written again when it is asked for later."""
+        if not self._dirty.empty:
+            self._refresh()
+        return self._grid
+
+    def update(self, scan_points: ArrayLike, sensor_origin: ArrayLike, robot: Pose2 | None = None) -> None:
         """Clear along the rays of a scan and mark its points.
 
         Args:
             scan_points: Ends of the rays, shape (n, 2), in the costmap's frame [m]. A ray without return ends
                 beyond `obstacle_max_range`: it clears and does not mark. NaN points are skipped.
             sensor_origin: x, y of the sensor in the costmap's frame [m].
+            robot: Pose of the base in the costmap's frame; the cells under its footprint become free.
         """
         points = np.array(scan_points, dtype=np.float64, order="C").reshape(-1, 2)
-        sensor = np.asarray(sensor_origin, dtype=np.float64)
-        config, grid = self.config, self.costmap
-        reach = max(config.obstacle_max_range, config.raytrace_max_range)
-        window = self._clip(
-            *grid.world_to_cell(sensor[0] - reach, sensor[1] - reach),
-            *grid.world_to_cell(sensor[0] + reach, sensor[1] + reach),
+        x, y = np.asarray(sensor_origin, dtype=np.float64).tolist()
+        config = self.config
+        limits = np.array(
+            [
+                config.obstacle_min_range,
+                config.obstacle_max_range,
+                config.raytrace_min_range,
+                config.raytrace_max_range,
+            ]
         )
-        rows, columns = slice(window.y0, window.y1), slice(window.x0, window.x1)
-        before = self._obstacles[rows, columns].copy()
-        trace_scan(
-            self._obstacles,
-            points,
-            float(sensor[0]),
-            float(sensor[1]),
-            config.obstacle_min_range,
-            config.obstacle_max_range,
-            config.raytrace_max_range,
-            *grid.origin,
-            self._resolution,
+        self._touch(self._obstacles.trace(points, (x, y), limits, self._grid.frame))
+        if robot is not None and config.footprint_clearing_enabled:
+            self._touch(self._obstacles.clear_polygon(robot.apply(config.polygon), self._grid.frame))
+
+    def update_range(
+        self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float
+    ) -> None:
+        """Take a reading of a sonar or infrared sensor.
+
+        Args:
+            sensor: Pose in the costmap's frame; the cone opens along its x.
+            distance: What was measured [m].
+            limits: The sensor's least and greatest range [m]; if equal it tells only -inf (something) or inf.
+            field_of_view: Full angle of the cone [rad].
+        """
+        if self._ranges is None:
+            self._ranges = RangeSensorLayer(self.shape, self.config.range_sensor_layer)
+        self._touch(self._ranges.add(sensor, distance, limits, field_of_view, self._grid.frame))
+
+    def set_keepout(
+        self, keepout: KeepoutFilter | None, robot: Pose2 | None = None, T_mask_costmap: Pose2 = _SAME_FRAME
+    ) -> None:
+        """Lay a keep-out mask over the costmap, or take it away; call it again when the frames have moved.
+
+        Args:
+            keepout: The mask.
+            robot: Pose in the costmap's frame, for `override_lethal_cost`.
+            T_mask_costmap: Pose of the costmap's frame in the mask's.
+        """
+        layer = (
+            None if keepout is None else keepout.costs(self.shape, self._grid.frame, robot, T_mask_costmap)
         )
-        changed = before != self._obstacles[rows, columns]
-        ys, xs = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
-        if ys.size:
-            r = self._stamp.shape[0] // 2
-            x0, y0 = window.x0 + int(xs[0]) - r, window.y0 + int(ys[0]) - r
-            x1, y1 = window.x0 + int(xs[-1]) + r, window.y0 + int(ys[-1]) + r
-            self._refresh(self._clip(x0, y0, x1, y1))
+        same = layer is self._keepout or (
+            layer is not None and self._keepout is not None and np.array_equal(layer, self._keepout)
+        )
+        if not same:
+            self._keepout = layer
+            self._stale()
 
     def move_to(self, x: float, y: float) -> None:
         """Centre a rolling window on a point [m], by whole cells; what leaves it is forgotten.
@@ -157,90 +154,79 @@ class LayeredCostmap:
         """
         if not self.config.rolling_window:
             raise ValueError("move_to needs rolling_window")
-        height, width = self._base.shape
-        old = self.costmap.origin
+        height, width = self.shape
+        old = self._grid.origin
         dx = math.floor((x - old[0]) / self._resolution) - width // 2
         dy = math.floor((y - old[1]) / self._resolution) - height // 2
         if dx == 0 and dy == 0:
             return
+        self._obstacles.move(dx, dy)
+        if self._ranges is not None:
+            self._ranges.move(dx, dy)
+        self._keepout = None  # the mask stays where it is: whoever has it lays it anew
         origin = (old[0] + dx * self._resolution, old[1] + dy * self._resolution)
-        self._obstacles = _shifted(self._obstacles, dx, dy)
-        self.costmap = self._wrap(np.empty_like(self._base), origin)
-        self._refresh(_Window(x0=0, y0=0, x1=width, y1=height))
+        self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._stale()
 
     def clear(self) -> None:
-        """Forget every obstacle that the static map does not hold (nav2's clear_entirely service)."""
-        self._obstacles.fill(NO_INFORMATION)
-        np.copyto(self.costmap.costs, self._base)
+        """Forget every obstacle that the static map and the masks do not hold (clear_entirely)."""
+        self._forget(everything(self.shape), outside=False)
+
+    def clear_area(self, x: float, y: float, size: float, *, outside: bool = False) -> None:
+        """Forget obstacles in a square about a point, or everywhere else.
+
+        Source: nav2_costmap_2d ClearCostmapService and CostmapLayer::clearArea (`clear_around_robot`,
+        `clear_except_region`): cells strictly between those of the square's corners.
+
+        Args:
+            x: Centre [m].
+            y: Centre [m].
+            size: Edge of the square [m].
+            outside: Whether what is outside of the square is forgotten instead.
+        """
+        half = size / 2.0
+        x0, y0 = self._grid.world_to_cell(x - half, y - half)
+        x1, y1 = self._grid.world_to_cell(x + half, y + half)
+        self._forget(Window(x0 + 1, y0 + 1, x1, y1).clipped(self.shape), outside=outside)
+
+    def _forget(self, window: Window, *, outside: bool) -> None:
+        if window.empty and not outside:
+            return
+        self._touch(self._obstacles.forget(window, outside=outside))
+        if self._ranges is not None:
+            self._touch(self._ranges.forget(window, outside=outside))
 
     def _wrap(self, costs: Cells, origin: tuple[float, float]) -> Costmap:
         return Costmap(
             costs=costs,
             resolution=self._resolution,
             origin=origin,
-            inscribed_radius=self.config.inscribed_radius,
+            inscribed_radius=self._inscribed_radius,
             cost_scaling_factor=self.config.cost_scaling_factor,
         )
 
-    def _refresh(self, window: _Window) -> None:
-        combine_and_inflate(
-            self.costmap.costs,
-            self._base,
-            self._seen_base,
-            self._obstacles,
-            self._stamp,
-            self.config.inflate_unknown,
-            window.x0,
-            window.y0,
-            window.x1,
-            window.y1,
-        )
+    def _touch(self, window: Window) -> None:
+        self._dirty = self._dirty.joined(window)
 
-    def _clip(self, x_first: int, y_first: int, x_last: int, y_last: int) -> _Window:
-        height, width = self._base.shape
-        return _Window(
-            x0=min(max(0, x_first), width),
-            y0=min(max(0, y_first), height),
-            x1=min(max(0, x_last + 1), width),
-            y1=min(max(0, y_last + 1), height),
-        )
+    def _stale(self) -> None:
+        self._dirty, self._all_costs_stale = everything(self.shape), True
 
-    def _costs_at(self, distance: Array) -> Cells:
-        return inflation_costs(
-            distance * self._resolution,
-            inscribed_radius=self.config.inscribed_radius,
-            inflation_radius=self.config.inflation_radius,
-            cost_scaling_factor=self.config.cost_scaling_factor,
-        )
-
-    def _make_stamp(self) -> Cells:
-        r = math.floor(self.config.inflation_radius / self._resolution)
-        span = np.arange(-r, r + 1, dtype=np.float64)
-        return self._costs_at(np.hypot(span[:, None], span[None, :]))
-
-    def _inflated_static(self, static: OccupancyMap, unknown: int) -> Cells:
-        occupancy = static.data
-        lethal = occupancy >= self.config.lethal_cost_threshold
-        costs = np.where(occupancy < 0, unknown, FREE_SPACE).astype(np.uint8)
-        if not self.config.trinary_costmap:
-            scaled = (occupancy > 0) & ~lethal
-            costs[scaled] = occupancy[scaled] / self.config.lethal_cost_threshold * LETHAL_OBSTACLE
-        if not lethal.any():
-            return costs
-        inflated = self._costs_at(ndimage.distance_transform_edt(~lethal))
-        into_unknown = (inflated >= INSCRIBED_INFLATED_OBSTACLE) | self.config.inflate_unknown & (
-            inflated > 0
-        )
-        write = np.where(costs == NO_INFORMATION, into_unknown, inflated > costs)
-        costs[write] = inflated[write]
-        return costs
-
-
-def _shifted(cells: NDArray[np.uint8], dx: int, dy: int) -> NDArray[np.uint8]:
-    """Return the cells as seen from a window moved by (dx, dy) cells; new cells are unknown."""
-    height, width = cells.shape
-    moved = np.full_like(cells, NO_INFORMATION)
-    if abs(dx) < width and abs(dy) < height:
-        target = moved[max(0, -dy) : height - max(0, dy), max(0, -dx) : width - max(0, dx)]
-        target[...] = cells[max(0, dy) : height - max(0, -dy), max(0, dx) : width - max(0, -dx)]
-    return moved
+    def _refresh(self) -> None:
+        """Combine the layers where they changed, and inflate as far around as that reaches."""
+        window, self._dirty = self._dirty, NOTHING
+        at = window.slices
+        master = raised(self._static[at], self._obstacles.cells[at])
+        if self._ranges is not None:
+            master = raised(master, self._ranges.costs(window))
+        keepout, inflated_zones = self._keepout, self.config.keepout_before_inflation
+        if keepout is not None and inflated_zones:
+            master = raised(master, keepout[at])
+        self._master[at] = master
+        around = everything(self.shape)
+        if not self._all_costs_stale:
+            around = window.grown(self._inflation.reach).clipped(self.shape)
+        self._all_costs_stale = False
+        costs = self._grid.costs
+        self._inflation.write(costs, self._master, around)
+        if keepout is not None and not inflated_zones:
+            costs[around.slices] = raised(costs[around.slices], keepout[around.slices])

@@ -10,59 +10,28 @@ from numpy.typing import ArrayLike
 
 from twin.errors import MapError
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.amcl_config import MOTION_MODELS, AmclConfig
+from twin.navigation.localisation.annealing import annealed
+from twin.navigation.localisation.confidence import Confidence
+from twin.navigation.localisation.hit_calibration import HitCalibration
+from twin.navigation.localisation.laser_models import is_converged, laser_model, without_strangers
+from twin.navigation.localisation.laser_scan import Beams, chosen_beams
 from twin.navigation.localisation.particles import (
-    best_cluster,
     bin_keys,
+    clusters,
+    heaviest,
     kld_sample_size,
     mean_and_covariance,
+    regularised,
     sample_motion,
+    sample_omni_motion,
     systematic_resample,
-    tempered_weights,
 )
+from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 
-
-@dataclass(frozen=True, kw_only=True)
-class AmclConfig:
-    """Parameters; names are those of nav2_amcl (whose alphas default to 0.2, for drives that slip more)."""
-
-    alpha1: float = 0.05
-    """Turning noise per turn."""
-    alpha2: float = 0.05
-    """Turning noise per metre."""
-    alpha3: float = 0.05
-    """Driving noise per metre."""
-    alpha4: float = 0.05
-    """Driving noise per turn."""
-    min_particles: int = 500
-    max_particles: int = 2000
-    pf_err: float = 0.05
-    pf_z: float = 0.99
-    max_beams: int = 60
-    sigma_hit: float = 0.1
-    """[m]"""
-    z_hit: float = 0.5
-    z_rand: float = 0.5
-    laser_likelihood_max_dist: float = 2.0
-    """[m]"""
-    laser_min_range: float = 0.0
-    """[m]"""
-    laser_max_range: float = 100.0
-    """Readings of this and more saw nothing and are not used [m]."""
-    beam_weight: float = 0.5
-    """Exponent of a beam's likelihood: beams are not independent, all of them see the same map's faults."""
-    update_min_d: float = 0.25
-    """[m]"""
-    update_min_a: float = 0.2
-    """[rad]"""
-    resample_interval: int = 1
-    recovery_alpha_slow: float = 0.0
-    recovery_alpha_fast: float = 0.0
-    least_effective: float = 20.0
-    """Weights are flattened while fewer particles than this would count."""
-    global_particles: int = 50_000
-    """How many poses `global_localisation` tries at once."""
+_FIT_SIGMA = 0.1
+"""Distance from the nearest surface at which a beam counts as explained by 0.6 [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,9 +41,13 @@ class Estimate:
     pose: Pose2
     """Of the base in the map frame: mean of the heaviest cluster."""
     covariance: Array
-    """Of x, y, yaw, shape (3, 3)."""
+    """Of x, y, yaw, shape (3, 3); of all particles while the robot is lost."""
     T_map_odom: Pose2
     """What to publish as the transform map -> odom."""
+    fit: float
+    """Share of the scan, 0 ... 1, that the map explains at this pose; nan if the scan saw nothing."""
+    lost: float
+    """Share of the belief, 0 ... 1, that is being drawn anew because scans do not fit; 0 if all is well."""
 
 
 class Amcl:
@@ -89,20 +62,19 @@ class Amcl:
     def __init__(self, config: AmclConfig, occupancy: OccupancyMap, seed: int) -> None:
         self.config = config
         self._map = occupancy
-        self._field = LikelihoodField(
-            occupancy,
-            sigma_hit=config.sigma_hit,
-            z_hit=config.z_hit,
-            z_rand=config.z_rand,
-            max_dist=config.laser_likelihood_max_dist,
-        )
+        self._surfaces = SurfaceDistance(occupancy, max_dist=config.laser_likelihood_max_dist)
+        self.hits = HitCalibration(occupancy.resolution, config.sigma_hit)
+        """What was learnt about this map and lidar."""
+        self._model = laser_model(config, self._surfaces)
         self._free = np.argwhere(occupancy.data == FREE)[:, ::-1]
         if not len(self._free):
             raise MapError("the map has no free cell; localisation needs at least one")
-        self._random = np.random.Generator(np.random.Philox(key=seed))
+        self._random = np.random.Generator(
+            np.random.Philox(key=seed if config.random_seed < 0 else config.random_seed)
+        )
         self._odom: Pose2 | None = None
         self._updates = 0
-        self._w_slow = self._w_fast = 0.0
+        self._confidence = self._no_confidence()
         self.particles: Array = np.zeros((0, 3))
         """Poses in the map frame, shape (n, 3)."""
         self.weights: Array = np.zeros(0)
@@ -116,8 +88,7 @@ class Amcl:
         spread = np.asarray(covariance, dtype=np.float64)
         values, vectors = np.linalg.eigh(spread)
         normal = self._random.standard_normal((self.config.max_particles, 3))
-        particles = normal * np.sqrt(np.maximum(values, 0.0)) @ vectors.T + pose
-        self._restart(particles)
+        self._restart(normal * np.sqrt(np.maximum(values, 0.0)) @ vectors.T + pose)
 
     def global_localisation(self) -> None:
         """Start from no idea: poses all over the free cells (nav2's reinitialize_global_localization)."""
@@ -130,7 +101,7 @@ class Amcl:
 
         Args:
             odom: Pose of the base in the odom frame when the scan was taken.
-            ranges: Shape (n,) [m]; what is not finite or out of range saw nothing.
+            ranges: Shape (n,) [m]; +inf saw nothing, nan and -inf tell nothing; empty: odometry alone.
             angles: Shape (n,), of the beams in the lidar frame [rad].
             T_base_lidar: Pose of the lidar in the base frame.
             force: Update without motion (nav2's request_nomotion_update).
@@ -141,20 +112,27 @@ class Amcl:
             turned = abs(wrap_angle(odom.yaw - self._odom.yaw)) >= config.update_min_a
             if not (moved or turned or force):
                 return None
-            noise = self._random.standard_normal((3, len(self.particles)))
-            alphas = (config.alpha1, config.alpha2, config.alpha3, config.alpha4)
-            self.particles = sample_motion(self.particles, self._odom, odom, alphas, noise)
+            self._move(self._odom, odom)
         self._odom = odom
-        ends = self._beam_ends(np.asarray(ranges, dtype=np.float64), np.asarray(angles), T_base_lidar)
-        if len(ends):
-            self._weigh(ends)
-        members = best_cluster(self.particles, self.weights)
-        pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
-        self.estimate = Estimate(pose=pose, covariance=covariance, T_map_odom=pose @ odom.inverse())
+        beams = chosen_beams(
+            ranges,
+            angles,
+            T_base_lidar,
+            most=config.max_beams,
+            min_range=config.laser_min_range,
+            max_range=config.laser_max_range,
+        )
+        if len(beams):
+            self._weigh(beams)
+        self.estimate = self._estimated(odom, beams)
         self._updates += 1
         if self._updates % config.resample_interval == 0:
-            self._resample(ends)
+            self._resample(beams, self.estimate.lost)
         return self.estimate
+
+    def rebase(self, odom: Pose2) -> None:
+        """Take odometry as continuing from `odom` without motion: it jumped."""
+        self._odom = odom
 
     def _restart(self, particles: Array) -> None:
         self.particles = particles
@@ -162,7 +140,10 @@ class Amcl:
         self.estimate = None
         self._odom = None
         self._updates = 0
-        self._w_slow = self._w_fast = 0.0
+        self._confidence = self._no_confidence()
+
+    def _no_confidence(self) -> Confidence:
+        return Confidence(self.config.recovery_alpha_slow, self.config.recovery_alpha_fast)
 
     def _anywhere(self, count: int) -> Array:
         """Return poses uniform over the free cells and all headings, shape (count, 3)."""
@@ -171,38 +152,59 @@ class Amcl:
         xy = self._map.cell_to_world(cells + place[:, :2] - 0.5)
         return np.column_stack([xy, (2.0 * place[:, 2] - 1.0) * math.pi])
 
-    def _where_it_fits(self, count: int, ends: Array) -> Array:
-        """Return poses from all over the map that explain a scan, shape (count, 3).
-
-        Source: Lenser and Veloso, Sensor Resetting Localization, ICRA 2000; amcl draws them blindly.
-        """
-        candidates = self._anywhere(max(count, self.config.global_particles // 5))
-        fit = self._field.log_likelihood(candidates, ends)
-        weights = tempered_weights(self.config.beam_weight * fit, self.config.least_effective)
-        return candidates[systematic_resample(weights, count, float(self._random.random()))]
-
-    def _beam_ends(self, ranges: Array, angles: Array, T_base_lidar: Pose2) -> Array:
-        """Return the ends of at most max_beams evenly spread beams in the base frame, shape (b, 2)."""
+    def _move(self, before: Pose2, now: Pose2) -> None:
         config = self.config
-        count = min(config.max_beams, len(ranges))
-        chosen = np.linspace(0, len(ranges) - 1, count).round().astype(np.int64)
-        r, a = ranges[chosen], angles[chosen]
-        seen = np.isfinite(r) & (r > config.laser_min_range) & (r < config.laser_max_range)
-        r, a = r[seen], a[seen]
-        return T_base_lidar.apply(np.column_stack([r * np.cos(a), r * np.sin(a)]))
+        noise = self._random.standard_normal((3, len(self.particles)))
+        alphas = (config.alpha1, config.alpha2, config.alpha3, config.alpha4)
+        if config.robot_model_type == MOTION_MODELS[0]:
+            self.particles = sample_motion(self.particles, before, now, alphas, noise)
+        else:
+            self.particles = sample_omni_motion(self.particles, before, now, (*alphas, config.alpha5), noise)
 
-    def _weigh(self, ends: Array) -> None:
-        fit = self._field.log_likelihood(self.particles, ends)
-        per_beam = float(np.exp(fit / len(ends)) @ self.weights)
+    def _weigh(self, beams: Beams) -> None:
         config = self.config
-        self._w_slow += config.recovery_alpha_slow * (per_beam - self._w_slow) if self._w_slow else per_beam
-        self._w_fast += config.recovery_alpha_fast * (per_beam - self._w_fast) if self._w_fast else per_beam
-        with np.errstate(divide="ignore"):
-            prior = np.log(self.weights)
-        least = min(config.least_effective, 0.5 * len(self.particles))
-        self.weights = tempered_weights(prior + config.beam_weight * fit, least)
+        converged = is_converged(self.particles)
+        if config.do_beamskip and config.laser_model_type == "likelihood_field_prob" and converged:
+            beams = without_strangers(beams, self.particles, self._surfaces, self.hits, config)
+        # What was learnt about hits holds near the truth; far from it a wide model leads there.
+        sigma = self.hits.sigma if converged else config.sigma_hit
+        self.particles, self.weights = self._fitted(self.particles, self.weights, beams, sigma)
 
-    def _resample(self, ends: Array) -> None:
+    def _fitted(self, particles: Array, weights: Array, beams: Beams, sigma: float) -> tuple[Array, Array]:
+        config, depth = self.config, self.hits.depth
+        return annealed(
+            particles,
+            weights,
+            lambda poses: config.beam_weight * self._model.log_likelihood(poses, beams, depth, sigma),
+            count=config.max_particles,
+            effective=config.effective_share,
+            random=self._random,
+        )
+
+    def _estimated(self, odom: Pose2, beams: Beams) -> Estimate:
+        """Return the heaviest cluster's pose; learn from how the scan fits there."""
+        members = heaviest(clusters(self.particles), self.weights)
+        pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
+        fit = math.nan
+        if len(beams):
+            distances = self._surfaces.at(pose.apply(beams.ends))
+            fit = float(np.mean(np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)))
+            self._confidence.update(fit)
+            self.hits.learn(distances)
+        elif self.estimate is not None:
+            # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.
+            pose = self.estimate.T_map_odom @ odom
+        if self._confidence.lost:
+            _, covariance = mean_and_covariance(self.particles, self.weights)
+        return Estimate(
+            pose=pose,
+            covariance=covariance,
+            T_map_odom=pose @ odom.inverse(),
+            fit=fit,
+            lost=self._confidence.lost,
+        )
+
+    def _resample(self, beams: Beams, lost: float) -> None:
         """Draw as many particles as the spread of the belief asks for (KLD sampling)."""
         config = self.config
         offset, again = self._random.random(2)
@@ -210,11 +212,21 @@ class Amcl:
         bins = len(np.unique(bin_keys(self.particles[drawn])))
         wanted = kld_sample_size(bins, config.pf_err, config.pf_z)
         count = min(max(wanted, config.min_particles), config.max_particles)
-        self.particles = self.particles[systematic_resample(self.weights, count, again)]
+        kept = self.particles[systematic_resample(self.weights, count, again)]
+        noise = self._random.standard_normal((count, 3))
+        self.particles = regularised(kept, clusters(kept), noise)
         self.weights = np.full(count, 1.0 / count)
-        lost = max(0.0, 1.0 - self._w_fast / self._w_slow) if self._w_slow > 0.0 else 0.0
         fresh = round(lost * count)
-        if fresh:
+        if fresh and len(beams):
             replaced = np.linspace(0, count - 1, fresh).astype(np.int64)
-            self.particles[replaced] = self._where_it_fits(fresh, ends)
-            self._w_slow = self._w_fast = 0.0
+            self.particles[replaced] = self._where_it_fits(fresh, beams)
+
+    def _where_it_fits(self, count: int, beams: Beams) -> Array:
+        """Return poses from all over the map that explain a scan, shape (count, 3).
+
+        Source: Lenser and Veloso, Sensor Resetting Localization, ICRA 2000; amcl draws them blindly.
+        """
+        candidates = self._anywhere(max(count, self.config.global_particles // 5))
+        even = np.full(len(candidates), 1.0 / len(candidates))
+        poses, weights = self._fitted(candidates, even, beams, self.config.sigma_hit)
+        return poses[systematic_resample(weights, count, float(self._random.random()))]

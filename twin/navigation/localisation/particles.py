@@ -49,7 +49,39 @@ def sample_motion(
     moved[:, 0] = particles[:, 0] + step * np.cos(heading)
     moved[:, 1] = particles[:, 1] + step * np.sin(heading)
     moved[:, 2] = heading + rot2 + sigma2 * noise[2]
-    moved[:, 2] -= 2.0 * math.pi * np.round(moved[:, 2] / (2.0 * math.pi))
+    moved[:, 2] = _wrapped(moved[:, 2])
+    return moved
+
+
+def sample_omni_motion(
+    particles: Array,
+    before: Pose2,
+    now: Pose2,
+    alphas: tuple[float, float, float, float, float],
+    noise: Array,
+) -> Array:
+    """Return the particles, shape (n, 3), moved as `sample_motion`, by a drive that can go sideways.
+
+    Source: nav2_amcl's OmniMotionModel: noise along the motion, across it, and of the turn.
+
+    Args:
+        particles: Shape (n, 3).
+        before: Odometry pose.
+        now: Odometry pose.
+        alphas: alpha1..alpha5.
+        noise: Standard normal, shape (3, n).
+    """
+    step = before.inverse() @ now
+    trans, turn = math.hypot(step.x, step.y), wrap_angle(step.yaw)
+    a1, a2, a3, a4, a5 = alphas
+    along = trans + math.sqrt(a3 * trans**2 + a4 * turn**2) * noise[0]
+    across = math.sqrt(a4 * turn**2 + a5 * trans**2) * noise[1]
+    bearing = particles[:, 2] + math.atan2(step.y, step.x)
+    c, s = np.cos(bearing), np.sin(bearing)
+    moved = np.empty_like(particles)
+    moved[:, 0] = particles[:, 0] + along * c - across * s
+    moved[:, 1] = particles[:, 1] + along * s + across * c
+    moved[:, 2] = _wrapped(particles[:, 2] + turn + math.sqrt(a1 * turn**2 + a2 * trans**2) * noise[2])
     return moved
 
 
@@ -83,11 +115,11 @@ def systematic_resample(weights: Array, count: int, offset: float) -> NDArray[np
     return np.minimum(at, len(weights) - 1)
 
 
-def best_cluster(particles: Array, weights: Array) -> NDArray[np.bool_]:
-    """Return the members, shape (n,), of the heaviest cluster: particles in bins that touch each other."""
+def clusters(particles: Array) -> NDArray[np.int64]:
+    """Return the number, shape (n,), of each particle's cluster: those in bins that touch each other."""
     keys, bin_of = np.unique(bin_keys(particles), return_inverse=True)
     if len(keys) == 1:
-        return np.ones(len(particles), dtype=np.bool_)
+        return np.zeros(len(particles), dtype=np.int64)
     turn, cell = keys % YAW_BINS, keys // YAW_BINS
     links = []
     for step in (0, 1, _ROW - 1, _ROW, _ROW + 1):
@@ -100,10 +132,47 @@ def best_cluster(particles: Array, weights: Array) -> NDArray[np.bool_]:
     ones = np.ones(len(pairs), dtype=np.int8)
     graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(keys), len(keys)))
     _, cluster_of_bin = connected_components(graph, directed=False)
-    cluster = cluster_of_bin[bin_of]
-    mass = np.bincount(cluster, weights=weights)
-    members: NDArray[np.bool_] = cluster == int(np.argmax(mass))
+    return np.asarray(cluster_of_bin[bin_of], dtype=np.int64)
+
+
+def heaviest(cluster: NDArray[np.int64], weights: Array) -> NDArray[np.bool_]:
+    """Return which particles, shape (n,), are in the cluster of the largest weight."""
+    members: NDArray[np.bool_] = cluster == int(np.argmax(np.bincount(cluster, weights=weights)))
     return members
+
+
+def regularised(particles: Array, cluster: NDArray[np.int64], noise: Array) -> Array:
+    """Return equally weighted particles, shape (n, 3), moved a little so that no two are the same.
+
+    Each cluster is drawn together and blurred such that its mean and covariance stay what they are; the
+    width is Silverman's rule for a normal density.
+    Source: Liu and West, Combined parameter and state estimation in simulation-based filtering, 2001.
+
+    Args:
+        particles: Shape (n, 3).
+        cluster: The number of each one's cluster, shape (n,).
+        noise: Standard normal, shape (n, 3).
+    """
+    moved = particles.copy()
+    for number in range(int(cluster.max()) + 1):
+        members = np.flatnonzero(cluster == number)
+        count = len(members)
+        if count < 2:
+            continue
+        own = particles[members]
+        mean, covariance = mean_and_covariance(own, np.full(count, 1.0 / count))
+        width = min(0.5, (0.8 * count) ** (-1.0 / 7.0))
+        values, vectors = np.linalg.eigh(covariance)
+        blur = width * (noise[members] * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        offset = own - mean
+        offset[:, 2] = _wrapped(offset[:, 2])
+        moved[members] = mean + math.sqrt(1.0 - width**2) * offset + blur
+    moved[:, 2] = _wrapped(moved[:, 2])
+    return moved
+
+
+def _wrapped(yaw: Array) -> Array:
+    return yaw - 2.0 * math.pi * np.round(yaw / (2.0 * math.pi))
 
 
 def mean_and_covariance(particles: Array, weights: Array) -> tuple[Pose2, Array]:
@@ -112,31 +181,40 @@ def mean_and_covariance(particles: Array, weights: Array) -> tuple[Pose2, Array]
     x, y = (float(weights @ particles[:, i]) for i in (0, 1))
     yaw = math.atan2(float(weights @ np.sin(particles[:, 2])), float(weights @ np.cos(particles[:, 2])))
     error = particles - (x, y, yaw)
-    error[:, 2] -= 2.0 * math.pi * np.round(error[:, 2] / (2.0 * math.pi))
+    error[:, 2] = _wrapped(error[:, 2])
     return Pose2(x, y, yaw), (error * weights[:, None]).T @ error
 
 
-def tempered_weights(log_weights: Array, least_effective: float) -> Array:
-    """Return normalised weights of log-weights, shape (n,), flattened until enough particles count.
+def tempered_weights(
+    log_prior: Array, log_likelihood: Array, least_effective: float, most: float = 1.0
+) -> tuple[Array, float]:
+    """Return normalised weights, shape (n,), and the exponent that the likelihood has in them.
 
-    The exponent is the largest in (0, 1] for which the effective sample size 1 / sum w² is `least_effective`:
-    a filter that starts far off approaches in steps instead of betting everything on its luckiest particle.
+    The exponent is the largest up to `most` for which the effective sample size 1 / sum w² is at least
+    `least_effective`: a filter that starts far off approaches in steps instead of betting everything on its
+    luckiest particle. Where the prior alone has fewer, the exponent is 0.
+
+    Args:
+        log_prior: Shape (n,).
+        log_likelihood: Shape (n,).
+        least_effective: Effective sample size.
+        most: Largest exponent.
     """
-    relative = log_weights - log_weights.max()
 
-    def flattened(exponent: float) -> Array:
-        weights = np.exp(exponent * relative)
-        return weights / weights.sum()
+    def tempered(exponent: float) -> Array:
+        logs = log_prior + exponent * log_likelihood
+        weights = np.exp(logs - logs.max())
+        return np.asarray(weights / weights.sum())
 
-    weights = flattened(1.0)
+    weights = tempered(most)
     if 1.0 / float(weights @ weights) >= least_effective:
-        return weights
-    low, high = 0.0, 1.0
+        return weights, most
+    low, high = 0.0, most
     for _ in range(12):
         middle = 0.5 * (low + high)
-        weights = flattened(middle)
+        weights = tempered(middle)
         if 1.0 / float(weights @ weights) >= least_effective:
             low = middle
         else:
             high = middle
-    return flattened(low)
+    return tempered(low), low

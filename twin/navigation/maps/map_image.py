@@ -1,4 +1,4 @@
-"""Map images as grey levels: PGM by hand, everything else through pillow."""
+"""Map images as grey levels: PGM by hand, PNG, BMP and others through pillow."""
 
 from __future__ import annotations
 
@@ -27,17 +27,35 @@ def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
     try:
         with Image.open(path) as image:
             has_alpha = "A" in image.getbands() or "transparency" in image.info
-            rgba = np.asarray(image.convert("RGBA")) if has_alpha else None
-            gray = np.asarray(image.convert("L"), dtype=np.uint8)
-    except (UnidentifiedImageError, OSError, ValueError) as error:
-        raise MapError(Problem("the file is not an image; valid is PGM or PNG", path)) from error
-    return gray, None if rgba is None else rgba[..., 3]
+            if image.mode.startswith(("I", "F")):  # 16 bits per pixel, which pillow does not scale by itself
+                return np.rint(np.clip(np.asarray(image, dtype=np.float64), 0, 65535) / 257.0).astype(
+                    np.uint8
+                ), None
+            rgba = np.asarray(image.convert("RGBA"))
+    except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
+        raise MapError(Problem("the file is not an image; valid is PGM, PNG or BMP", path)) from error
+    return _luma(rgba), rgba[..., 3] if has_alpha else None
 
 
-def write_pgm(path: Path, gray: NDArray[np.uint8]) -> None:
-    """Write a binary PGM of grey levels, shape (h, w), row 0 on top."""
-    height, width = gray.shape
-    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + gray.tobytes())
+def write_image(path: Path, gray: NDArray[np.uint8], alpha: NDArray[np.uint8] | None = None) -> None:
+    """Write grey levels, shape (h, w), row 0 on top, as the suffix says: .pgm, .png or .bmp.
+
+    Transparency needs .png, and makes it RGBA, as nav2's saver does.
+    """
+    if path.suffix.lower() == ".pgm":
+        height, width = gray.shape
+        path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + gray.tobytes())
+        return
+    from PIL import Image
+
+    pixels = gray if alpha is None else np.stack([gray, gray, gray, alpha], axis=-1)
+    Image.fromarray(np.ascontiguousarray(pixels)).save(path)
+
+
+def _luma(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return grey levels as GraphicsMagick, with which Nav2 reads images, weighs colours (PixelIntensity)."""
+    red, green, blue = (rgba[..., k].astype(np.uint32) * 257 for k in range(3))
+    return np.rint(((306 * red + 601 * green + 117 * blue) >> 10) / 257.0).astype(np.uint8)
 
 
 def _read_pgm(path: Path, content: bytes) -> NDArray[np.uint8]:

@@ -1,49 +1,32 @@
-"""map_server files: YAML plus image, with the exact rules of nav2_map_server (map_io.cpp)."""
+"""Map images to occupancy, with the exact rules of nav2_map_server (map_io.cpp)."""
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from twin.errors import MapError, Problem
-from twin.geometry import Pose2
-from twin.navigation.maps.map_image import read_image, write_pgm
+from twin.navigation.maps.map_image import read_image
+from twin.navigation.maps.map_yaml import MapMetadata, read_metadata
 from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
-
-REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
-MODES = ("trinary", "scale", "raw")
-SAVED_OCCUPIED_THRESH = 0.65
-SAVED_FREE_THRESH = 0.25
-
-
-@dataclass(frozen=True, kw_only=True)
-class MapMetadata:
-    """The keys of a map_server YAML file."""
-
-    image: Path
-    resolution: float
-    origin: Pose2
-    negate: bool
-    occupied_thresh: float
-    free_thresh: float
-    mode: Literal["trinary", "scale", "raw"]
 
 
 def load_map(path: Path) -> OccupancyMap:
-    """Read a map.
+    """Read a map; `~` is the home folder.
 
     Raises:
         MapError: every fault of the YAML file at once, or that of the image.
     """
-    metadata = read_metadata(path)
+    return load_image(read_metadata(path.expanduser()))
+
+
+def load_image(metadata: MapMetadata) -> OccupancyMap:
+    """Read the image of a map whose YAML file is read.
+
+    Raises:
+        MapError: it is no image.
+    """
     gray, alpha = read_image(metadata.image)
     data = occupancy_from_gray(gray, alpha, metadata)
     return OccupancyMap(data=data[::-1], resolution=metadata.resolution, origin=metadata.origin)
@@ -54,174 +37,25 @@ def occupancy_from_gray(
 ) -> NDArray[np.int8]:
     """Return the occupancy, shape (h, w), of an image of the same shape and row order.
 
-    Source: nav2_map_server/src/map_io.cpp, loadMapFromFile.
+    As Nav2 it computes in single precision, rounds halves up, and ignores `negate` and transparency of raw
+    images. Source: nav2_map_server/src/map_io.cpp, loadMapFromFile.
     """
     if metadata.mode == "raw":
         return np.where(gray <= OCCUPIED, gray, UNKNOWN).astype(np.int8)
-    level = gray.astype(np.float32) / np.float32(255.0)
+    # There are only 256 levels: a table of them is the whole rule.
+    level = np.arange(256, dtype=np.float32) / np.float32(255.0)
     if not metadata.negate:
         level = np.float32(1.0) - level
     occupied_thresh, free_thresh = np.float32(metadata.occupied_thresh), np.float32(metadata.free_thresh)
+    table = np.full(256, UNKNOWN, dtype=np.int8)
     if metadata.mode == "scale":
-        between = np.rint((level - free_thresh) / (occupied_thresh - free_thresh) * np.float32(100.0))
-        data = np.clip(between, FREE, OCCUPIED)
-    else:
-        data = np.full(gray.shape, UNKNOWN, dtype=np.float32)
-    data[level <= free_thresh] = FREE
-    data[level >= occupied_thresh] = OCCUPIED
+        span = np.float32(metadata.occupied_thresh - metadata.free_thresh)
+        scaled = (level - free_thresh) / span * np.float32(100.0)
+        between = (level > free_thresh) & (level < occupied_thresh)
+        table[between] = np.floor(scaled[between].astype(np.float64) + 0.5)
+    table[level >= occupied_thresh] = OCCUPIED
+    table[level <= free_thresh] = FREE
+    data = table[gray]
     if alpha is not None:
         data[alpha < 255] = UNKNOWN
-    return data.astype(np.int8)
-
-
-def save_map(occupancy: OccupancyMap, path: Path, mode: Literal["trinary", "raw"]) -> None:
-    """Write a map as nav2_map_server's saver does: 254 free, 0 occupied, 205 unknown (trinary)."""
-    data = occupancy.data[::-1]
-    if mode == "raw":
-        gray = np.where(data == UNKNOWN, 255, data)
-    else:
-        gray = np.full(data.shape, 205)
-        gray[(data >= FREE) & (data <= round(SAVED_FREE_THRESH * 100))] = 254
-        gray[data >= round(SAVED_OCCUPIED_THRESH * 100)] = 0
-    image = path.with_suffix(".pgm")
-    write_pgm(image, gray.astype(np.uint8))
-    origin = ", ".join(map(repr, occupancy.origin))
-    path.write_text(
-        f"image: {image.name}\nmode: {mode}\nresolution: {occupancy.resolution!r}\norigin: [{origin}]\n"
-        f"negate: 0\noccupied_thresh: {SAVED_OCCUPIED_THRESH}\nfree_thresh: {_free_thresh(mode)}\n",
-        encoding="utf-8",
-    )
-
-
-def _free_thresh(mode: str) -> float:
-    # With 0.25 the saver's own 205 (19.6 % occupied) would load as free; 0.196 keeps unknown cells unknown.
-    return SAVED_FREE_THRESH if mode == "raw" else 0.196
-
-
-def read_metadata(path: Path) -> MapMetadata:
-    """Read and check a map_server YAML file.
-
-    Raises:
-        MapError: with every fault found, each with its line.
-    """
-    return _MetadataReader(path).read()
-
-
-class _MetadataReader:
-    """Reads one file, collecting problems on the way."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.values: dict[str, Any] = {}
-        self.lines: dict[str, int] = {}
-        self.problems: list[Problem] = []
-
-    def read(self) -> MapMetadata:
-        self._parse()
-        for key in REQUIRED:
-            if key not in self.values:
-                close = difflib.get_close_matches(key, self.values, n=1, cutoff=0.7)
-                hint = f"; did you mean it by '{close[0]}'?" if close else ""
-                self._report(f"the key '{key}' is missing{hint}", close[0] if close else None)
-        image = self._get("image", self._image)
-        resolution = self._get("resolution", lambda v: _number(v, above=0.0))
-        origin = self._get("origin", _origin)
-        negate = self._get("negate", _flag)
-        occupied = self._get("occupied_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
-        free = self._get("free_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
-        mode: Any = self._get("mode", _mode) if "mode" in self.values else "trinary"
-        if occupied is not None and free is not None and free >= occupied:
-            message = f"is {free}; valid is less than occupied_thresh ({occupied})"
-            self._report(message, "free_thresh", name=True)
-        if self.problems:
-            raise MapError(self.problems)
-        return MapMetadata(
-            image=image,
-            resolution=resolution,
-            origin=origin,
-            negate=negate,
-            occupied_thresh=occupied,
-            free_thresh=free,
-            mode=mode,
-        )
-
-    def _parse(self) -> None:
-        try:
-            text = self.path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-            raise MapError(f"map file {self.path} cannot be read ({reason}); valid is a YAML file") from error
-        try:
-            root = yaml.compose(text, Loader=yaml.SafeLoader)
-            values = yaml.safe_load(text)
-        except (yaml.YAMLError, ValueError) as error:
-            mark = getattr(error, "problem_mark", None)
-            reason = getattr(error, "problem", None) or str(error)
-            line = mark.line + 1 if mark else None
-            raise MapError(Problem(f"the file is not YAML: {reason}", self.path, line)) from error
-        if not isinstance(root, yaml.MappingNode):
-            raise MapError(
-                Problem(f"the file holds no keys; valid keys: {', '.join(REQUIRED)}", self.path, 1)
-            )
-        for key_node, _ in root.value:
-            key, line = str(key_node.value), key_node.start_mark.line + 1
-            if key in self.lines:
-                first = self.lines[key]
-                message = f"the key '{key}' is given twice (first in line {first}); valid is once"
-                self.problems.append(Problem(message, self.path, line))
-            self.lines.setdefault(key, line)
-        self.values = {str(key): value for key, value in values.items()}
-
-    def _get(self, key: str, convert: Callable[[Any], Any]) -> Any:
-        if key not in self.values:
-            return None
-        try:
-            return convert(self.values[key])
-        except ValueError as error:
-            self._report(str(error), key, name=True)
-            return None
-
-    def _image(self, value: Any) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError(f"is {value!r}; valid is the name of an image file")
-        image = self.path.parent / value
-        if not image.is_file():
-            raise ValueError(f"names {image}, which is not there; valid is an image file")
-        return image
-
-    def _report(self, message: str, key: str | None = None, *, name: bool = False) -> None:
-        text = f"{key} {message}" if name else message
-        self.problems.append(Problem(text, self.path, self.lines.get(key or "")))
-
-
-def _number(
-    value: Any, *, above: float = -math.inf, at_least: float = -math.inf, at_most: float = math.inf
-) -> float:
-    valid = f"a number above {above:g}" if above > -math.inf else "a number"
-    valid = f"a number from {at_least:g} to {at_most:g}" if at_most < math.inf else valid
-    try:
-        number = float(value)  # also YAML 1.1's strings such as 5e-2
-    except (TypeError, ValueError):
-        raise ValueError(f"is {value!r}; valid is {valid}") from None
-    in_range = math.isfinite(number) and number > above and at_least <= number <= at_most
-    if isinstance(value, bool) or not in_range:
-        raise ValueError(f"is {value!r}; valid is {valid}")
-    return number
-
-
-def _origin(value: Any) -> Pose2:
-    if not isinstance(value, list) or len(value) != 3:
-        raise ValueError(f"is {value!r}; valid is [x, y, yaw]")
-    return Pose2(*(_number(part) for part in value))
-
-
-def _flag(value: Any) -> bool:
-    if isinstance(value, bool | int):
-        return bool(value)
-    raise ValueError(f"is {value!r}; valid is 0 or 1")
-
-
-def _mode(value: Any) -> str:
-    if value not in MODES:
-        raise ValueError(f"is {value!r}; valid is one of {', '.join(MODES)}")
-    return str(value)
+    return data

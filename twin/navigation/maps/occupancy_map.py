@@ -56,16 +56,16 @@ class OccupancyMap:
 
         return load_map(Path(path))
 
-    def save(self, path: str | Path, mode: Literal["trinary", "raw"] = "trinary") -> None:
-        """Write `path` (.yaml) and a PGM image of the same stem, as nav2_map_server's map saver does.
+    def save(self, path: str | Path, mode: Literal["trinary", "scale", "raw"] = "trinary") -> None:
+        """Write `path` (.yaml) and an image of the same stem, as nav2_map_server's map saver does.
 
         Args:
             path: The YAML file.
-            mode: "trinary" keeps free, occupied and unknown; "raw" keeps every value.
+            mode: "trinary" keeps free, occupied and unknown; "raw" every value; "scale" those from 25 to 65.
         """
-        from twin.navigation.maps.map_io import save_map
+        from twin.navigation.maps.map_saver import SaveParameters, save_map
 
-        save_map(self, Path(path), mode)
+        save_map(self, Path(path), SaveParameters(mode=mode))
 
     @property
     def width(self) -> int:
@@ -84,6 +84,16 @@ class OccupancyMap:
         corners = self.origin.apply([[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]])
         low, high = corners.min(axis=0), corners.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    def counts(self) -> dict[str, int]:
+        """Return how many cells are free (0), occupied (100), unknown (-1) and between (1..99)."""
+        found = np.bincount(self.data.view(np.uint8).ravel(), minlength=256)
+        return {
+            "free": int(found[FREE]),
+            "occupied": int(found[OCCUPIED]),
+            "unknown": int(found[255]),
+            "between": int(found[1:OCCUPIED].sum()),
+        }
 
     def world_to_cell(self, points: ArrayLike) -> NDArray[np.int64]:
         """Return cells (column, row) of points [m] in the map frame; both of shape (..., 2).

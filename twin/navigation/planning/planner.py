@@ -1,9 +1,10 @@
-"""Global planning: the cheapest 8-connected path over a costmap."""
+"""Global planning on a grid: the cheapest path, 8-connected (A*) or of straight lines (Theta*)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,22 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
-from twin.navigation.planning.astar_kernel import search
+from twin.navigation.planning.grid_search import GridSearch
+
+
+class GlobalPlanner(Protocol):
+    """What plans a path over a costmap."""
+
+    def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
+        """Return a path, shape (n, 3): x, y [m], yaw [rad]; raise a PlanningFailure if there is none."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerConfig:
-    """Parameters of the planner; names are those of Nav2's NavFn and Smac 2-D planners."""
+    """Parameters of the 8-connected planner; names are those of Nav2's NavFn and Smac 2-D planners."""
+
+    any_angle: ClassVar[bool] = False
 
     tolerance: float = 0.5
     """If the goal cannot be reached, how far from it the path may end [m]."""
@@ -39,18 +50,46 @@ class PlannerConfig:
     escape_factor: float = 20.0
     """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
 
+    def price(self, level: Array) -> Array:
+        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
+        return 1.0 + self.cost_factor * level
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThetaStarConfig:
+    """Parameters of the any-angle planner; names are those of nav2_theta_star_planner."""
+
+    any_angle: ClassVar[bool] = True
+
+    tolerance: float = 0.5
+    """If the goal cannot be reached, how far from it the path may end [m]."""
+    allow_unknown: bool = True
+    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
+    w_euc_cost: float = 1.0
+    """Weight of a path's length."""
+    w_traversal_cost: float = 2.0
+    """Weight of the squared costs under it."""
+    escape_factor: float = 20.0
+    """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
+
+    def price(self, level: Array) -> Array:
+        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
+        return 1.0 + self.w_traversal_cost / max(self.w_euc_cost, 1e-6) * level**2
+
 
 @dataclass(kw_only=True)
 class Planner:
-    """A* (Hart, Nilsson, Raphael 1968) with the octile heuristic; it never cuts a blocked corner."""
+    """A* (Hart, Nilsson, Raphael 1968) or Theta* (Nash et al. 2007) by its config; never cuts a corner."""
 
-    config: PlannerConfig
+    config: PlannerConfig | ThetaStarConfig
+    _search: GridSearch = field(default_factory=GridSearch, init=False, repr=False, compare=False)
 
     def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
         """Return the cheapest path, shape (n, 3): x, y [m], yaw [rad] along the path.
 
         The first row is the start's position, the last the goal itself with its yaw, or the nearest reachable
-        cell within the tolerance. Rows between are cell centres.
+        cell within the tolerance. Rows between are cell centres, or with Theta* points of straight lines
+        between such, at most a cell apart.
 
         Raises:
             StartOutsideMap: the start is off the costmap.
@@ -59,56 +98,45 @@ class Planner:
             GoalOccupied: no cell within the tolerance of the goal is free.
             NoValidPath: none of them is connected to the start.
         """
-        for pose, outside in ((start, StartOutsideMap), (goal, GoalOutsideMap)):
-            if not (np.all(np.isfinite(pose)) and costmap.contains(pose.x, pose.y)):
-                raise outside(f"({pose.x:.2f}, {pose.y:.2f}) is outside the costmap")
-        factor, penned = self._factors(costmap, start)
-        width = factor.shape[1]
+        check_inside(costmap, start, goal)
+        prices = self._prices()
         first = _flat(costmap, start)
-        if factor.flat[first] == math.inf:
+        if prices[1, costmap.costs.flat[first]] == math.inf:
             raise StartOccupied(f"the start ({start.x:.2f}, {start.y:.2f}) is inside an obstacle")
-        candidates = self._candidates(costmap, factor, penned, first, goal)
+        candidates = self._candidates(costmap, prices[0], first, goal)
         if not candidates.size:
             near = f"within {self.config.tolerance:g} m of " if self.config.tolerance else ""
             raise GoalOccupied(f"nothing is free {near}the goal ({goal.x:.2f}, {goal.y:.2f})")
-        size = factor.size
-        g, closed = np.full(size, np.inf), np.zeros(size, dtype=np.bool_)
-        parent = np.empty(size, dtype=np.int32)
         last = int(candidates[0])
-        if not search(factor, first, last, penned, g, parent, closed):
-            reached = candidates[closed[candidates]]
+        search = self._search
+        if not search.run(costmap.costs, prices, first, last, any_angle=self.config.any_angle):
+            reached = candidates[search.reached(candidates)]
             if not reached.size:
                 route = f"({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
                 raise NoValidPath(f"no path from {route}")
             last = int(reached[0])
-        cells = [last]
-        while cells[-1] != first:
-            cells.append(int(parent[cells[-1]]))
-        flat = np.array(cells[::-1])
+        flat = search.path(last)
+        width = costmap.costs.shape[1]
         points = costmap.cell_to_world(np.column_stack([flat % width, flat // width]))
-        return _finish(points, start, goal, exact=last == _flat(costmap, goal))
+        path = _ends(points, start, goal, exact=last == _flat(costmap, goal))
+        if self.config.any_angle:
+            path = filled(path, costmap.resolution)
+        return with_headings(path, goal.yaw if last == _flat(costmap, goal) else None)
 
-    def _factors(self, costmap: Costmap, start: Pose2) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the price of each cell, and the cells that may be left but not entered."""
+    def _prices(self) -> Array:
+        """Return the price of a metre by cost, shape (2, 256), as `grid_kernel.search` takes it."""
         config = self.config
-        price = 1.0 + config.cost_factor * np.arange(256) / MAX_NON_OBSTACLE
-        unknown = 1.0 + config.cost_factor if config.allow_unknown else math.inf
-        price[INSCRIBED_INFLATED_OBSTACLE:] = (math.inf, math.inf, unknown)
-        column, row = costmap.world_to_cell(start.x, start.y)
-        starts_inscribed = costmap.costs[row, column] == INSCRIBED_INFLATED_OBSTACLE
-        if starts_inscribed:
-            price[INSCRIBED_INFLATED_OBSTACLE] = max(config.escape_factor, 1.0)
-        price[LETHAL_OBSTACLE] = math.inf
-        penned = np.zeros(256, dtype=np.bool_)
-        penned[INSCRIBED_INFLATED_OBSTACLE] = starts_inscribed
-        price[NO_INFORMATION] = unknown
-        return price[costmap.costs], penned[costmap.costs]
+        price = np.empty((2, 256))
+        price[:] = config.price(np.arange(256) / MAX_NON_OBSTACLE)
+        price[0, INSCRIBED_INFLATED_OBSTACLE] = math.inf
+        price[1, INSCRIBED_INFLATED_OBSTACLE] = max(config.escape_factor, 1.0)
+        price[:, LETHAL_OBSTACLE] = math.inf
+        price[:, NO_INFORMATION] = price[0, MAX_NON_OBSTACLE] if config.allow_unknown else math.inf
+        return price
 
-    def _candidates(
-        self, costmap: Costmap, factor: Array, penned: NDArray[np.bool_], first: int, goal: Pose2
-    ) -> NDArray[np.int64]:
+    def _candidates(self, costmap: Costmap, price: Array, first: int, goal: Pose2) -> NDArray[np.int64]:
         """Return the flat indices of the cells a path may end in, the nearest to the goal first."""
-        height, width = factor.shape
+        height, width = costmap.costs.shape
         column, row = costmap.world_to_cell(goal.x, goal.y)
         r = math.floor(self.config.tolerance / costmap.resolution)
         rows = np.arange(max(0, row - r), min(height, row + r + 1))
@@ -118,9 +146,26 @@ class Planner:
         distance = np.hypot(centres[:, 0] - goal.x, centres[:, 1] - goal.y)
         distance[(v == row) & (u == column)] = 0.0
         flat = v * width + u
-        free = np.isfinite(factor[v, u]) & (~penned[v, u] | (flat == first))
+        free = np.isfinite(price[costmap.costs[v, u]]) | (flat == first)
         usable = free & (distance <= self.config.tolerance)
         return flat[usable][np.argsort(distance[usable], kind="stable")]
+
+
+def check_inside(costmap: Costmap, start: Pose2, goal: Pose2) -> None:
+    """Raise StartOutsideMap or GoalOutsideMap for a pose that is off the costmap, or not finite."""
+    for pose, outside in ((start, StartOutsideMap), (goal, GoalOutsideMap)):
+        if not (np.all(np.isfinite(pose)) and costmap.contains(pose.x, pose.y)):
+            raise outside(f"({pose.x:.2f}, {pose.y:.2f}) is outside the costmap")
+
+
+def filled(corners: Array, spacing: float) -> Array:
+    """Return corners, shape (n, 2) [m], with points between that are at most `spacing` [m] apart."""
+    pieces = np.maximum(1, np.ceil(np.hypot(*np.diff(corners, axis=0).T) / spacing - 1e-9)).astype(int)
+    lines = [
+        a + np.arange(n)[:, None] / n * (b - a)
+        for a, b, n in zip(corners[:-1], corners[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*lines, corners[-1:]])
 
 
 def with_headings(points: Array, final_yaw: float | None = None) -> Array:
@@ -150,11 +195,11 @@ def _flat(costmap: Costmap, pose: Pose2) -> int:
     return row * costmap.costs.shape[1] + column
 
 
-def _finish(points: Array, start: Pose2, goal: Pose2, *, exact: bool) -> Array:
+def _ends(points: Array, start: Pose2, goal: Pose2, *, exact: bool) -> Array:
     """Put the exact start and goal in place of the centres of their cells."""
     if len(points) == 1:
         points = np.repeat(points, 2, axis=0)
     points[0] = start.x, start.y
     if exact:
         points[-1] = goal.x, goal.y
-    return with_headings(points, goal.yaw if exact else None)
+    return points

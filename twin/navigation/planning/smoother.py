@@ -61,6 +61,56 @@ class SimpleSmoother:
         return with_headings(points, float(path[-1, 2]))
 
 
+@dataclass(frozen=True, kw_only=True)
+class SavitzkyGolayConfig:
+    """Parameters of the filter; names and defaults are those of nav2_smoother's SavitzkyGolaySmoother."""
+
+    refinement_num: int = 2
+    """How often the result is filtered again."""
+    do_refinement: bool = True
+    """Whether it is."""
+
+
+_WINDOW = np.array([-2.0, 3.0, 6.0, 7.0, 6.0, 3.0, -2.0]) / 21.0
+"""Value in the middle of the parabola through seven points (Savitzky and Golay 1964)."""
+
+
+@dataclass(kw_only=True)
+class SavitzkyGolaySmoother:
+    """Takes the noise out of a path and keeps its shape; points that would run into an obstacle stay."""
+
+    config: SavitzkyGolayConfig = field(default_factory=SavitzkyGolayConfig)
+
+    def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
+        """Return the path, shape (n, 3), with the same first and last row and smoother in between.
+
+        Args:
+            path: Shape (n, 3).
+            costmap: Where points may go; None lets them go anywhere.
+        """
+        half = len(_WINDOW) // 2
+        points = np.array(path[:, :2], dtype=np.float64)
+        if len(points) <= 2 * half:
+            return path.copy()
+        for _ in range(1 + self.config.refinement_num * self.config.do_refinement):
+            # Beyond the ends the path goes on mirrored at them, so that the ends stay.
+            padded = np.concatenate(
+                [
+                    2.0 * points[0] - points[half:0:-1],
+                    points,
+                    2.0 * points[-1] - points[-2 : -half - 2 : -1],
+                ]
+            )
+            moved = np.column_stack([np.convolve(column, _WINDOW, mode="valid") for column in padded.T])
+            moved[0], moved[-1] = points[0], points[-1]
+            if costmap is not None:
+                for i in range(len(points)):
+                    if costmap.cost_at(*moved[i]) >= max(253, costmap.cost_at(*points[i]) + 1):
+                        moved[i] = points[i]
+            points = moved
+        return with_headings(points, float(path[-1, 2]))
+
+
 @jit
 def _relax(
     points: Array,

@@ -1,33 +1,46 @@
-"""`/behavior_server`: the actions `spin`, `backup`, `drive_on_heading` and `wait`, as in Nav2."""
+"""`/behavior_server`: `spin`, `backup`, `drive_on_heading`, `wait` and `assisted_teleop`, as in Nav2."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from typing import Any
+from typing import Any, NamedTuple
 
-from twin.bridge.action_types import BackUp, DriveOnHeading, Spin, Wait
+from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import Twist, duration, new, ns
+from twin.bridge.msgs import Empty, Twist, duration, new, ns
 from twin.bridge.types import ActionType
 from twin.navigation import recovery
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
-_ERROR_CODES = {
-    "spin": {recovery.TIMEOUT: 701, recovery.COLLISION_AHEAD: 703},
-    "backup": {recovery.TIMEOUT: 711, recovery.COLLISION_AHEAD: 714},
-    "drive_on_heading": {recovery.TIMEOUT: 721, recovery.COLLISION_AHEAD: 724},
-    "wait": {recovery.TIMEOUT: 741},
-}
+Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.AssistedTeleop
 
-Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait
+_POSE_TIMEOUT_NS = 1_000_000_000
+"""How long odometry is waited for."""
+_TF_ERROR, _INVALID_INPUT = "tf_error", "invalid_input"
+
+
+class _Served(NamedTuple):
+    """What distinguishes the actions."""
+
+    action: ActionType
+    make: Callable[[Any], Behavior]
+    codes: dict[str, int]
+    """Reason -> error code of nav2_msgs."""
+    feedback: str
+    """Field that tells the progress."""
+    is_valid: Callable[[Any], bool] = lambda goal: True
 
 
 class BehaviorServerNode:
-    """Runs behaviours on odometry, with the local costmap, if there is one, to see collisions."""
+    """Runs behaviours on odometry, with the local costmap, if there is one, to see collisions.
+
+    Takes what is steered in assisted teleop from `cmd_vel_assisted_teleop`: `cmd_vel_teleop`, Nav2's name,
+    goes past navigation straight to the multiplexer here.
+    """
 
     def __init__(
         self,
@@ -37,6 +50,7 @@ class BehaviorServerNode:
         *,
         costmap: CostmapNode | None = None,
         cmd_vel: str = "cmd_vel_nav",
+        cmd_vel_teleop: str = "cmd_vel_assisted_teleop",
         period_ns: int = 20_000_000,
         namespace: str = "",
     ) -> None:
@@ -46,10 +60,34 @@ class BehaviorServerNode:
         self._costmap = costmap
         self._period_ns = period_ns
         self._publisher = self.node.create_publisher(Twist, cmd_vel, 1)
-        self._serve("spin", Spin, self._spin)
-        self._serve("backup", BackUp, self._backup)
-        self._serve("drive_on_heading", DriveOnHeading, self._drive_on_heading)
-        self._serve("wait", Wait, self._wait)
+        self._teleop: recovery.AssistedTeleop | None = None
+        self.node.create_subscription(Twist, cmd_vel_teleop, self._on_teleop, 10)
+        self.node.create_subscription(Empty, "preempt_teleop", self._on_preempt_teleop, 10)
+        for name, served in self._behaviors().items():
+            ActionServer(self.node, served.action, name, self._execution(name, served), _is_finite)
+
+    def _behaviors(self) -> dict[str, _Served]:
+        timeout, tf, collision = recovery.TIMEOUT, _TF_ERROR, recovery.COLLISION_AHEAD
+        spin = {timeout: 701, tf: 702, collision: 703}
+        backup = {timeout: 711, tf: 712, _INVALID_INPUT: 713, collision: 714}
+        drive = {timeout: 721, tf: 722, collision: 723, _INVALID_INPUT: 724}
+        teleop, wait = {timeout: 731, tf: 732}, {timeout: 741, tf: 740}
+        distance, turned = "distance_traveled", "angular_distance_traveled"
+        return {
+            "spin": _Served(Spin, self._spin, spin, turned),
+            "backup": _Served(BackUp, self._backup, backup, distance, _is_straight),
+            "drive_on_heading": _Served(
+                DriveOnHeading,
+                self._drive,
+                drive,
+                distance,
+                lambda goal: _is_straight(goal) and _agrees(goal),
+            ),
+            "wait": _Served(Wait, self._wait, wait, "time_left"),
+            "assisted_teleop": _Served(
+                AssistedTeleop, self._assisted_teleop, teleop, "current_teleop_duration"
+            ),
+        }
 
     def _spin(self, goal: Any) -> Behavior:
         return recovery.Spin(
@@ -64,7 +102,7 @@ class BehaviorServerNode:
             time_allowance=ns(goal.time_allowance) * 1e-9,
         )
 
-    def _drive_on_heading(self, goal: Any) -> Behavior:
+    def _drive(self, goal: Any) -> Behavior:
         return recovery.DriveOnHeading(
             config=self.config,
             target_distance=goal.target.x,
@@ -75,40 +113,78 @@ class BehaviorServerNode:
     def _wait(self, goal: Any) -> Behavior:
         return recovery.Wait(config=self.config, duration=ns(goal.time) * 1e-9, time_allowance=0.0)
 
-    def _serve(self, name: str, action: ActionType, make: Callable[[Any], Behavior]) -> None:
+    def _assisted_teleop(self, goal: Any) -> Behavior:
+        self._teleop = recovery.AssistedTeleop(
+            config=self.config, time_allowance=ns(goal.time_allowance) * 1e-9
+        )
+        return self._teleop
+
+    def _on_teleop(self, message: Twist) -> None:
+        values = (message.linear.x, message.angular.z)
+        if self._teleop is not None and all(map(math.isfinite, values)):
+            self._teleop.steered = values
+
+    def _on_preempt_teleop(self, message: Empty) -> None:
+        del message
+        if self._teleop is not None:
+            self._teleop.is_over = True
+
+    def _execution(self, name: str, served: _Served) -> Callable[[GoalHandle], Generator[None, None, Any]]:
+        def failed(handle: GoalHandle, reason: str) -> Any:
+            handle.abort()
+            text = f"{name}: {reason.replace('_', ' ')}"
+            return new(served.action.Result, error_code=served.codes[reason], error_msg=text)
+
         def execute(handle: GoalHandle) -> Generator[None, None, Any]:
-            behavior = make(handle.request)
+            if not served.is_valid(handle.request):
+                return failed(handle, _INVALID_INPUT)
+            behavior = served.make(handle.request)
             started = due = self.node.now_ns
             try:
                 while True:
                     if handle.is_cancel_requested:
                         handle.canceled()
-                        return new(action.Result, error_msg="canceled")
+                        return new(served.action.Result, error_msg="canceled")
                     if self.node.now_ns < due:
                         yield
                         continue
-                    due += self._period_ns
                     pose = self._robot_pose.in_odom()
+                    if pose is None and self.node.now_ns - due > _POSE_TIMEOUT_NS:
+                        return failed(handle, _TF_ERROR)
                     if pose is None:
                         yield
                         continue
+                    due = max(due, self.node.now_ns - self._period_ns) + self._period_ns
                     costmap = self._costmap.costmap if self._costmap else None
                     step = behavior.update(pose, self._period_ns * 1e-9, costmap)
                     if step.done:
-                        return new(action.Result, total_elapsed_time=duration(self.node.now_ns - started))
+                        elapsed = duration(self.node.now_ns - started)
+                        return new(served.action.Result, total_elapsed_time=elapsed)
                     if step.failed_reason is not None:
-                        handle.abort()
-                        return new(
-                            action.Result,
-                            error_code=_ERROR_CODES[name][step.failed_reason],
-                            error_msg=f"{name}: {step.failed_reason.replace('_', ' ')}",
-                        )
+                        return failed(handle, step.failed_reason)
                     self._publisher.publish(twist_from_planar(step.v, step.w))
+                    handle.publish_feedback(_feedback(served, behavior.progress))
                     yield
             finally:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
 
-        ActionServer(self.node, action, name, execute, _is_finite)
+        return execute
+
+
+def _feedback(served: _Served, progress: float) -> Any:
+    is_time = served.feedback in ("time_left", "current_teleop_duration")
+    value = duration(round(progress * 1e9)) if is_time else progress
+    return new(served.action.Feedback, **{served.feedback: value})
+
+
+def _is_straight(goal: Any) -> bool:
+    """Whether a goal only wants to go along the robot's x."""
+    return bool(goal.target.y == 0.0 and goal.target.z == 0.0)
+
+
+def _agrees(goal: Any) -> bool:
+    """Whether distance and speed have the same sign; a speed that is positive is a magnitude too."""
+    return bool(goal.speed > 0.0 or goal.target.x <= 0.0)
 
 
 def _is_finite(goal: Any) -> bool:

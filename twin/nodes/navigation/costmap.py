@@ -2,71 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import LaserScan, OccupancyGrid, new
+from twin.bridge.msgs import Costmap as CostmapMessage
+from twin.bridge.msgs import LaserScan, OccupancyGrid, PolygonStamped, Range
 from twin.bridge.qos import LATCHED, SENSOR_DATA
-from twin.bridge.srvs import ClearEntireCostmap
 from twin.errors import MapError
-from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.costmap import (
-    INSCRIBED_INFLATED_OBSTACLE,
-    LETHAL_OBSTACLE,
-    NO_INFORMATION,
-    Costmap,
-)
+from twin.geometry import Array
+from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
-from twin.nodes.navigation.map_server import grid_msg, occupancy_map
+from twin.nodes.navigation.costmap_filters import KeepoutFilterPart, SpeedFilterPart
+from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, polygon_msg
+from twin.nodes.navigation.costmap_services import CostmapServices
+from twin.nodes.navigation.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 
 
-def scan_points(message: LaserScan, no_return: float) -> Array:
+def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
     """Return the ends of a scan's rays in its frame, shape (n, 2).
 
-    Rays without return (inf) end at `no_return` [m], so that they clear; invalid ones are NaN.
+    Args:
+        message: The scan.
+        no_return: Where rays without return (inf, or beyond the sensor's range) end, so that they clear [m].
+        inf_is_valid: Whether they do; if not they are NaN, as those below the least range are.
     """
     ranges = message.ranges.astype(np.float64)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
-    silent = np.isposinf(ranges) | (ranges > message.range_max)
-    ranges = np.where(silent, no_return, ranges)
+    silent = ranges > message.range_max
+    ranges[silent] = no_return if inf_is_valid else np.nan
     ranges[ranges < message.range_min] = np.nan
     return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
 
 
-def _occupancy_of_costs() -> NDArray[np.int8]:
-    """Return nav2_costmap_2d's table from costs to the values of an OccupancyGrid."""
-    table = 1 + (97 * (np.arange(256) - 1)) // 251
-    table[0] = 0
-    table[INSCRIBED_INFLATED_OBSTACLE] = 99
-    table[LETHAL_OBSTACLE] = 100
-    table[NO_INFORMATION] = -1
-    return table.astype(np.int8)
-
-
-_OCCUPANCY = _occupancy_of_costs()
-
-
 @dataclass(frozen=True, kw_only=True)
 class CostmapNodeConfig:
-    """Rates and frame of a costmap."""
+    """Rates, frame and inputs of a costmap."""
 
     name: str
     """global_costmap or local_costmap."""
     frame: str
     layers: CostmapConfig
     scan_topic: str = "scan"
+    range_topics: tuple[str, ...] = ()
+    """Topics of sensor_msgs/Range: the range sensor layer."""
+    keepout_filter_info_topic: str = ""
+    """Where the keep-out mask is announced; empty: no keep-out filter."""
+    speed_filter_info_topic: str = ""
+    """Where the mask of speed limits is announced; empty: no speed filter."""
+    speed_limit_topic: str = "speed_limit"
     update_period_ns: int = 200_000_000
     publish_period_ns: int = 1_000_000_000
 
 
 class CostmapNode:
-    """`/<name>/<name>`: takes `map` (unless rolling) and scans; publishes `<name>/costmap`."""
+    """`/<name>/<name>`: takes `map` (unless rolling), scans and ranges; publishes `<name>/costmap`."""
 
     def __init__(
         self, bus: Bus, robot_pose: RobotPose, config: CostmapNodeConfig, *, namespace: str = ""
@@ -76,14 +68,28 @@ class CostmapNode:
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scan: LaserScan | None = None
-        self._listeners: list[Callable[[], None]] = []
-        self._publisher = node.create_publisher(OccupancyGrid, f"{namespace}/{config.name}/costmap", LATCHED)
+        self._ranges: list[Range] = []
+        self._polygon = config.layers.polygon
+        own = f"{namespace}/{config.name}"
+        self._publisher = node.create_publisher(OccupancyGrid, f"{own}/costmap", LATCHED)
+        self._raw_publisher = node.create_publisher(CostmapMessage, f"{own}/costmap_raw", LATCHED)
+        self._footprint_publisher = node.create_publisher(PolygonStamped, f"{own}/published_footprint", 1)
         if not config.layers.rolling_window:
             node.create_subscription(OccupancyGrid, f"{namespace}/map", self._on_map, LATCHED)
         node.create_subscription(LaserScan, f"{namespace}/{config.scan_topic}", self._on_scan, SENSOR_DATA)
-        node.create_service(
-            ClearEntireCostmap, f"{namespace}/{config.name}/clear_entirely_{config.name}", self._on_clear
-        )
+        for topic in config.range_topics:
+            node.create_subscription(Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA)
+        CostmapServices(node, config.name, config.frame, robot_pose, lambda: self._layers)
+        self._keepout: KeepoutFilterPart | None = None
+        if config.keepout_filter_info_topic:
+            info = f"{namespace}/{config.keepout_filter_info_topic}"
+            self._keepout = KeepoutFilterPart(
+                node, robot_pose, config.frame, info, config.layers.keepout_filter
+            )
+        self._speed: SpeedFilterPart | None = None
+        if config.speed_filter_info_topic:
+            info = f"{namespace}/{config.speed_filter_info_topic}"
+            self._speed = SpeedFilterPart(node, robot_pose, info, f"{namespace}/{config.speed_limit_topic}")
         node.create_timer(config.update_period_ns, self._update)
         node.create_timer(config.publish_period_ns, self._publish)
 
@@ -101,33 +107,49 @@ class CostmapNode:
     def _on_scan(self, message: LaserScan) -> None:
         self._scan = message
 
-    def _on_clear(self, _request: Any) -> Any:
-        if self._layers is not None:
-            self._layers.clear()
-        return new(ClearEntireCostmap.Response)
-
     def _update(self) -> None:
-        if self._layers is None:
+        layers = self._layers
+        if layers is None:
             return
+        robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
         if self.config.layers.rolling_window:
-            pose = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
-            if pose is None:
+            if robot is None:
                 return
-            self._layers.move_to(pose.x, pose.y)
-        if self._scan is None:
-            return
+            layers.move_to(robot.x, robot.y)
+        self._take_scan(layers)
+        for message in self._ranges:
+            self._take_range(layers, message)
+        self._ranges.clear()
+        if self._keepout is not None:
+            self._keepout.update(layers, robot)
+        if self._speed is not None:
+            self._speed.update()
+        if robot is not None:
+            placed = robot.apply(self._polygon)
+            self._footprint_publisher.publish(polygon_msg(placed, self.config.frame, self.node.now_ns))
+
+    def _take_scan(self, layers: LayeredCostmap) -> None:
         scan, self._scan = self._scan, None
+        if scan is None:
+            return
         T_frame_lidar = self._robot_pose.at_stamp(self.config.frame, scan.header)
         if T_frame_lidar is None:
             return
-        beyond = self.config.layers.raytrace_max_range + 1.0
-        points = T_frame_lidar.apply(scan_points(scan, beyond))
-        self._layers.update(points, (T_frame_lidar.x, T_frame_lidar.y))
+        config = self.config.layers
+        beyond = max(config.raytrace_max_range, config.obstacle_max_range) + 1.0
+        points = T_frame_lidar.apply(scan_points(scan, beyond, inf_is_valid=config.inf_is_valid))
+        robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
+        layers.update(points, (T_frame_lidar.x, T_frame_lidar.y), robot)
+
+    def _take_range(self, layers: LayeredCostmap, message: Range) -> None:
+        sensor = self._robot_pose.at_stamp(self.config.frame, message.header)
+        if sensor is not None:
+            limits = float(message.min_range), float(message.max_range)
+            layers.update_range(sensor, float(message.range), limits, float(message.field_of_view))
 
     def _publish(self) -> None:
         grid = self.costmap
-        if grid is None:
-            return
-        data = _OCCUPANCY[grid.costs]
-        origin = Pose2(*grid.origin, 0.0)
-        self._publisher.publish(grid_msg(data, grid.resolution, origin, self.config.frame, self.node.now_ns))
+        if grid is not None:
+            frame, now = self.config.frame, self.node.now_ns
+            self._publisher.publish(occupancy_grid(grid, frame, now))
+            self._raw_publisher.publish(costmap_msg(grid, frame, now))

@@ -1,4 +1,4 @@
-"""`/planner_server`: the `compute_path_to_pose` action and `is_path_valid`, over the global costmap."""
+"""`/planner_server`: `compute_path_to_pose`, `compute_path_through_poses` and `is_path_valid`."""
 
 from __future__ import annotations
 
@@ -8,35 +8,57 @@ from typing import Any
 
 import numpy as np
 
-from twin.bridge.action_types import ComputePathToPose
+from twin.bridge.action_types import ComputePathThroughPoses, ComputePathToPose
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.srvs import IsPathValid
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
-from twin.navigation.failures import PlanningFailure
+from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
+from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.commitment import CommitmentConfig, committed
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.hybrid import HybridConfig
+from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
+DEFAULT_ID = "GridBased"
+"""Nav2's name for the planner that is used unless a request names another one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerServerConfig:
+    """Parameters of the server itself."""
+
+    compute_alternatives: int = 0
+    """How many other ways are tried when a goal is asked for again from where it was asked last: the path
+    could not be followed. For trees that plan anew only when they must."""
+    same_place: float = 0.5
+    """How far the robot may have moved meanwhile [m]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerParameters:
-    """Parameters of the server's plugins."""
+    """Parameters of the server and its plugins."""
 
-    planner: PlannerConfig
+    planner_plugins: tuple[str, ...]
+    server: PlannerServerConfig
+    planner: PlannerPluginConfig
     commitment: CommitmentConfig
     smoother: SmootherConfig
 
 
 class PlannerServerNode:
-    """Plans on request; publishes `plan`."""
+    """Plans on request; publishes `plan`.
+
+    A request's `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with
+    its defaults.
+    """
 
     def __init__(
         self,
@@ -44,7 +66,8 @@ class PlannerServerNode:
         robot_pose: RobotPose,
         costmap: CostmapNode,
         *,
-        config: PlannerConfig | None = None,
+        config: PlannerPluginConfig | None = None,
+        server: PlannerServerConfig | None = None,
         smoother: SmootherConfig | None = None,
         commitment: CommitmentConfig | None = None,
         namespace: str = "",
@@ -52,50 +75,132 @@ class PlannerServerNode:
         self.node = bus.create_node("planner_server", namespace)
         self._robot_pose = robot_pose
         self._costmap = costmap
-        self._planner = Planner(config=config or PlannerConfig())
-        self._smoother = SimpleSmoother(config=smoother or SmootherConfig())
-        self._commitment = commitment or CommitmentConfig()
+        self._configs: dict[str, PlannerPluginConfig] = {DEFAULT_ID: config or PLUGINS[DEFAULT]()}
+        self._configs |= {name: plugin() for name, plugin in PLUGINS.items()}
+        self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
+        self._tried: list[Array] = []
         self._last: tuple[Pose2, Array] | None = None
-        """The goal of the last plan, and that plan."""
+        """The goal of the last leg, and its path."""
+        self._asked: tuple[Pose2, Pose2] | None = None
         parameters = PlannerParameters(
-            planner=self._planner.config, commitment=self._commitment, smoother=self._smoother.config
+            planner_plugins=tuple(self._configs),
+            server=server or PlannerServerConfig(),
+            planner=self._configs[DEFAULT_ID],
+            commitment=commitment or CommitmentConfig(),
+            smoother=smoother or SmootherConfig(),
         )
-        names = {"planner": "GridBased", "commitment": "GridBased"}
-        declare_config(self.node, parameters, self._reconfigure, names)
+        self._apply(parameters)
+        declare_config(
+            self.node,
+            parameters,
+            self._apply,
+            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "server": ""},
+        )
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
-        ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._execute)
+        ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)
+        ActionServer(self.node, ComputePathThroughPoses, "compute_path_through_poses", self._through_poses)
 
-    def _reconfigure(self, parameters: PlannerParameters) -> None:
-        """Plan the next path with other parameters."""
-        self._planner.config = parameters.planner
+    def _made(self, config: PlannerPluginConfig) -> Any:
+        layers = self._costmap.config.layers
+        return make_planner(config, layers.polygon, layers.inflation_radius)
+
+    def _apply(self, parameters: PlannerParameters) -> None:
+        """Plan the next path with these parameters."""
+        self._server = parameters.server
         self._commitment = parameters.commitment
         self._smoother = SimpleSmoother(config=parameters.smoother)
+        if parameters.planner != self._configs[DEFAULT_ID]:
+            self._configs[DEFAULT_ID] = parameters.planner
+            self._planners[DEFAULT_ID] = self._made(parameters.planner)
 
-    def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
+    def _to_pose(self, handle: GoalHandle) -> Generator[None, None, Any]:
+        return (yield from self._compute(handle, ComputePathToPose.Result, [handle.request.goal], 0))
+
+    def _through_poses(self, handle: GoalHandle) -> Generator[None, None, Any]:
+        # The codes of this action are those of the other one, a hundred higher.
+        return (
+            yield from self._compute(handle, ComputePathThroughPoses.Result, list(handle.request.goals), 100)
+        )
+
+    def _compute(
+        self, handle: GoalHandle, result: Any, goals: list[Any], code_offset: int
+    ) -> Generator[None, None, Any]:
+        """Plan leg by leg; between legs other nodes run, and a request to cancel is heeded."""
         request = handle.request
-        start = pose2_from_pose(request.start.pose) if request.use_start else self._robot_pose.in_map()
-        costmap = self._costmap.costmap
-        if start is None or costmap is None:
-            handle.abort()
-            what = "map" if costmap is None else "localisation"
-            return new(ComputePathToPose.Result, error_code=202, error_msg=f"no plan without {what}")
-        yield
-        goal = pose2_from_pose(request.goal.pose)
-        if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
-            costmap = committed(costmap, self._last[1], self._commitment)
         try:
-            raw = self._planner.plan(costmap, start, goal)
+            if not goals:
+                raise NoViapoints("no goals are given; valid is one at least")
+            here = self._start(request)
+            name = request.planner_id or DEFAULT_ID
+            if name not in self._planners:
+                valid = ", ".join(self._planners)
+                raise InvalidPlanner(f"{name!r} is no planner; valid: {valid}")
+            legs = []
+            for goal in goals:
+                yield
+                if handle.is_cancel_requested:
+                    handle.canceled()
+                    return new(result)
+                there = self._in_map(goal)
+                legs.append(self._leg(name, here, there))
+                here = Pose2(*map(float, legs[-1][-1]))
         except PlanningFailure as failure:
             handle.abort()
-            return new(ComputePathToPose.Result, error_code=failure.error_code, error_msg=str(failure))
-        smooth = self._smoother.smooth(raw, costmap)
-        # A smooth path needs no point per cell; the message costs by the point.
-        thinned = np.concatenate([smooth[:-1:2], smooth[-1:]])
-        self._last = (goal, thinned)
-        path = path_msg(thinned, self._robot_pose.frames.map, self.node.now_ns)
+            return new(result, error_code=failure.error_code + code_offset, error_msg=str(failure))
+        whole = np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])
+        path = path_msg(whole, self._robot_pose.frames.map, self.node.now_ns)
         self._publisher.publish(path)
-        return new(ComputePathToPose.Result, path=path, planning_time=duration(0))
+        return new(result, path=path, planning_time=duration(0))
+
+    def _leg(self, name: str, start: Pose2, goal: Pose2) -> Array:
+        costmap, planner = self._known_costmap(), self._planners[name]
+        if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
+            costmap = committed(costmap, self._last[1], self._commitment)
+        tried = self._tried_before(start, goal)
+        path = other_way(planner, costmap, start, goal, tried, AlternativesConfig())
+        self._tried.append(path)
+        self._last = (goal, path)
+        if isinstance(self._configs[name], HybridConfig):
+            return path
+        smooth = self._smoother.smooth(path, costmap)
+        # A smooth path needs no point per cell; the message costs by the point.
+        return np.concatenate([smooth[:-1:2], smooth[-1:]])
+
+    def _tried_before(self, start: Pose2, goal: Pose2) -> list[Array]:
+        """Return the paths that this goal got from this place; begin anew if it is another goal or place."""
+        asked, self._asked = self._asked, (start, goal)
+        again = asked is not None and asked[1] == goal and asked[0].distance(start) < self._server.same_place
+        if not again or len(self._tried) > self._server.compute_alternatives:
+            self._tried = []
+        return self._tried
+
+    def _known_costmap(self) -> Costmap:
+        if self._costmap.costmap is None:
+            raise NoPose("no plan without map")
+        return self._costmap.costmap
+
+    def _start(self, request: Any) -> Pose2:
+        if request.use_start:
+            return self._in_map(request.start)
+        pose = self._robot_pose.in_map()
+        if pose is None:
+            raise NoPose("no plan without localisation")
+        return pose
+
+    def _in_map(self, stamped: Any) -> Pose2:
+        """Return a stamped pose in the map frame."""
+        pose, frame, world = (
+            pose2_from_pose(stamped.pose),
+            stamped.header.frame_id,
+            self._robot_pose.frames.map,
+        )
+        if frame in ("", world):
+            return pose
+        T_map_frame = self._robot_pose.relative(world, frame)
+        if T_map_frame is None:
+            raise NoPose(f"frame {frame!r} has no transform to {world!r}")
+        return T_map_frame @ pose
 
     def _on_is_path_valid(self, request: Any) -> Any:
         """Answer whether the rest of a path, from the pose nearest to the robot on, is free."""
@@ -106,6 +211,7 @@ class PlannerServerNode:
         columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
         height, width = costmap.costs.shape
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-        costs = costmap.costs[rows[inside], columns[inside]]
-        blocked = (costs >= INSCRIBED_INFLATED_OBSTACLE) & (costs != NO_INFORMATION)
-        return new(IsPathValid.Response, is_valid=bool(inside.all() and not blocked.any()))
+        costs = costmap.costs[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+        blocked = ~inside | ((costs >= INSCRIBED_INFLATED_OBSTACLE) & (costs != NO_INFORMATION))
+        indices = (nearest + np.flatnonzero(blocked)).astype(np.int32)
+        return new(IsPathValid.Response, is_valid=not indices.size, invalid_pose_indices=indices)

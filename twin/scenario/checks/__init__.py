@@ -7,6 +7,7 @@ from twin.scenario.checks.check import CheckConfig
 from twin.scenario.checks.check import CheckResult as CheckResult
 from twin.scenario.checks.delivered import DeliveredConfig
 from twin.scenario.checks.localisation import LocalisationErrorConfig, OdometryDriftConfig
+from twin.scenario.checks.map_quality import MapAccuracyConfig, MapCoverageConfig
 from twin.scenario.checks.mission import MissionSucceededConfig, TimeLimitConfig
 from twin.scenario.checks.no_collision import NoCollisionConfig
 from twin.scenario.checks.path import ClosedLoopConfig, FinalPoseConfig, PathOnCircleConfig
@@ -38,6 +39,10 @@ class CheckEntry(OneOf):
     """The length of the path lies between two bounds."""
     recoveries: RecoveriesConfig | None = None
     """The navigator recovers as often as expected."""
+    map_accuracy: MapAccuracyConfig | None = None
+    """The walls of the map that the robot made are where the true ones are."""
+    map_coverage: MapCoverageConfig | None = None
+    """What the robot can get to is on its map."""
     energy: EnergyConfig | None = None
     """The actuators use no more than this."""
     final_pose: FinalPoseConfig | None = None

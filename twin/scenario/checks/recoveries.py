@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from pydantic import model_validator
@@ -18,11 +19,13 @@ class RecoveriesConfig(RobotCheckConfig):
     """Fewest recoveries; more than 0 in a scenario that is made to force one."""
     max: Annotated[int, NotNegative] | None = None
     """Most recoveries."""
+    max_per_km: Annotated[float, NotNegative] | None = None
+    """Most recoveries per kilometre driven."""
 
     @model_validator(mode="after")
     def _ordered(self) -> RecoveriesConfig:
-        if self.max is None and self.min == 0:
-            raise ValueError("must have at least one of the keys min, max")
+        if self.max is None and self.max_per_km is None and self.min == 0:
+            raise ValueError("must have at least one of the keys min, max, max_per_km")
         if self.max is not None and self.max < self.min:
             raise ValueError(f"max ({self.max}) must not be less than min ({self.min})")
         return self
@@ -33,23 +36,31 @@ class RecoveriesConfig(RobotCheckConfig):
 
 
 class Recoveries(Check):
-    """Keeps the last count and when it last changed."""
+    """Keeps the last count, when it last changed, and how far the robot has driven."""
 
     def __init__(self, name: str, config: RecoveriesConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
         self._count = 0
+        self._driven = 0.0
+        self._last: tuple[float, float] | None = None
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        count = observation.robots[self._robot].recoveries
+        robot = observation.robots[self._robot]
+        count, here = robot.recoveries, (float(robot.pose.xyz[0]), float(robot.pose.xyz[1]))
+        self._driven += math.dist(self._last or here, here)
+        self._last = here
         if count != self._count or self._at_s is None:
             self._count, self._at_s = count, observation.time_s
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the limit is the bound that is missed, or the lower one."""
-        low, high = self._config.min, self._config.max
+        low, high, per_km = self._config.min, self._config.max, self._config.max_per_km
+        if per_km is not None:
+            allowed = per_km * self._driven / 1000.0
+            high = math.floor(allowed) if high is None else min(high, math.floor(allowed))
         too_many = high is not None and self._count > high
         reason = f"{self._robot} recovered {self._count} times" if too_many or self._count < low else ""
         if self._at_s is None:

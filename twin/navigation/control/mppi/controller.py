@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.footprint_cover import FootprintCover
 from twin.navigation.control.mppi import kernels
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.footprint_cover import FootprintCover
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.noise import NoiseBank
 from twin.navigation.control.mppi.scoring import cost_tables, total
@@ -72,6 +72,11 @@ class MPPI:
         """vx_max [m/s]."""
         return self.config.vx_max
 
+    @property
+    def reverses(self) -> bool:
+        """Whether it drives backwards."""
+        return self.config.enforce_path_inversion and self.config.vx_min < 0.0
+
     def configure(self, config: MPPIConfig) -> None:
         """Go on with other parameters, from rest; lifts the speed limit."""
         self.config = config
@@ -92,7 +97,7 @@ class MPPI:
             config=PathHandlerConfig(
                 prune_distance=config.prune_distance,
                 max_robot_pose_search_dist=config.max_robot_pose_search_dist,
-                enforce_path_inversion=config.enforce_path_inversion,
+                enforce_path_inversion=self.reverses,
                 inversion_xy_tolerance=config.inversion_xy_tolerance,
                 inversion_yaw_tolerance=config.inversion_yaw_tolerance,
             )

@@ -1,1 +1,1 @@
-"""Behaviour-tree nodes: Nav2's control nodes on py_trees, and leaves that call actions and services."""
+"""What missions are made of: py_trees nodes that call actions and services."""

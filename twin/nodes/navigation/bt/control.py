@@ -1,4 +1,4 @@
-"""Nav2's control and decorator nodes (nav2_behavior_tree/plugins) as py_trees composites."""
+"""Nav2's RecoveryNode as a py_trees composite, for missions; the navigator has trees of its own kind."""
 
 from __future__ import annotations
 
@@ -38,25 +38,6 @@ class ControlNode(Composite):
                 child.stop(Status.INVALID)
 
 
-class PipelineSequence(ControlNode):
-    """Ticks earlier children again while a later one runs; the last one's success is its own."""
-
-    def initialise(self) -> None:
-        """Start with the first child."""
-        self._last_ticked = 0
-
-    def step(self) -> Step:
-        """Tick all children up to the furthest one reached so far."""
-        for i, child in enumerate(self.children):
-            yield from child.tick()
-            if child.status == Status.FAILURE:
-                return Status.FAILURE
-            if child.status == Status.RUNNING and i >= self._last_ticked:
-                self._last_ticked = i
-                return Status.RUNNING
-        return Status.SUCCESS
-
-
 class RecoveryNode(ControlNode):
     """Runs its first child; when that fails, runs the second one and tries again, at most `retries` times."""
 
@@ -85,72 +66,6 @@ class RecoveryNode(ControlNode):
                 return recovery.status
             self._recovering = False
             self._count += 1
-
-
-class RoundRobin(ControlNode):
-    """Runs one child a time, going on with the next one at every entry; fails when all have failed."""
-
-    _next = 0
-
-    def initialise(self) -> None:
-        """Forget the failures of the last entry."""
-        self._failures = 0
-
-    def step(self) -> Step:
-        """Tick the child whose turn it is."""
-        while self._failures < len(self.children):
-            child = self.children[self._next]
-            yield from child.tick()
-            if child.status == Status.RUNNING:
-                return Status.RUNNING
-            self._next = (self._next + 1) % len(self.children)
-            if child.status == Status.SUCCESS:
-                return Status.SUCCESS
-            self._failures += 1
-        self._next = 0
-        return Status.FAILURE
-
-    def terminate(self, new_status: Status) -> None:
-        """Begin with the first child again after a halt while running."""
-        if self.status == Status.RUNNING and new_status == Status.INVALID:
-            self._next = 0
-
-
-class RateController(ControlNode):
-    """Ticks its child at once, then when `period_ns` of simulated time has passed; runs in between."""
-
-    def __init__(self, name: str, period_ns: int, clock: Callable[[], int], child: Behaviour) -> None:
-        super().__init__(name, [child])
-        self._period_ns = period_ns
-        self._clock = clock
-        self._due: int | None = None
-
-    def terminate(self, new_status: Status) -> None:
-        """Forget the rate when halted, so that the next entry ticks at once."""
-        if new_status == Status.INVALID:
-            self._due = None
-
-    def step(self) -> Step:
-        """Tick the child if it is due or still running."""
-        (child,) = self.children
-        if self._due is not None and self._clock() < self._due and child.status != Status.RUNNING:
-            return Status.RUNNING
-        yield from child.tick()
-        if child.status != Status.RUNNING:
-            self._due = self._clock() + self._period_ns
-        return child.status
-
-
-class Fallback(ControlNode):
-    """Ticks its children in order, from the first at every tick, until one does not fail."""
-
-    def step(self) -> Step:
-        """Return the status of the first child that does not fail."""
-        for child in self.children:
-            yield from child.tick()
-            if child.status != Status.FAILURE:
-                return child.status
-        return Status.FAILURE
 
 
 def sequence(name: str, children: Sequence[Behaviour]) -> Composite:

@@ -21,7 +21,6 @@ class CallAction(Behaviour):
         goal: Makes the goal at the start; returns None if it cannot, after saying why, and the leaf fails.
         on_result: Takes the result of a goal that succeeded; a returned text is a reason to fail after all.
         on_failure: Takes the text that says why it failed.
-        updated: Makes a new goal while the old one runs, or None; the server preempts the old one.
     """
 
     def __init__(
@@ -32,14 +31,12 @@ class CallAction(Behaviour):
         *,
         on_result: Callable[[Any], str | None] | None = None,
         on_failure: Callable[[str], None] | None = None,
-        updated: Callable[[], Any | None] | None = None,
     ) -> None:
         super().__init__(name)
         self._client = client
         self._make_goal = goal
         self._on_result = on_result
         self._on_failure = on_failure
-        self._updated = updated
         self._goal: ClientGoal | None = None
 
     def initialise(self) -> None:
@@ -54,9 +51,6 @@ class CallAction(Behaviour):
             return Status.FAILURE
         if self._goal.accepted is False:
             return self._fail(self._goal.error or f"{self._client.name} rejected the goal")
-        if self._updated is not None and (goal := self._updated()) is not None:
-            self._goal = self._client.send_goal(goal)
-            return Status.RUNNING
         if not self._goal.done:
             return Status.RUNNING
         if not self._goal.succeeded:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.costmaps.costmap import Costmap, inflation_costs
 from twin.navigation.costmaps.footprint import radii
+
+F32 = NDArray[np.float32]
 
 _SLACK = math.sqrt(2.0)
 """Between two cells whose points are `d` apart lie at most `d` plus so many cells."""

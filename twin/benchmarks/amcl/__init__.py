@@ -1,0 +1,1 @@
+"""How well `/amcl` localises in the warehouse: tracking, global localisation, kidnapped robots."""

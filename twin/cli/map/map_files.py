@@ -1,0 +1,43 @@
+"""Arguments that name maps, and the parameters of files that commands write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from twin.navigation.maps.occupancy_map import OccupancyMap
+
+Map = Annotated[
+    str, typer.Argument(metavar="MAP", help="A YAML file of map_server, or a shipped map's name.")
+]
+Mode = Annotated[str, typer.Option("--mode", help="trinary, scale or raw.")]
+Format = Annotated[str, typer.Option("--fmt", help="pgm, png or bmp.", show_default="pgm; for scale png")]
+
+
+def load(name_or_path: str) -> OccupancyMap:
+    """Return a map; raises MapError with every fault."""
+    from twin.navigation.maps.occupancy_map import OccupancyMap
+
+    return OccupancyMap.load(map_path(name_or_path))
+
+
+def map_path(name_or_path: str) -> Path:
+    """Return the YAML file of a map; raises MapError if there is none."""
+    from twin.warehouse.map_files import named_map
+
+    return named_map(name_or_path)
+
+
+def yaml_path(output: Path) -> Path:
+    """Return the YAML file that an output names, with or without its ending."""
+    return output if output.suffix in (".yaml", ".yml") else output.with_name(output.name + ".yaml")
+
+
+def told(occupancy: OccupancyMap, path: Path, image: Path) -> str:
+    """Return a line about a map that was written."""
+    return (
+        f"{path} and {image.name}: {occupancy.width} x {occupancy.height} cells of {occupancy.resolution:g} m"
+    )

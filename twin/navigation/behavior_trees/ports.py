@@ -1,0 +1,93 @@
+"""Ports of tree nodes: their types, and how XML text becomes a value (BehaviorTree.CPP, basic_types)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input or output of a node."""
+
+    name: str
+    type: str = "string"
+    """A key of `READERS`, or `message` for what only the blackboard can hold."""
+    default: Any = None
+    """None: the port may be left out and is then empty."""
+    is_output: bool = False
+    required: bool = False
+
+
+def inputs(**types: str | tuple[str, Any]) -> tuple[Port, ...]:
+    """Return input ports: `name="double"`, or `name=("double", 1.0)` with a default."""
+    return tuple(
+        Port(name, *((spec,) if isinstance(spec, str) else spec)) for name, spec in sorted(types.items())
+    )
+
+
+def outputs(**types: str) -> tuple[Port, ...]:
+    """Return output ports."""
+    return tuple(Port(name, type_, is_output=True) for name, type_ in sorted(types.items()))
+
+
+def read_value(text: str, type_: str) -> Any:
+    """Return the value of a literal.
+
+    Raises:
+        ValueError: no literal of this type; the message says what would be one.
+    """
+    if type_ == "message":
+        raise ValueError("must be a blackboard entry such as {goal}")
+    try:
+        return READERS[type_](text)
+    except ValueError:
+        raise ValueError(f"must be {_MEANT[type_]} or a blackboard entry in braces") from None
+
+
+def is_pointer(text: str) -> bool:
+    """Return whether a port's text names a blackboard entry: `{entry}`."""
+    return len(text) >= 3 and text[0] == "{" and text[-1] == "}"
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if math.isnan(value):
+        raise ValueError
+    return value
+
+
+def _unsigned(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def _bool(text: str) -> bool:
+    values = {"1": True, "true": True, "TRUE": True, "True": True}
+    values |= {"0": False, "false": False, "FALSE": False, "False": False}
+    if text not in values:
+        raise ValueError
+    return values[text]
+
+
+READERS: dict[str, Callable[[str], Any]] = {
+    "string": str,
+    "double": _number,
+    "int": int,
+    "unsigned": _unsigned,
+    "bool": _bool,
+    "strings": lambda text: text.split(";") if text else [],
+    "ints": lambda text: [int(part) for part in text.split(";")],
+    "any": str,
+}
+_MEANT = {
+    "double": "a number",
+    "int": "a whole number",
+    "unsigned": "a whole number that is not negative",
+    "bool": "true or false",
+    "ints": "whole numbers separated by semicolons",
+}

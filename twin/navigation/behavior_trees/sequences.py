@@ -1,0 +1,162 @@
+"""BehaviorTree.CPP's control nodes that tick children in order (src/controls)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from twin.navigation.behavior_trees.node import ControlNode, NodeSetup, Status
+
+
+class _InOrder(ControlNode):
+    """Goes on to the next child when one ended with `GO_ON`; any other end is its own."""
+
+    GO_ON: ClassVar[Status]
+    STOP: ClassVar[Status]
+
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._current = 0
+        self._skipped = 0
+
+    def tick(self) -> Status:
+        """Tick from the current child on."""
+        if not self.status.is_active:
+            self._skipped = 0
+        self.set_status(Status.RUNNING)
+        while self._current < len(self.children):
+            status = self.children[self._current].execute_tick()
+            if status is Status.RUNNING:
+                return status
+            if status is self.STOP:
+                self._stopped()
+                return status
+            self._skipped += status is Status.SKIPPED
+            self._current += 1
+        all_skipped = self._skipped == len(self.children)
+        self.reset_children()
+        self._current = self._skipped = 0
+        return Status.SKIPPED if all_skipped else self.GO_ON
+
+    def _stopped(self) -> None:
+        self.reset_children()
+        self._current = 0
+
+    def halt(self) -> None:
+        """Begin with the first child next time."""
+        self._current = self._skipped = 0
+        super().halt()
+
+
+class Sequence(_InOrder):
+    """Succeeds when all children did, one after the other; a failure ends it."""
+
+    GO_ON, STOP = Status.SUCCESS, Status.FAILURE
+
+
+class Fallback(_InOrder):
+    """Tries children one after the other until one succeeds."""
+
+    GO_ON, STOP = Status.FAILURE, Status.SUCCESS
+
+
+class SequenceWithMemory(Sequence):
+    """A sequence that after a failure or a halt goes on with the child that was not done."""
+
+    def _stopped(self) -> None:
+        for child in self.children[self._current :]:
+            child.reset()
+
+    def halt(self) -> None:
+        """Keep the place."""
+        self.reset_children()
+
+
+class _Reactive(ControlNode):
+    """Ticks from the first child every time; the one that runs halts all others."""
+
+    GO_ON: ClassVar[Status]
+    STOP: ClassVar[Status]
+
+    def tick(self) -> Status:
+        """Tick the children in order until one runs or stops it."""
+        self.set_status(Status.RUNNING)
+        all_skipped = True
+        for child in self.children:
+            status = child.execute_tick()
+            all_skipped &= status is Status.SKIPPED
+            if status is Status.RUNNING:
+                for other in self.children:
+                    if other is not child:
+                        other.reset()
+                return status
+            if status is self.STOP:
+                self.reset_children()
+                return status
+            if status is Status.SKIPPED:
+                child.reset()
+        self.reset_children()
+        return Status.SKIPPED if all_skipped else self.GO_ON
+
+
+class ReactiveSequence(_Reactive):
+    """A sequence whose earlier children are asked again at every tick."""
+
+    GO_ON, STOP = Status.SUCCESS, Status.FAILURE
+
+
+class ReactiveFallback(_Reactive):
+    """A fallback whose earlier children are asked again at every tick."""
+
+    GO_ON, STOP = Status.FAILURE, Status.SUCCESS
+
+
+class IfThenElse(ControlNode):
+    """Ticks the second child if the first succeeds, else the third; asks once."""
+
+    CHILDREN = (2, 3)
+
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._chosen = 0
+
+    def tick(self) -> Status:
+        """Ask, then tick what was chosen until it ends."""
+        self.set_status(Status.RUNNING)
+        if self._chosen == 0:
+            status = self.children[0].execute_tick()
+            if status is Status.SUCCESS:
+                self._chosen = 1
+            elif status is Status.FAILURE and len(self.children) == 3:
+                self._chosen = 2
+            else:
+                return status
+        status = self.children[self._chosen].execute_tick()
+        if status is not Status.RUNNING:
+            self.reset_children()
+            self._chosen = 0
+        return status
+
+    def halt(self) -> None:
+        """Ask again next time."""
+        self._chosen = 0
+        super().halt()
+
+
+class WhileDoElse(ControlNode):
+    """As `IfThenElse`, but asks at every tick."""
+
+    CHILDREN = (2, 3)
+
+    def tick(self) -> Status:
+        """Ask, halt what is not chosen, tick what is."""
+        self.set_status(Status.RUNNING)
+        asked = self.children[0].execute_tick()
+        if asked is Status.RUNNING:
+            return asked
+        chosen, other = (1, 2) if asked is Status.SUCCESS else (2, 1)
+        if other < len(self.children):
+            self.children[other].reset()
+        status = self.children[chosen].execute_tick() if chosen < len(self.children) else Status.FAILURE
+        if status is not Status.RUNNING:
+            self.reset_children()
+        return status

@@ -1,0 +1,192 @@
+"""Nav2's range sensor layer: the cones of sonars and infrared sensors as probabilities of cells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Pose2
+from twin.navigation._jit import jit
+from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION
+from twin.navigation.costmaps.kernels import Cells
+from twin.navigation.costmaps.window import NOTHING, Window, everything, shifted
+
+_EVEN = int(0.5 * LETHAL_OBSTACLE)
+"""A probability of one half, as nav2's layer stores it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeSensorConfig:
+    """Parameters of the layer; names and defaults are those of nav2_costmap_2d's RangeSensorLayer."""
+
+    phi: float = 1.2
+    """Distance at which a reading counts half [m]."""
+    inflate_cone: float = 1.0
+    """How far beside the cone cells are looked at, as a share of it; 1: in its whole bounding box."""
+    clear_threshold: float = 0.2
+    """Cells less probable than this are free."""
+    mark_threshold: float = 0.8
+    """Cells more probable than this are lethal."""
+    clear_on_max_reading: bool = False
+    """Whether a reading of the maximal range frees the whole cone."""
+
+
+class RangeSensorLayer:
+    """Bayes' rule per cell, with the sensor model of nav2's RangeSensorLayer (van der Poel's sonar layer)."""
+
+    def __init__(self, shape: tuple[int, int], config: RangeSensorConfig | None = None) -> None:
+        self.config = config or RangeSensorConfig()
+        self.probabilities: Cells = np.full(shape, _EVEN, dtype=np.uint8)
+        """254 times the probability that a cell is occupied."""
+        mark, clear = (
+            int(t * LETHAL_OBSTACLE) for t in (self.config.mark_threshold, self.config.clear_threshold)
+        )
+        self._table: NDArray[np.uint8] = np.full(256, NO_INFORMATION, dtype=np.uint8)
+        self._table[:clear] = FREE_SPACE
+        self._table[mark + 1 :] = LETHAL_OBSTACLE
+        self._table[255] = NO_INFORMATION
+
+    def add(
+        self,
+        sensor: Pose2,
+        distance: float,
+        limits: tuple[float, float],
+        field_of_view: float,
+        frame: tuple[float, float, float],
+    ) -> Window:
+        """Take a reading; return the window that may have changed.
+
+        Args:
+            sensor: Pose in the costmap's frame; the cone opens along its x.
+            distance: What was measured [m]; of a sensor whose limits are equal, -inf is "something there" and
+                inf is "nothing there" (sensor_msgs/Range).
+            limits: Least and greatest range [m]; readings outside are no readings.
+            field_of_view: Full angle of the cone [rad].
+            frame: Origin x, y and resolution of the grid [m].
+        """
+        least, greatest = limits
+        if least == greatest:
+            if not math.isinf(distance) or (distance > 0.0 and not self.config.clear_on_max_reading):
+                return NOTHING
+            clearing, distance = distance > 0.0, least
+        elif not least <= distance <= greatest:
+            return NOTHING
+        else:
+            clearing = distance >= greatest and self.config.clear_on_max_reading
+        half = 0.5 * field_of_view
+        # As nav2, a fifth further than the reading, so that the far side of the object is weighed, too.
+        reach = 1.2 * distance
+        xs = [sensor.x, *(sensor.x + reach * math.cos(sensor.yaw + side * half) for side in (-1, 1))]
+        ys = [sensor.y, *(sensor.y + reach * math.sin(sensor.yaw + side * half) for side in (-1, 1))]
+        columns = [math.floor((x - frame[0]) / frame[2]) for x in xs]
+        rows = [math.floor((y - frame[1]) / frame[2]) for y in ys]
+        window = Window(min(columns), min(rows), max(columns) + 1, max(rows) + 1).clipped(
+            self.probabilities.shape
+        )
+        if window.empty:
+            return NOTHING
+        _update_cone(
+            self.probabilities,
+            float(sensor.x),
+            float(sensor.y),
+            float(sensor.yaw),
+            float(distance),
+            half,
+            self.config.phi,
+            clearing,
+            self.config.inflate_cone,
+            np.array([columns, rows], dtype=np.int64),
+            np.array([window.x0, window.y0, window.x1, window.y1], dtype=np.int64),
+            *frame,
+        )
+        return window
+
+    def costs(self, window: Window) -> Cells:
+        """Return the costs of a window's cells: lethal, free, or unknown where the readings do not decide."""
+        costs: Cells = self._table[self.probabilities[window.slices]]
+        return costs
+
+    def forget(self, window: Window, *, outside: bool = False) -> Window:
+        """Forget what is in a window, or outside of it; return where that may matter."""
+        if not outside:
+            self.probabilities[window.slices] = _EVEN
+            return window
+        kept = self.probabilities[window.slices].copy()
+        self.probabilities.fill(_EVEN)
+        self.probabilities[window.slices] = kept
+        return everything(self.probabilities.shape)
+
+    def move(self, dx: int, dy: int) -> None:
+        """Follow a grid that rolls by (dx, dy) cells."""
+        self.probabilities = shifted(self.probabilities, dx, dy, _EVEN)
+
+
+@jit
+def sensor_model(distance: float, phi: float, theta: float, half: float, phi_v: float, cell: float) -> float:
+    """Return the probability of an occupied cell at (phi [m], theta [rad]) after a reading of `distance` [m].
+
+    Source: nav2_costmap_2d/plugins/range_sensor_layer.cpp, sensor_model.
+    """
+    gamma = 0.0 if abs(theta) > half else 1.0 - (theta / half) ** 2
+    weight = (1.0 - (1.0 + math.tanh(2.0 * (phi - phi_v))) / 2.0) * gamma
+    spread = cell * distance
+    if 0.0 <= phi < distance - 2.0 * spread:
+        return (1.0 - weight) * 0.5
+    if phi < distance - spread:
+        return weight * 0.5 * ((phi - (distance - 2.0 * spread)) / spread) ** 2 + (1.0 - weight) * 0.5
+    if phi < distance + spread:
+        return weight * (0.5 - 0.5 * ((distance - phi) / spread) ** 2) + 0.5
+    return 0.5
+
+
+@jit
+def _update_cone(
+    cells: Cells,
+    x: float,
+    y: float,
+    yaw: float,
+    distance: float,
+    half: float,
+    phi_v: float,
+    clearing: bool,
+    inflate_cone: float,
+    triangle: NDArray[np.int64],
+    window: NDArray[np.int64],
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> None:
+    """Apply Bayes' rule to the cells of a window; `triangle` holds the cone's corners: columns, then rows."""
+    tx, ty = (
+        math.floor((x + distance * math.cos(yaw) - origin_x) / resolution),
+        math.floor((y + distance * math.sin(yaw) - origin_y) / resolution),
+    )
+    if 0 <= tx < cells.shape[1] and 0 <= ty < cells.shape[0]:
+        cells[ty, tx] = 233
+    (ox, ax, bx), (oy, ay, by) = triangle[0], triangle[1]
+    doubled = abs((bx - ax) * (oy - ay) - (by - ay) * (ox - ax))
+    slack = -inflate_cone * doubled / 2.0
+    sense = 1 if (bx - ax) * (oy - ay) - (by - ay) * (ox - ax) >= 0 else -1
+    for v in range(window[1], window[3]):
+        for u in range(window[0], window[2]):
+            if inflate_cone < 1.0:
+                w0 = sense * ((bx - ax) * (v - ay) - (by - ay) * (u - ax))
+                w1 = sense * ((ox - bx) * (v - by) - (oy - by) * (u - bx))
+                w2 = sense * ((ax - ox) * (v - oy) - (ay - oy) * (u - ox))
+                if w0 < slack or w1 < slack or w2 < slack:
+                    continue
+            dx, dy = origin_x + (u + 0.5) * resolution - x, origin_y + (v + 0.5) * resolution - y
+            theta = math.atan2(dy, dx) - yaw
+            theta = math.atan2(math.sin(theta), math.cos(theta))
+            sensed = 0.0
+            if not clearing:
+                sensed = sensor_model(distance, math.hypot(dx, dy), theta, half, phi_v, resolution)
+            elif abs(theta) > half or math.hypot(dx, dy) > distance:
+                continue  # nav2 frees the whole bounding box here, also what the sensor cannot see
+            prior = cells[v, u] / 254.0
+            occupied, free = sensed * prior, (1.0 - sensed) * (1.0 - prior)
+            if occupied + free > 0.0:
+                cells[v, u] = int(occupied / (occupied + free) * 254.0)

@@ -1,0 +1,1 @@
+"""Frontier exploration: where to drive so that an unknown place becomes known."""

@@ -1,0 +1,168 @@
+"""Frontiers of a map: borders between what is known to be free and what is unknown (Yamauchi 1997)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from twin.geometry import Array, Pose2
+from twin.navigation.exploration.wavefront import travel_distances, way_back
+from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
+
+_EIGHT = np.ones((3, 3), dtype=np.int8)
+_FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontierConfig:
+    """What counts as a frontier."""
+
+    min_frontier_size: float = 0.5
+    """Shorter ones are left alone [m]."""
+    robot_radius: float = 0.3
+    """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn [m]."""
+    inscribed_radius: float = 0.3
+    """Unknown cells this near to obstacles are none that matter [m]."""
+    view_distance: float = 2.0
+    """A frontier in a passage too narrow to turn in is looked at from outside, so far away at most [m]."""
+    lethal_threshold: int = 65
+    """Occupancy from which a cell of the map is an obstacle."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frontier:
+    """Unknown cells in one piece, each beside a cell that the robot can get to."""
+
+    points: Array
+    """Centres of its cells in the map frame, shape (n, 2) [m]."""
+    size: float
+    """Number of cells times their edge [m]."""
+    distance: float
+    """Way of the robot to its nearest cell [m]."""
+    target: tuple[float, float]
+    """The cell of it that the robot gets to first, [m] in the map frame."""
+    gate: tuple[int, int] = field(repr=False)
+    """Row and column of the free cell from which it gets there."""
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """Mean of its cells [m]; it may lie anywhere."""
+        x, y = self.points.mean(axis=0)
+        return float(x), float(y)
+
+    def gap_to(self, point: tuple[float, float]) -> float:
+        """Return the distance of a point to the nearest of its cells [m]."""
+        return float(np.hypot(*(self.points - point).T).min())
+
+
+class FrontierMap:
+    """A map as seen from where the robot stands: its frontiers, and the ways to them."""
+
+    def __init__(
+        self,
+        grid: OccupancyMap,
+        position: tuple[float, float],
+        config: FrontierConfig,
+        *,
+        leave_out: Sequence[tuple[float, float]] = (),
+        around: float = 0.0,
+    ) -> None:
+        """Find the frontiers.
+
+        Args:
+            grid: The map.
+            position: Of the robot, in the map frame [m].
+            config: What counts as a frontier.
+            leave_out: Points near which nothing is a frontier [m].
+            around: How near to them [m].
+        """
+        self._grid = grid
+        self._config = config
+        unknown = grid.data == UNKNOWN
+        clearance = self._clearance()
+        roomy = ~unknown & (clearance > config.robot_radius)
+        self._distance = np.full(grid.data.shape, np.inf)
+        start = self._start(roomy, position)
+        if start is not None:
+            self._distance[start] = 0.0
+            travel_distances(roomy, self._distance)
+        self.reachable: NDArray[np.bool_] = np.isfinite(self._distance)
+        """Cells that the robot's centre can get to on known ground, shape (h, w)."""
+        passages = clearance > config.inscribed_radius
+        travel_distances(~unknown & passages, self._distance)
+        wanted = unknown & passages & ~self._near(leave_out, around)
+        self.frontiers: tuple[Frontier, ...] = tuple(self._find(wanted))
+        """In the order of their cells in the map: from its lower left."""
+
+    def view_of(self, frontier: Frontier, standoff: float) -> Pose2:
+        """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it."""
+        row, column = self._stand(frontier.gate, standoff)
+        x, y = self._grid.cell_to_world((column, row))
+        yaw = math.atan2(frontier.target[1] - y, frontier.target[0] - x)
+        return Pose2(float(x), float(y), yaw)
+
+    def _stand(self, gate: tuple[int, int], standoff: float) -> tuple[int, int]:
+        return way_back(self._distance, self.reachable, *gate, standoff / self._grid.resolution)
+
+    def _clearance(self) -> Array:
+        """Return the distance of each cell to the nearest obstacle, shape (h, w) [m]."""
+        lethal = self._grid.data >= self._config.lethal_threshold
+        if not lethal.any():
+            return np.full(lethal.shape, np.inf)
+        distance: Array = ndimage.distance_transform_edt(~lethal) * self._grid.resolution
+        return distance
+
+    def _near(self, points: Sequence[tuple[float, float]], radius: float) -> NDArray[np.bool_]:
+        """Return the cells within `radius` [m] of any of the points."""
+        rows, columns = np.ogrid[: self._grid.height, : self._grid.width]
+        near = np.zeros(self._grid.data.shape, dtype=np.bool_)
+        for column, row in self._grid.world_to_cell(np.reshape(points, (-1, 2))):
+            near |= np.hypot(columns - column, rows - row) * self._grid.resolution < radius
+        return near
+
+    def _start(self, passable: NDArray[np.bool_], position: tuple[float, float]) -> tuple[int, int] | None:
+        """Return the passable cell nearest to the robot: it may stand on unknown ground or near a wall."""
+        rows, columns = np.nonzero(passable)
+        if not rows.size:
+            return None
+        centres = self._grid.cell_to_world(np.column_stack([columns, rows]))
+        nearest = int(np.argmin(np.hypot(*(centres - position).T)))
+        return int(rows[nearest]), int(columns[nearest])
+
+    def _find(self, unknown: NDArray[np.bool_]) -> list[Frontier]:
+        height, width = unknown.shape
+        padded = np.pad(self._distance, 1, constant_values=np.inf)
+        beside = np.stack([padded[1 + v : 1 + v + height, 1 + u : 1 + u + width] for v, u in _FOUR])
+        nearest = beside.min(axis=0)
+        border = unknown & np.isfinite(nearest)
+        labels, _ = ndimage.label(border, structure=_EIGHT)
+        found = []
+        for label, window in enumerate(ndimage.find_objects(labels), start=1):
+            rows, columns = np.nonzero(labels[window] == label)
+            size = rows.size * self._grid.resolution
+            if size < self._config.min_frontier_size:
+                continue
+            rows, columns = rows + window[0].start, columns + window[1].start
+            points = self._grid.cell_to_world(np.column_stack([columns, rows]))
+            first = int(np.argmin(nearest[rows, columns]))
+            row, column = int(rows[first]), int(columns[first])
+            v, u = _FOUR[int(np.argmin(beside[:, row, column]))]
+            gate = row + v, column + u
+            aside = float(nearest[row, column] - self._distance[self._stand(gate, 0.0)])
+            if aside * self._grid.resolution > self._config.view_distance:
+                continue
+            found.append(
+                Frontier(
+                    points=points,
+                    size=size,
+                    distance=float(nearest[row, column]) * self._grid.resolution,
+                    target=(float(points[first, 0]), float(points[first, 1])),
+                    gate=gate,
+                )
+            )
+        return found

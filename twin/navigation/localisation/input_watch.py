@@ -1,0 +1,68 @@
+"""Whether localisation's inputs can be believed: a lidar that froze or went blind, odometry that jumped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twin.geometry import Array, Pose2, wrap_angle
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputWatchConfig:
+    """What no healthy robot does."""
+
+    max_speed: float = 10.0
+    """Odometry that is faster than this has jumped [m/s]."""
+    max_turn_rate: float = 15.0
+    """The same of turning [rad/s]."""
+    frozen_after: int = 5
+    """So many equal scans in a row, while odometry moves, are one old scan."""
+    frozen_distance: float = 0.1
+    """How far odometry must have come meanwhile [m]."""
+    least_share: float = 0.05
+    """Of the readings that must have hit something for the lidar not to be blind."""
+
+
+class InputWatch:
+    """Compares each scan, and the odometry at its stamp, with those before."""
+
+    def __init__(self, config: InputWatchConfig | None = None) -> None:
+        self._config = config or InputWatchConfig()
+        self._ranges: Array | None = None
+        self._repeats = 0
+        self._since: Pose2 | None = None
+        self._odom: tuple[int, Pose2] | None = None
+
+    def has_jumped(self, odom: Pose2, time_ns: int) -> bool:
+        """Whether no motion can explain odometry at `time_ns` after the last one that was asked about."""
+        before, self._odom = self._odom, (time_ns, odom)
+        if before is None or time_ns <= before[0]:
+            return False
+        elapsed = (time_ns - before[0]) * 1e-9
+        turned = abs(wrap_angle(odom.yaw - before[1].yaw))
+        fast = before[1].distance(odom) > self._config.max_speed * elapsed
+        return fast or turned > min(self._config.max_turn_rate * elapsed, 3.1)
+
+    def fault(self, ranges: ArrayLike, odom: Pose2) -> str:
+        """Return why a scan cannot be used, empty if it can.
+
+        Args:
+            ranges: Shape (n,) [m].
+            odom: Pose of the base in the odom frame when the scan was taken.
+        """
+        values = np.asarray(ranges, dtype=np.float64)
+        if self._ranges is not None and np.array_equal(values, self._ranges, equal_nan=True):
+            self._repeats += 1
+        else:
+            self._ranges, self._repeats, self._since = values, 0, odom
+        if np.count_nonzero(np.isfinite(values)) < self._config.least_share * len(values):
+            return "the scan is blind: hardly a reading hit anything"
+        assert self._since is not None
+        moved = self._since.distance(odom) >= self._config.frozen_distance
+        turned = abs(wrap_angle(self._since.yaw - odom.yaw)) >= self._config.frozen_distance
+        if self._repeats >= self._config.frozen_after and (moved or turned):
+            return "the scan is frozen: it stays the same while the robot moves"
+        return ""

@@ -1,0 +1,1 @@
+"""Simultaneous localisation and mapping from lidar scans: matching, pose graph, loop closing, map."""

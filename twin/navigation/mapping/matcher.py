@@ -1,0 +1,139 @@
+"""Matching a scan with scans whose poses are known: coarse by correlation, fine by alignment with lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.geometry import Array, Pose2
+from twin.navigation.mapping.alignment import Alignment, Lines
+from twin.navigation.mapping.correlation import CorrelationGrid, Window
+from twin.navigation.mapping.scan import Scan
+from twin.navigation.mapping.uncertainty import inverted
+from twin.navigation.mapping.visibility import contradicted
+
+DEVIATION = 0.03
+"""Of a point from the line it lies on [m]."""
+CORRELATED = 6.0
+"""So many points of a scan are as good as one independent one: all of them see the same faults."""
+FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
+"""No match is better than this: variances of x, y [m^2], yaw [rad^2]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Match:
+    """Where a scan fits."""
+
+    pose: Pose2
+    """Of the base in the map frame."""
+    covariance: Array
+    """Of x, y, yaw in the map frame, shape (3, 3)."""
+    response: float
+    """Of the correlation, 0..1."""
+    inliers: float
+    """Part of the points that lie on lines of the reference, 0..1."""
+    contradicted: float
+    """Part of the points that beams have passed, 0..1; see `visibility`."""
+
+    @property
+    def score(self) -> float:
+        """How well the scan fits, -1..1."""
+        return self.inliers - self.contradicted
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """Scans at known poses, ready to be matched with."""
+
+    grid: CorrelationGrid
+    lines: Lines
+    scans: Sequence[Scan]
+    poses: Sequence[Pose2]
+
+    @staticmethod
+    def of(
+        scans: Sequence[Scan], poses: Array, *, resolution: float, deviation: float, levels: int
+    ) -> Reference | None:
+        """Return the reference of scans at poses, shape (n, 3); None if they saw nothing."""
+        places = [Pose2(x, y, yaw) for x, y, yaw in poses.tolist()]
+        points = [place.apply(scan.points) for scan, place in zip(scans, places, strict=True)]
+        normals = [_turned(scan.normals, place) for scan, place in zip(scans, places, strict=True)]
+        merged = np.concatenate(points)
+        if not len(merged):
+            return None
+        halves = np.concatenate([scan.half_lengths for scan in scans])
+        return Reference(
+            grid=CorrelationGrid(merged, resolution, deviation, levels),
+            lines=Lines(merged, np.concatenate(normals), halves),
+            scans=scans,
+            poses=places,
+        )
+
+    def match(
+        self,
+        scan: Scan,
+        guess: Pose2,
+        window: Window,
+        prior: Array,
+        least: float,
+        believed: Pose2 | None = None,
+    ) -> Match | None:
+        """Return where `scan` fits, None if it fits nowhere in the window with a response of `least`.
+
+        Args:
+            scan: In the frame of its base.
+            guess: Of the pose of its base in the map frame.
+            window: How far from the guess it is looked for.
+            prior: Covariance of what is believed in the map frame, shape (3, 3).
+            least: Response of the correlation below which nothing is found.
+            believed: The pose that odometry tells; None: the guess.
+        """
+        coarse = self.grid.search(scan.points, guess, window, least)
+        if coarse is None:
+            return None
+        information = inverted(prior)
+        fine = self.lines.align(
+            scan.points, scan.normals, coarse.pose, believed or guess, CORRELATED * information, DEVIATION
+        )
+        if fine.pose.distance(coarse.pose) > 0.5:
+            return None
+        return Match(
+            pose=fine.pose,
+            covariance=_covariance(fine, information),
+            response=coarse.response,
+            inliers=fine.inliers,
+            contradicted=contradicted(scan, fine.pose, self.scans, self.poses),
+        )
+
+    def best_match(
+        self, scan: Scan, guess: Pose2, window: Window, prior: Array, least: float, sectors: int
+    ) -> Match | None:
+        """Return the match of the best score of the best in each of `sectors` parts of the window's angle.
+
+        What responds most on the smeared grid need not be what fits best; this asks for several. See `match`.
+        """
+        width = 2.0 * window.half_angle / sectors
+        narrow = replace(window, half_angle=0.5 * width)
+        best: Match | None = None
+        for sector in range(sectors):
+            yaw = guess.yaw + (sector + 0.5) * width - window.half_angle
+            match = self.match(scan, Pose2(guess.x, guess.y, yaw), narrow, prior, least, guess)
+            if match is not None and (best is None or match.score > best.score):
+                best = match
+        return best
+
+
+def _turned(vectors: Array, pose: Pose2) -> Array:
+    return Pose2(0.0, 0.0, pose.yaw).apply(vectors)
+
+
+def _covariance(fine: Alignment, prior: Array) -> Array:
+    return inverted(fine.information / CORRELATED + prior) + FLOOR
+
+
+def levels_for(half_width: float, resolution: float) -> int:
+    """Return how many levels of a pyramid search a window fastest."""
+    return max(1, min(6, math.ceil(math.log2(max(half_width / resolution, 1.0))) - 1))

@@ -1,0 +1,100 @@
+"""Filter masks: keep-out and speed zones on a map's cells, as nav2's costmap filters read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.errors import MapError
+from twin.geometry import Array, Pose2
+from twin.navigation.maps.map_saver import LOSSLESS_SCALE, SaveParameters
+from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, OccupancyMap
+
+KEEPOUT_FILE = SaveParameters(mode="trinary")
+"""How a keep-out mask is saved: black is forbidden, as nav2's depot_keepout."""
+SPEED_FILE = LOSSLESS_SCALE
+"""How a mask of speeds is saved: every per cent is a grey level, as nav2's depot_speed."""
+
+
+def empty_mask(occupancy: OccupancyMap) -> OccupancyMap:
+    """Return a mask without zones, of the cells of a map."""
+    return OccupancyMap(
+        data=np.full_like(occupancy.data, FREE), resolution=occupancy.resolution, origin=occupancy.origin
+    )
+
+
+def with_zone(mask: OccupancyMap, polygon: ArrayLike, value: int) -> OccupancyMap:
+    """Return the mask with a zone more.
+
+    Args:
+        mask: Of values 0 (no zone) to 100.
+        polygon: Corners in the map frame, shape (n, 2), n >= 3 [m]; the even-odd rule holds.
+            The cells whose centres are inside are the zone.
+        value: 100 forbids; a speed zone's is its limit in per cent; 0 erases.
+
+    Raises:
+        MapError: no polygon, a value out of range, or no cell is inside.
+    """
+    corners = np.asarray(polygon, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
+        raise MapError("a zone needs three corners or more, each an x and a y in metres")
+    if not FREE <= value <= OCCUPIED:
+        raise MapError(f"a zone's value is {value}; valid is {FREE} to {OCCUPIED}")
+    inside = _inside(mask, corners)
+    if not inside.any():
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        x0, y0, x1, y1 = mask.extent
+        raise MapError(
+            f"no cell of the mask lies in the zone x {low[0]:g} … {high[0]:g}, y {low[1]:g} … {high[1]:g} m; "
+            f"the mask spans x {x0:g} … {x1:g}, y {y0:g} … {y1:g} m"
+        )
+    data = mask.data.copy()
+    data[inside] = value
+    return OccupancyMap(data=data, resolution=mask.resolution, origin=mask.origin)
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Array:
+    """Return the corners, shape (4, 2) [m], of a rectangle along the axes between two opposite ones."""
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=np.float64)
+
+
+def circle(x: float, y: float, radius: float, *, corners: int = 64) -> Array:
+    """Return a polygon, shape (corners, 2) [m], about a circle.
+
+    Raises:
+        MapError: the radius is not positive.
+    """
+    if not radius > 0.0:
+        raise MapError(f"a zone's radius is {radius:g} m; valid is a positive number")
+    angles = np.arange(corners) * (2.0 * math.pi / corners)
+    return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
+
+
+def same_cells(a: OccupancyMap, b: OccupancyMap) -> bool:
+    """Return whether two maps have the same cells: shape, resolution, origin."""
+    return (
+        a.data.shape == b.data.shape
+        and math.isclose(a.resolution, b.resolution, rel_tol=1e-6)
+        and _close(a.origin, b.origin)
+    )
+
+
+def _close(a: Pose2, b: Pose2) -> bool:
+    pairs: Sequence[tuple[float, float]] = list(zip(a, b, strict=True))
+    return all(math.isclose(p, q, abs_tol=1e-6) for p, q in pairs)
+
+
+def _inside(mask: OccupancyMap, corners: Array) -> NDArray[np.bool_]:
+    """Return which cells' centres are inside, by counting the edges to the right of each (even-odd rule)."""
+    local = (mask.origin.inverse().apply(corners)) / mask.resolution
+    xs, ys = np.arange(mask.width) + 0.5, np.arange(mask.height) + 0.5
+    inside = np.zeros(mask.data.shape, dtype=np.bool_)
+    for (ax, ay), (bx, by) in zip(local, np.roll(local, -1, axis=0), strict=True):
+        rows = np.flatnonzero((ay > ys) != (by > ys))
+        if rows.size:
+            crossing = ax + (ys[rows] - ay) * (bx - ax) / (by - ay)
+            inside[rows] ^= xs[None, :] < crossing[:, None]
+    return inside

@@ -1,0 +1,285 @@
+"""Hybrid-A*: paths that a robot with a limited turning circle can follow, safe for its whole footprint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.geometry import Array, Pose2
+from twin.navigation.costmaps.costmap import (
+    INSCRIBED_INFLATED_OBSTACLE,
+    MAX_NON_OBSTACLE,
+    NO_INFORMATION,
+    Costmap,
+    inflation_costs,
+)
+from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
+from twin.navigation.planning.curves import advance
+from twin.navigation.planning.grid_search import GridSearch
+from twin.navigation.planning.hybrid_kernel import (
+    FOUND,
+    OUT_OF_NODES,
+    Ints,
+    curve_cost,
+    expand,
+    pose_cost,
+)
+from twin.navigation.planning.planner import check_inside
+
+_SLACK = 1.3
+"""The cost to the goal is known for cells of so many times the start's; the others cost more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HybridConfig:
+    """Parameters of the planner; names and defaults are those of nav2_smac_planner's SmacPlannerHybrid."""
+
+    motion_model_for_search: Literal["DUBIN", "REEDS_SHEPP"] = "DUBIN"
+    """Whether the robot only drives forwards, or backwards too."""
+    minimum_turning_radius: float = 0.4
+    """[m]"""
+    tolerance: float = 0.25
+    """If the goal is occupied, how far from it the path may end [m]."""
+    allow_unknown: bool = True
+    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
+    angle_quantization_bins: int = 72
+    """Headings that are told apart."""
+    analytic_expansion_ratio: float = 3.5
+    """How often a curve straight to the goal is tried."""
+    analytic_expansion_max_length: float = 3.0
+    """It is no longer than this [m]; 4 to 5 turning radii at least."""
+    reverse_penalty: float = 2.0
+    """What a metre backwards counts."""
+    change_penalty: float = 0.0
+    """What is added where a turn to one side follows one to the other."""
+    non_straight_penalty: float = 1.2
+    """What a metre of a turn counts."""
+    cost_penalty: float = 2.0
+    """A metre at cost 252 counts as 1 + cost_penalty metres of free space."""
+    max_iterations: int = 1_000_000
+    """Poses that are expanded at most."""
+    smooth_path: bool = True
+    """Whether parts of the path give way to single curves where those are cheaper."""
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The problem in cells, as the kernels take it."""
+
+    costmap: Costmap
+    corners: Array
+    radius: float
+    clear_below: int
+
+    def pose(self, pose: Pose2) -> Array:
+        x, y, resolution = self.costmap.frame
+        return np.array([(pose.x - x) / resolution, (pose.y - y) / resolution, pose.yaw])
+
+
+@dataclass(kw_only=True)
+class HybridPlanner:
+    """Plans arcs and straight lines (Dolgov et al. 2008; nav2_smac_planner), forwards or also backwards."""
+
+    config: HybridConfig
+    footprint: ArrayLike = ((0.0, 0.0),)
+    """Corners [m] in the base frame, shape (n, 2); a single one leaves it to the inscribed zone."""
+    inflation_radius: float = 0.0
+    """Of the costmap [m]: from it follows how low a cost keeps the whole footprint clear."""
+    _search: GridSearch = field(default_factory=GridSearch, init=False, repr=False, compare=False)
+
+    def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
+        """Return a path, shape (n, 3): x, y [m] and the robot's heading [rad], at most a cell apart.
+
+        Where the robot drives backwards, the next pose lies behind the heading.
+
+        Raises:
+            StartOutsideMap: the start is off the costmap.
+            GoalOutsideMap: the goal is off the costmap.
+            StartOccupied: the footprint collides at the start.
+            GoalOccupied: and so at every cell within the tolerance of the goal.
+            NoValidPath: there is no path.
+            PlanningTimeout: none was found within `max_iterations`.
+        """
+        check_inside(costmap, start, goal)
+        frame = self._frame(costmap)
+        first = frame.pose(start)
+        if not self._is_free(frame, first):
+            raise StartOccupied(f"the robot collides at the start ({start.x:.2f}, {start.y:.2f})")
+        last = frame.pose(self._reachable(frame, goal))
+        anchors, moves, g = self._expanded(frame, first, last)
+        pieces = self._pieces(frame, anchors, moves, g)
+        poses = _driven(first, pieces, frame.radius)
+        poses[-1] = last
+        x, y, resolution = costmap.frame
+        poses[:, :2] = poses[:, :2] * resolution + (x, y)
+        poses[:, 2] = (poses[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        return poses
+
+    @property
+    def _reverse(self) -> bool:
+        return self.config.motion_model_for_search == "REEDS_SHEPP"
+
+    @property
+    def _penalties(self) -> Array:
+        config = self.config
+        return np.array(
+            [
+                config.cost_penalty,
+                config.non_straight_penalty,
+                config.change_penalty,
+                config.reverse_penalty,
+            ]
+        )
+
+    def _frame(self, costmap: Costmap) -> _Frame:
+        corners = np.array(self.footprint, dtype=np.float64, order="C")
+        reach = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+        clear_below = 0
+        if self.inflation_radius >= reach:
+            # One cell more, for costs are those of the cells' centres.
+            cost = inflation_costs(
+                reach + costmap.resolution,
+                inscribed_radius=costmap.inscribed_radius,
+                inflation_radius=math.inf,
+                cost_scaling_factor=costmap.cost_scaling_factor,
+            )
+            within = self.inflation_radius >= reach + costmap.resolution
+            clear_below = int(cost) if within else 0
+        radius = max(self.config.minimum_turning_radius / costmap.resolution, 1.0)
+        return _Frame(costmap, corners / costmap.resolution, radius, clear_below)
+
+    def _is_free(self, frame: _Frame, pose: Array) -> bool:
+        costs, unknown = frame.costmap.costs, self.config.allow_unknown
+        x, y, yaw = map(float, pose)
+        return pose_cost(costs, frame.corners, x, y, yaw, frame.clear_below, unknown) >= 0
+
+    def _reachable(self, frame: _Frame, goal: Pose2) -> Pose2:
+        """Return the goal, or the nearest pose of its heading at a cell's centre where the robot fits."""
+        costmap, tolerance = frame.costmap, self.config.tolerance
+        if self._is_free(frame, frame.pose(goal)):
+            return goal
+        r = math.ceil(tolerance / costmap.resolution)
+        column, row = costmap.world_to_cell(goal.x, goal.y)
+        offsets = np.stack(np.meshgrid(np.arange(-r, r + 1), np.arange(-r, r + 1)), axis=-1).reshape(-1, 2)
+        centres = costmap.cell_to_world(offsets + np.array([column, row]))
+        away = np.hypot(*(centres - (goal.x, goal.y)).T)
+        for i in np.argsort(away, kind="stable"):
+            near = Pose2(float(centres[i, 0]), float(centres[i, 1]), goal.yaw)
+            if away[i] <= tolerance and self._is_free(frame, frame.pose(near)):
+                return near
+        message = f"the robot fits nowhere within {tolerance:g} m of the goal"
+        raise GoalOccupied(f"{message} ({goal.x:.2f}, {goal.y:.2f})")
+
+    def _expanded(self, frame: _Frame, first: Array, last: Array) -> tuple[Array, Ints, Array]:
+        """Return the nodes of the way: poses, moves into them, costs."""
+        config, costs = self.config, frame.costmap.costs
+        price = np.full((2, 256), 1.0 + config.cost_penalty * np.arange(256) / MAX_NON_OBSTACLE)
+        price[:, INSCRIBED_INFLATED_OBSTACLE:NO_INFORMATION] = math.inf
+        price[:, NO_INFORMATION] = 1.0 + config.cost_penalty if config.allow_unknown else math.inf
+        width = costs.shape[1]
+        here, there = (math.floor(pose[1]) * width + math.floor(pose[0]) for pose in (first, last))
+        if not self._search.run(costs, price, there, here, slack=_SLACK):
+            raise NoValidPath("start and goal are not connected")
+        bins = config.angle_quantization_bins
+        # A move leaves its cell, and turns by a whole number of bins (nav2_smac_planner, node_hybrid.cpp).
+        turn = 2.0 * math.asin(min(1.0, math.sqrt(2.0) / (2.0 * frame.radius)))
+        arc = max(1, math.ceil(turn / (2.0 * math.pi / bins))) * 2.0 * math.pi / bins
+        longest = max(config.analytic_expansion_max_length / frame.costmap.resolution, 4.0 * frame.radius)
+        outcome, node, poses, g, parent, move = expand(
+            costs,
+            frame.corners,
+            first,
+            last,
+            *self._search.field,
+            _SLACK * self._search.cost(here),
+            bins,
+            arc,
+            frame.radius,
+            self._reverse,
+            frame.clear_below,
+            config.allow_unknown,
+            self._penalties,
+            float(config.analytic_expansion_ratio),
+            longest,
+            config.max_iterations,
+        )
+        if outcome == OUT_OF_NODES:
+            raise PlanningTimeout(f"no path within {config.max_iterations} iterations")
+        if outcome != FOUND:
+            raise NoValidPath("the robot cannot turn its way to the goal")
+        nodes = [node]
+        while parent[nodes[-1]] >= 0:
+            nodes.append(int(parent[nodes[-1]]))
+        order = np.array(nodes[::-1])
+        self._arc = arc
+        return poses[order], move[order], g[order]
+
+    def _pieces(self, frame: _Frame, anchors: Array, moves: Ints, g: Array) -> list[tuple[int, float]]:
+        """Return the path as turns and lengths [radii], with cheaper curves in place of parts if smoothed."""
+        pieces: list[tuple[int, float]] = []
+        i, count = 0, len(anchors) - 1
+        last = (0, 1)
+        while i < count:
+            found: list[tuple[int, float]] = []
+            j = i + 1
+            for ahead in _aheads(count - i) if self.config.smooth_path else ():
+                saved = float(g[i + ahead] - g[i]) - 1e-6
+                cost, curve = self._curve(frame, anchors[i], anchors[i + ahead], last)
+                if cost < saved:
+                    j, found = i + ahead, curve
+                    break
+            if not found and moves[j] == 6:
+                found = self._curve(frame, anchors[i], anchors[j], last)[1]
+            elif not found:
+                found = [(int(moves[j]) % 3 - 1, self._arc if moves[j] < 3 else -self._arc)]
+            pieces += found
+            last = (pieces[-1][0], 1 if pieces[-1][1] > 0.0 else -1)
+            i = j
+        return pieces
+
+    def _curve(
+        self, frame: _Frame, start: Array, goal: Array, last: tuple[int, int]
+    ) -> tuple[float, list[tuple[int, float]]]:
+        """Return the cost [cells] and the pieces of the shortest curve between two poses."""
+        turns: NDArray[np.int64] = np.zeros(5, np.int64)
+        lengths = np.zeros(5)
+        cost, _, count = curve_cost(
+            frame.costmap.costs,
+            frame.corners,
+            start,
+            goal,
+            frame.radius,
+            self._reverse,
+            frame.clear_below,
+            self.config.allow_unknown,
+            self._penalties,
+            *last,
+            turns,
+            lengths,
+        )
+        drawn = zip(turns[:count].tolist(), lengths[:count].tolist(), strict=True)
+        return cost, [(turn, length) for turn, length in drawn if abs(length) > 1e-9]
+
+
+def _aheads(most: int) -> list[int]:
+    """Return how many nodes ahead curves are tried to: far ones first, each two thirds of the one before."""
+    steps = [most]
+    while steps[-1] > 2:
+        steps.append(steps[-1] * 2 // 3)
+    return steps
+
+
+def _driven(first: Array, pieces: list[tuple[int, float]], radius: float) -> Array:
+    """Return the poses along pieces, shape (n, 3), at most a cell apart."""
+    poses = [(float(first[0]), float(first[1]), float(first[2]))]
+    for turn, length in pieces:
+        count = max(1, math.ceil(abs(length) * radius))
+        x, y, yaw = poses[-1]
+        poses += [advance(x, y, yaw, turn, length * i / count, radius) for i in range(1, count + 1)]
+    if len(poses) == 1:
+        poses.append(poses[0])
+    return np.array(poses)

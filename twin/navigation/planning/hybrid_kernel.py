@@ -1,0 +1,357 @@
+"""The compiled loops of Hybrid-A* (Dolgov et al. 2008): poses, arcs, and a curve to the goal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+from twin.navigation._jit import jit
+from twin.navigation.costmaps.kernels import outline_cost
+from twin.navigation.planning.curves import advance, shortest_curve
+
+Ints = NDArray[np.int32]
+Cells = NDArray[np.uint8]
+
+_MORE = 1000
+"""Poses that are expanded after a first way is found, to find a better one."""
+
+FOUND, UNREACHABLE, OUT_OF_NODES = 0, 1, 2
+
+
+@jit
+def pose_cost(
+    costs: Cells, corners: Array, x: float, y: float, yaw: float, clear_below: int, allow_unknown: bool
+) -> int:
+    """Return the cost under the centre of a pose, -1 if the robot collides there.
+
+    Args:
+        costs: Of the grid, shape (h, w); poses are in cells.
+        corners: Of the footprint, shape (n, 2) [cells]; a single one leaves it to the inscribed zone.
+        x: Column.
+        y: Row.
+        yaw: Heading [rad].
+        clear_below: A centre of less cost has no obstacle within reach of the footprint.
+        allow_unknown: Whether the footprint may lie on unknown cells.
+    """
+    column, row = math.floor(x), math.floor(y)
+    if column < 0 or row < 0 or column >= costs.shape[1] or row >= costs.shape[0]:
+        return -1
+    cost = int(costs[row, column])
+    if cost == 255:
+        if not allow_unknown:
+            return -1
+        cost = 252
+    elif cost >= 253:
+        return -1
+    if cost < clear_below or corners.shape[0] < 2:
+        return cost
+    worst = outline_cost(costs, corners, x, y, yaw, 0.0, 0.0, 1.0)
+    if worst == 254 or (worst == 255 and not allow_unknown):
+        return -1
+    return cost
+
+
+@jit
+def piece_cost(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    turn: int,
+    length: float,
+    radius: float,
+    clear_below: int,
+    allow_unknown: bool,
+    cost_penalty: float,
+) -> float:
+    """Return the length [cells] of a piece weighted by the costs under it; inf if it collides.
+
+    Poses are tested at most a cell apart, the first one not.
+    """
+    distance = abs(length) * radius
+    count = max(1, math.ceil(distance))
+    total = 0.0
+    for i in range(1, count + 1):
+        px, py, pyaw = advance(x, y, yaw, turn, length * i / count, radius)
+        cost = pose_cost(costs, corners, px, py, pyaw, clear_below, allow_unknown)
+        if cost < 0:
+            return math.inf
+        total += 1.0 + cost_penalty * cost / 252.0
+    return total * distance / count
+
+
+@jit
+def curve_cost(
+    costs: Cells,
+    corners: Array,
+    start: Array,
+    goal: Array,
+    radius: float,
+    reverse: bool,
+    clear_below: int,
+    allow_unknown: bool,
+    penalties: Array,
+    last_turn: int,
+    last_way: int,
+    turns: NDArray[np.int64],
+    lengths: Array,
+) -> tuple[float, float, int]:
+    """Return the cost and length [cells] of the shortest curve between two poses, and its count of pieces."""
+    dx, dy = (goal[0] - start[0]) / radius, (goal[1] - start[1]) / radius
+    c, s = math.cos(start[2]), math.sin(start[2])
+    shortest, count = shortest_curve(
+        c * dx + s * dy, c * dy - s * dx, goal[2] - start[2], reverse, turns, lengths
+    )
+    x, y, yaw = start[0], start[1], start[2]
+    total = 0.0
+    for i in range(count):
+        if lengths[i] == 0.0:
+            continue
+        turn, length = turns[i], lengths[i]
+        cost = piece_cost(
+            costs, corners, x, y, yaw, turn, length, radius, clear_below, allow_unknown, penalties[0]
+        )
+        if cost == math.inf:
+            return math.inf, shortest * radius, count
+        way = 1 if length > 0.0 else -1
+        total += cost * move_factor(turn, way, last_turn, last_way, penalties)
+        last_turn, last_way = turn, way
+        x, y, yaw = advance(x, y, yaw, turn, length, radius)
+    return total, shortest * radius, count
+
+
+@jit
+def move_factor(turn: int, way: int, last_turn: int, last_way: int, penalties: Array) -> float:
+    """Return what a move costs more for turning, for turning otherwise than before, and for reversing."""
+    factor = 1.0
+    if turn != 0:
+        factor = penalties[1]
+        if turn * way == -last_turn * last_way:
+            factor += penalties[2]
+    if way < 0:
+        factor *= penalties[3]
+    return factor
+
+
+@jit
+def expand(
+    costs: Cells,
+    corners: Array,
+    start: Array,
+    goal: Array,
+    to_go: Array,
+    to_go_mark: Ints,
+    to_go_generation: int,
+    beyond: float,
+    bins: int,
+    arc: float,
+    radius: float,
+    reverse: bool,
+    clear_below: int,
+    allow_unknown: bool,
+    penalties: Array,
+    expansion_ratio: float,
+    expansion_length: float,
+    most: int,
+) -> tuple[int, int, Array, Array, Ints, Ints]:
+    """Search from a pose to a pose; all in cells.
+
+    Args:
+        costs: Of the grid, shape (h, w).
+        corners: Of the footprint, shape (n, 2).
+        start: x, y, yaw.
+        goal: x, y, yaw.
+        to_go: Cost from each cell to the goal, shape (h * w,); known where `to_go_mark` is the generation.
+        to_go_mark: Shape (h * w,).
+        to_go_generation: See `to_go`.
+        beyond: Cost to the goal from the cells where it is not known, at least.
+        bins: Headings that are told apart.
+        arc: Of a move, in turning radii.
+        radius: Of the tightest turn.
+        reverse: Whether moves and the curve to the goal may go backwards.
+        clear_below: See `pose_cost`.
+        allow_unknown: See `pose_cost`.
+        penalties: Of costs, of turning, of turning otherwise, of reversing.
+        expansion_ratio: The curve to the goal is tried the more often the larger, and the nearer the goal.
+        expansion_length: It is no longer than this.
+        most: Poses to expand at most.
+
+    Returns:
+        An outcome, the last node, and per node its pose (n, 3), its cost, the one before and its move: turn
+        + 1, plus 3 backwards; 6 for the curve to the goal.
+    """
+    height, width = costs.shape
+    capacity = 1024
+    poses, g = np.empty((capacity, 3)), np.empty(capacity)
+    parent, move = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
+    closed = np.zeros(capacity, np.bool_)
+    cell_of = np.empty(capacity, np.int64)
+    slots = 4096
+    table = np.full(slots, -1, np.int32)
+    keys, items = np.empty(capacity), np.empty(capacity, np.int32)
+    turns, lengths = np.empty(5, np.int64), np.empty(5)
+    nodes, waiting, expanded, until_curve = 1, 1, 0, 0
+    best, best_g, last_chance = -1, math.inf, most
+    bin_size = 2.0 * math.pi / bins
+    poses[0], g[0], parent[0], move[0] = start, 0.0, -1, 1
+    cell_of[0] = (math.floor(start[1]) * width + math.floor(start[0])) * bins + round(
+        (start[2] % (2.0 * math.pi)) / bin_size
+    ) % bins
+    table[(cell_of[0] * 2654435761 >> 7) % slots] = 0
+    keys[0], items[0] = 0.0, 0
+    while waiting > 0:
+        node = items[0]
+        waiting -= 1
+        key, item = keys[waiting], items[waiting]
+        hole = 0
+        while True:  # sift the last entry down from the top
+            child = 2 * hole + 1
+            if child >= waiting:
+                break
+            if child + 1 < waiting and keys[child + 1] < keys[child]:
+                child += 1
+            if keys[child] >= key:
+                break
+            keys[hole], items[hole] = keys[child], items[child]
+            hole = child
+        keys[hole], items[hole] = key, item
+        if closed[node]:
+            continue
+        closed[node] = True
+        if node == best or g[node] >= best_g or expanded == last_chance:
+            break
+        if expanded == most:
+            break
+        expanded += 1
+        until_curve -= 1
+        x, y, yaw = poses[node, 0], poses[node, 1], poses[node, 2]
+        last_turn, last_way = move[node] % 3 - 1, 1 if move[node] < 3 else -1
+        # Candidates: the moves, and sometimes the curve to the goal as number 6.
+        for option in range(7):
+            if option == 6:
+                away = math.hypot(goal[0] - x, goal[1] - y)
+                if until_curve > 0 or away > expansion_length:
+                    continue
+                until_curve = max(1, int(away / expansion_ratio))
+                cost, length, _ = curve_cost(
+                    costs,
+                    corners,
+                    poses[node],
+                    goal,
+                    radius,
+                    reverse,
+                    clear_below,
+                    allow_unknown,
+                    penalties,
+                    last_turn,
+                    last_way,
+                    turns,
+                    lengths,
+                )
+                if cost == math.inf or length > expansion_length or g[node] + cost >= best_g:
+                    continue
+                best, best_g = nodes, g[node] + cost
+                last_chance = min(most, expanded + _MORE if last_chance == most else last_chance)
+                new_x, new_y, new_yaw, left = goal[0], goal[1], goal[2], 0.0
+                code = np.int64(-1 - node)
+            else:
+                if option >= 3 and not reverse:
+                    continue
+                turn, way = option % 3 - 1, 1 if option < 3 else -1
+                new_x, new_y, new_yaw = advance(x, y, yaw, turn, way * arc, radius)
+                column, row = math.floor(new_x), math.floor(new_y)
+                if column < 0 or row < 0 or column >= width or row >= height:
+                    continue
+                new_yaw %= 2.0 * math.pi
+                code = (row * width + column) * bins + round(new_yaw / bin_size) % bins
+                slot = (code * 2654435761 >> 7) % slots
+                while table[slot] >= 0 and cell_of[table[slot]] != code:
+                    slot = (slot + 1) % slots
+                known = table[slot]
+                if known >= 0 and closed[known]:
+                    continue
+                cost = piece_cost(
+                    costs,
+                    corners,
+                    x,
+                    y,
+                    yaw,
+                    turn,
+                    way * arc,
+                    radius,
+                    clear_below,
+                    allow_unknown,
+                    penalties[0],
+                )
+                if cost == math.inf:
+                    continue
+                cost *= move_factor(turn, way, last_turn, last_way, penalties)
+                if known >= 0 and g[known] <= g[node] + cost:
+                    continue
+                flat = row * width + column
+                left = to_go[flat] if to_go_mark[flat] == to_go_generation else beyond
+                dx, dy = (goal[0] - new_x) / radius, (goal[1] - new_y) / radius
+                if dx * dx + dy * dy < 100.0:  # further away the turns at both ends hardly matter
+                    c, s = math.cos(new_yaw), math.sin(new_yaw)
+                    shortest, _ = shortest_curve(
+                        c * dx + s * dy, c * dy - s * dx, goal[2] - new_yaw, reverse, turns, lengths
+                    )
+                    left = max(left, shortest * radius)
+            if nodes == capacity or waiting == capacity:
+                more = 2 * capacity
+                poses, g = _longer2(poses, more), _longer(g, more)
+                parent, move, items = _longer(parent, more), _longer(move, more), _longer(items, more)
+                cell_of, keys, closed = _longer(cell_of, more), _longer(keys, more), _longer(closed, more)
+                closed[capacity:] = False
+                capacity = more
+            # A pose reached better becomes a node of its own: what came from the worse one keeps its way.
+            fresh = nodes
+            nodes += 1
+            poses[fresh, 0], poses[fresh, 1], poses[fresh, 2] = new_x, new_y, new_yaw
+            g[fresh], parent[fresh], move[fresh], cell_of[fresh] = g[node] + cost, node, option, code
+            if option < 6:
+                if known >= 0:
+                    closed[known] = True
+                table[slot] = fresh
+                if 2 * nodes > slots:
+                    slots *= 4
+                    old = table
+                    table = np.full(slots, -1, np.int32)
+                    for entry in old:
+                        if entry >= 0:
+                            slot = (cell_of[entry] * 2654435761 >> 7) % slots
+                            while table[slot] >= 0:
+                                slot = (slot + 1) % slots
+                            table[slot] = entry
+            key = g[fresh] + left
+            hole = waiting
+            waiting += 1
+            while hole > 0:
+                above = (hole - 1) // 2
+                if keys[above] <= key:
+                    break
+                keys[hole], items[hole] = keys[above], items[above]
+                hole = above
+            keys[hole], items[hole] = key, fresh
+    if best >= 0:
+        return FOUND, best, poses, g, parent, move
+    return OUT_OF_NODES if expanded == most else UNREACHABLE, 0, poses, g, parent, move
+
+
+@jit
+def _longer(values: Any, size: int) -> Any:
+    more = np.empty(size, values.dtype)
+    more[: values.shape[0]] = values
+    return more
+
+
+@jit
+def _longer2(values: Array, size: int) -> Array:
+    more = np.empty((size, values.shape[1]))
+    more[: values.shape[0]] = values
+    return more

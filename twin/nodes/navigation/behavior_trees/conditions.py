@@ -1,0 +1,215 @@
+"""Nav2's conditions on errors, goals, poses and paths (plugins/condition)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import Path, new
+from twin.geometry import Pose2
+from twin.navigation.behavior_trees import paths
+from twin.navigation.behavior_trees.node import ConditionNode, NodeSetup
+from twin.navigation.behavior_trees.ports import inputs
+from twin.nodes.messages import path_array
+from twin.nodes.navigation.behavior_trees.context import NavigatorContext
+
+_GOAL = inputs(goal="message", goals="message")
+_FRAMES = inputs(global_frame="string", robot_base_frame="string")
+
+
+class NavigatorCondition(ConditionNode):
+    """A condition that needs what the navigator has."""
+
+    context: NavigatorContext
+
+    def robot(self) -> Pose2 | None:
+        """Return the robot's pose in the node's frames; None while it is not known."""
+        return self.context.pose(self.get("global_frame"), self.get("robot_base_frame"))
+
+
+class AreErrorCodesPresent(NavigatorCondition):
+    """Whether an error code is one of some."""
+
+    PORTS = inputs(error_code="unsigned", error_codes_to_check="ints")
+    CODES: ClassVar[tuple[int, ...]] = ()
+
+    def holds(self) -> bool:
+        """Look."""
+        codes = self.get("error_codes_to_check") or self.CODES
+        return self.get("error_code") in codes
+
+
+class WouldAControllerRecoveryHelp(AreErrorCodesPresent):
+    """Whether following failed for a reason that may go away: unknown, patience, progress, control."""
+
+    CODES = (100, 104, 105, 106)
+
+
+class WouldAPlannerRecoveryHelp(AreErrorCodesPresent):
+    """Whether planning failed for a reason that may go away: unknown, time-out, no valid path."""
+
+    CODES = (200, 207, 208, 300, 307, 308)
+
+
+class WouldASmootherRecoveryHelp(AreErrorCodesPresent):
+    """Whether smoothing failed for a reason that may go away: unknown, time-out, failed, in collision."""
+
+    CODES = (500, 502, 504, 503)
+
+
+class GoalUpdated(NavigatorCondition):
+    """Whether the goal has changed since this node began to be ticked."""
+
+    PORTS = _GOAL
+    _goal: Any = None
+
+    def holds(self) -> bool:
+        """Compare."""
+        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
+        before, self._goal = self._goal, present
+        return self.status.is_active and before != present
+
+
+class GlobalUpdatedGoal(NavigatorCondition):
+    """Whether the goal has changed since the last tick; true at the first one."""
+
+    PORTS = _GOAL
+
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._goal: Any = None
+
+    def holds(self) -> bool:
+        """Compare."""
+        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
+        before, self._goal = self._goal, present
+        return bool(before is None or before != present)
+
+
+class GoalReached(NavigatorCondition):
+    """Whether the robot is as near to the goal as the navigator's `goal_reached_tol`."""
+
+    PORTS = (*inputs(goal="message"), *_FRAMES)
+
+    def holds(self) -> bool:
+        """Measure."""
+        goal = self.get("goal")
+        if goal is None:
+            return False
+        pose = self.context.pose(goal.header.frame_id or None, self.get("robot_base_frame"))
+        near = self.context.goal_reached_tol
+        return pose is not None and pose.distance(pose2_from_pose(goal.pose)) <= near
+
+
+class ArePosesNear(NavigatorCondition):
+    """Whether two poses are near to each other."""
+
+    PORTS = inputs(
+        ref_pose="message", target_pose="message", global_frame="string", tolerance=("double", 0.5)
+    )
+
+    def holds(self) -> bool:
+        """Measure, in the map frame."""
+        one, two = self.get("ref_pose"), self.get("target_pose")
+        one, two = (pose and self.context.in_map(pose) for pose in (one, two))
+        if one is None or two is None:
+            return False
+        return pose2_from_pose(one.pose).distance(pose2_from_pose(two.pose)) <= float(self.get("tolerance"))
+
+
+class DistanceTraveled(NavigatorCondition):
+    """Whether the robot is so far from where it was last time this held."""
+
+    PORTS = (*inputs(distance=("double", 1.0)), *_FRAMES)
+    _start: Pose2 | None = None
+
+    def holds(self) -> bool:
+        """Measure; begins to count at the first tick."""
+        pose = self.robot()
+        if not self.status.is_active or self._start is None:
+            self._start = pose
+            return False
+        if pose is None or self._start.distance(pose) < self.get("distance"):
+            return False
+        self._start = pose
+        return True
+
+
+class TimeExpired(NavigatorCondition):
+    """Whether so much time has passed since this held last."""
+
+    PORTS = inputs(seconds=("double", 1.0))
+    _start = 0
+
+    def holds(self) -> bool:
+        """Look at the clock; begins to count at the first tick."""
+        now = self.context.now_ns()
+        if self.status.is_active and now - self._start < self.get("seconds") * 1e9:
+            return False
+        is_late, self._start = self.status.is_active, now
+        return is_late
+
+
+class PathExpiringTimer(NavigatorCondition):
+    """Whether a path has been the same for so long."""
+
+    PORTS = inputs(seconds=("double", 1.0), path="message")
+    _start: int | None = None
+    _path: Any = None
+
+    def holds(self) -> bool:
+        """Look at the clock; a new path sets it back."""
+        now, path = self.context.now_ns(), self.get("path")
+        if self._start is None or (path is not self._path and path != self._path):
+            self._start, self._path = now, path
+            return False
+        if now - self._start < self.get("seconds") * 1e9:
+            return False
+        self._start = now
+        return True
+
+
+class IsGoalNearby(NavigatorCondition):
+    """Whether less than so much of a path is left."""
+
+    PORTS = (
+        *inputs(path="message", proximity_threshold=("double", 1.0)),
+        *inputs(max_robot_pose_search_dist=("double", -1.0)),
+        *_FRAMES,
+    )
+    _path: Any = None
+    _nearest = 0
+
+    def holds(self) -> bool:
+        """Measure from the pose nearest to the robot."""
+        path = self.get("path") or new(Path)
+        pose = self.context.pose(path.header.frame_id or None, self.get("robot_base_frame"))
+        if not path.poses or pose is None:
+            return False
+        window = self.get("max_robot_pose_search_dist")
+        if window < 0.0 or path is not self._path:
+            self._path, self._nearest = path, 0
+        points = path_array(path)
+        reach = math.inf if window < 0.0 else window
+        self._nearest = paths.nearest(points, pose.x, pose.y, self._nearest, reach)
+        return paths.length(points, self._nearest) < float(self.get("proximity_threshold"))
+
+
+class IsWithinPathTrackingBounds(NavigatorCondition):
+    """Whether the controller tells that the robot is near its path; true while it tells nothing."""
+
+    PORTS = (
+        *inputs(max_error_left=("double", 0.5), max_error_right=("double", 0.5)),
+        *inputs(max_error_heading=("double", 3.14), tracking_feedback="message"),
+    )
+
+    def holds(self) -> bool:
+        """Look at the feedback; errors to the left are positive."""
+        feedback = self.get("tracking_feedback")
+        if feedback is None:
+            return True
+        aside = feedback.position_tracking_error
+        limit = abs(self.get("max_error_left" if aside >= 0.0 else "max_error_right"))
+        turned = abs(feedback.heading_tracking_error)
+        return bool(abs(aside) <= limit and turned <= abs(self.get("max_error_heading")))

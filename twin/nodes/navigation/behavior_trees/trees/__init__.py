@@ -1,0 +1,1 @@
+"""The trees that come with twin, in the format and with the nodes of Nav2."""

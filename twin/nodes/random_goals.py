@@ -1,0 +1,142 @@
+"""A mission that has no end in sight: drive to one random place of the map after the other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from twin.bridge.action_types import NavigateToPose
+from twin.bridge.actions import ActionClient, ClientGoal
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import OccupancyGrid, Odometry, new
+from twin.bridge.qos import LATCHED
+from twin.geometry import Array, Pose2
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.nodes.messages import pose_stamped
+from twin.nodes.mission_nodes import MissionNode
+from twin.nodes.navigation.map_server import occupancy_map
+from twin.nodes.navigation.robot_pose import RobotPose
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomGoalsConfig:
+    """What the goals are."""
+
+    distance: float
+    """The mission is done when odometry has counted so much [m]."""
+    clearance: float = 0.7
+    """Of a goal from what the map shows [m]."""
+    min_goal_distance: float = 3.0
+    """Of a goal from the robot, as the crow flies [m]."""
+    max_failed: int = 0
+    """How many goals may be given up by the navigator; one more ends the mission."""
+
+
+class RandomGoalsNode(MissionNode):
+    """`/mission`: takes the map from `map`, counts metres on `odom`, sends goals to `navigate_to_pose`."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        robot_pose: RobotPose,
+        config: RandomGoalsConfig,
+        *,
+        seed: int,
+        period_ns: int = 100_000_000,
+        namespace: str = "",
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        self._config = config
+        self._robot_pose = robot_pose
+        self._random = np.random.Generator(np.random.Philox(seed))
+        self._map: OccupancyMap | None = None
+        self._places: Array | None = None
+        self._goal: ClientGoal | None = None
+        self._at: tuple[float, float] | None = None
+        self.driven = 0.0
+        """By odometry, so far [m]."""
+        self.reached = 0
+        """Goals so far."""
+        self.failed = 0
+        """Goals so far that the navigator gave up."""
+        self._navigate = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
+        self.node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
+        self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        self.node.create_timer(period_ns, self._tick)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        self._map = occupancy_map(message)
+        self._places = None
+
+    def _on_odom(self, message: Odometry) -> None:
+        position = message.pose.pose.position
+        if self._at is not None:
+            self.driven += math.hypot(position.x - self._at[0], position.y - self._at[1])
+        self._at = position.x, position.y
+
+    def _tick(self) -> None:
+        robot = self._robot_pose.in_map()
+        if self.done or robot is None or self._map is None:
+            return
+        if self._goal is not None and not self._settle(self._goal):
+            return
+        if self.driven >= self._config.distance:
+            self.finish(succeeded=True)
+            return
+        if self._places is None:
+            self._places = open_places(self._map, robot, self._config.clearance)
+        goal = self._draw(robot)
+        if goal is None:
+            self.note("the map has no free place that far away from the robot")
+            self.finish(succeeded=False)
+            return
+        self.enter(f"goal {self.reached + self.failed + 1}: ({goal.x:.2f}, {goal.y:.2f})")
+        target = pose_stamped(goal, self._robot_pose.frames.map, self.node.now_ns)
+        self._goal = self._navigate.send_goal(new(NavigateToPose.Goal, pose=target))
+
+    def _settle(self, goal: ClientGoal) -> bool:
+        """Return whether the next goal may be drawn."""
+        if goal.accepted is not False and not goal.done:
+            return False
+        self._goal = None
+        if goal.succeeded:
+            self.reached += 1
+            return True
+        self.failed += 1
+        self.note(getattr(goal.result, "error_msg", "") or goal.error or "the goal was given up")
+        if self.failed > self._config.max_failed:
+            self.finish(succeeded=False)
+        return not self.done
+
+    def _draw(self, robot: Pose2) -> Pose2 | None:
+        assert self._places is not None
+        away = np.hypot(self._places[:, 0] - robot.x, self._places[:, 1] - robot.y)
+        places = self._places[away >= self._config.min_goal_distance]
+        if not len(places):
+            return None
+        x, y = places[self._random.integers(len(places))].tolist()
+        return Pose2(x, y, float(self._random.uniform(-math.pi, math.pi)))
+
+
+def open_places(grid: OccupancyMap, robot: Pose2, clearance: float) -> Array:
+    """Return the centres, shape (n, 2) [m], of free cells with clearance that are connected to the robot.
+
+    Args:
+        grid: The map.
+        robot: Where it is on it.
+        clearance: From everything that is not free [m].
+    """
+    free = np.pad(grid.data == 0, 1)  # beyond the map nothing is known to be free
+    to_centres = ndimage.distance_transform_edt(free)[1:-1, 1:-1]
+    room = (to_centres - 0.5) * grid.resolution >= clearance
+    label, _ = ndimage.label(room)
+    cells = np.argwhere(room)[:, ::-1]
+    if not len(cells):
+        return np.zeros((0, 2))
+    centres = grid.cell_to_world(cells)
+    nearest = int(np.argmin(np.hypot(centres[:, 0] - robot.x, centres[:, 1] - robot.y)))
+    mine = label[cells[nearest, 1], cells[nearest, 0]]
+    return centres[label[room] == mine]

@@ -1,0 +1,45 @@
+"""What checks of maps need to know of the world: the truth at the height of a robot's lidar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from twin.models.kinematics import link_poses
+from twin.models.shapes import Box
+from twin.models.specs import LidarSpec
+from twin.navigation.costmaps.footprint import radii
+from twin.runtime.robot_stack import RobotStack
+from twin.scenario.observation import Surroundings
+from twin.sim.scene import Scene
+from twin.warehouse.footprint import Rectangle
+
+_SCAN = "scan"
+"""The topic of the lidar that maps are made from."""
+
+
+def surroundings(scene: Scene, stack: RobotStack) -> Surroundings:
+    """Return the truth for one robot; a robot without a lidar on `scan` sees nothing.
+
+    Args:
+        scene: What never moves in it counts.
+        stack: The robot.
+    """
+    description = stack.handle.description
+    lidars = [s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == _SCAN]
+    solids: tuple[Rectangle, ...] = ()
+    if lidars:
+        T_root_lidar = link_poses(description)[lidars[0].link]
+        solids = tuple(_sections(scene, stack.spawn_height + float(T_root_lidar.xyz[2])))
+    radius = radii(stack.footprint)[0] if len(stack.footprint) > 2 else 0.0
+    return Surroundings(solids=solids, start=stack.start, radius=radius)
+
+
+def _sections(scene: Scene, height: float) -> Iterator[Rectangle]:
+    """Yield the sections of what stands still with the plane z = `height` [m]."""
+    for body in scene.statics:
+        for shape in body.shapes:
+            if not shape.solid or not isinstance(shape.geometry, Box):
+                continue
+            pose = body.T_world_body @ shape.T_body_geometry
+            if abs(height - pose.xyz[2]) <= shape.geometry.size[2] / 2.0:
+                yield Rectangle(pose.to_pose2(), shape.geometry.size[0], shape.geometry.size[1])

@@ -1,0 +1,144 @@
+"""Checks on a map that a robot makes: its walls are where the true ones are, and nothing is missing."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+from pydantic import model_validator
+from scipy.spatial import cKDTree
+
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.map_truth import FREE_TO, MapTruth, wall_cells
+from twin.scenario.fields import Fraction, Positive
+from twin.scenario.observation import CheckContext, Observation
+from twin.strict_yaml import Metres
+
+
+class MapAccuracyConfig(RobotCheckConfig):
+    """The walls of the map are where the true ones are, seen from the centres of the map's occupied cells."""
+
+    mean: Annotated[Metres, Positive] | None = None
+    """Largest mean distance to the nearest true surface [m]."""
+    p95: Annotated[Metres, Positive] | None = None
+    """Largest distance of 95 % of the cells [m]."""
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> MapAccuracyConfig:
+        if self.mean is None and self.p95 is None:
+            raise ValueError("must have at least one of the keys mean, p95")
+        return self
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return MapAccuracy(self.label(kind), self, context, context.robot(self.robot))
+
+
+class MapCoverageConfig(RobotCheckConfig):
+    """Nothing is missing on the map of what the robot can get to."""
+
+    floor: Annotated[float, Fraction] | None = None
+    """Least part of the floor that the robot can cover that is free on the map."""
+    walls: Annotated[float, Fraction] | None = None
+    """Least part of the surfaces beside that floor that have an occupied cell within `within`."""
+    within: Annotated[Metres, Positive] = 0.1
+    """Distance from a true surface to the nearest occupied cell [m]."""
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> MapCoverageConfig:
+        if self.floor is None and self.walls is None:
+            raise ValueError("must have at least one of the keys floor, walls")
+        return self
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return MapCoverage(self.label(kind), self, context, context.robot(self.robot))
+
+
+class _MapCheck(Check):
+    """Keeps the last map, and holds it against the truth at the end."""
+
+    unit = ""
+
+    def __init__(self, name: str, context: CheckContext, robot: str) -> None:
+        super().__init__(name)
+        self._surroundings, self._robot = context.surroundings.get(robot), robot
+        self._map: OccupancyMap | None = None
+        self._at_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one observation."""
+        self._at_s = observation.time_s
+        self._map = observation.robots[self._robot].map
+
+    @abstractmethod
+    def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
+        """Yield what was measured: its text, value and limit, and whether it passed; the worst one last."""
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far; the value is the first measure that fails, else the last one."""
+        value: float | None = None
+        limit: float | None = None
+        if self._surroundings is None or not self._surroundings.solids:
+            reason = "there is nothing that a lidar could see"
+        elif self._map is None:
+            reason = f"{self._robot} made no map"
+        else:
+            measures = list(self._measures(self._map, MapTruth(self._surroundings)))
+            failed = [measure for measure in measures if not measure[3]]
+            text, value, limit, passed = (failed or measures)[0 if failed else -1]
+            reason = "" if passed else text
+        return CheckResult(
+            name=self.name,
+            passed=not reason,
+            value=value,
+            limit=limit,
+            unit=self.unit,
+            at_s=self._at_s,
+            reason=reason,
+        )
+
+
+class MapAccuracy(_MapCheck):
+    """Measures distances from occupied cells to true surfaces."""
+
+    unit = "m"
+
+    def __init__(self, name: str, config: MapAccuracyConfig, context: CheckContext, robot: str) -> None:
+        super().__init__(name, context, robot)
+        self._config = config
+
+    def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
+        distances = truth.distances(wall_cells(grid))
+        mean, p95 = math.inf, math.inf
+        if distances.size:
+            mean, p95 = float(distances.mean()), float(np.percentile(distances, 95.0))
+        found = f"of {distances.size} occupied cells: mean {mean:.3f} m, 95 % within {p95:.3f} m"
+        for value, limit in ((mean, self._config.mean), (p95, self._config.p95)):
+            if limit is not None:
+                yield found, value, limit, value <= limit
+
+
+class MapCoverage(_MapCheck):
+    """Measures which part of the reachable floor and of its walls is on the map."""
+
+    def __init__(self, name: str, config: MapCoverageConfig, context: CheckContext, robot: str) -> None:
+        super().__init__(name, context, robot)
+        self._config = config
+
+    def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
+        config = self._config
+        if config.walls is not None:
+            cells, points = wall_cells(grid), truth.wall_points
+            share = 0.0
+            if len(cells) and len(points):
+                share = float((cKDTree(cells).query(points)[0] <= config.within).mean())
+            yield f"{share:.1%} of the walls are on the map", share, config.walls, share >= config.walls
+        if config.floor is not None:
+            values = grid.value_at(truth.floor_points)
+            share = float(((values >= 0) & (values <= FREE_TO)).mean()) if values.size else 0.0
+            yield f"{share:.1%} of the floor is free on the map", share, config.floor, share >= config.floor
