@@ -49,6 +49,7 @@ NOT_RUN = {
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
+    r"twin bench barn \.\./shared/\S+ .*": "needs data that is not in the repository: tests/benchmarks_ has small worlds",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""
