@@ -155,6 +155,8 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
             "cost_scaling_dist": 0.6,
             "cost_scaling_gain": 1.0,
             "turn_before_collision": True,
+            "required_movement_radius": 0.2,
+            "movement_time_allowance": 2.5,
             "rotate_to_heading_min_angle": 1.2,
             "rotate_to_heading_angular_vel": 2.0,
             "max_angular_accel": 6.0,
