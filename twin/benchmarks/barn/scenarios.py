@@ -125,7 +125,7 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
         "global_costmap": {
             "rolling_window": True,
             "resolution": 0.04,
-            "robot_radius": 0.29,
+            "robot_radius": 0.27,
             "width": 10.0,
             "height": 22.0,
             "inflation_radius": 0.8,
