@@ -30,6 +30,7 @@ from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingConfig
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.build import build
 from twin.scenario.schema import json_schema, load
 from twin.warehouse.arena_file import ArenaFile
@@ -213,6 +214,7 @@ PARAMETERS: Mapping[str, type[Any]] = {
     "/controller_server, progress checker": ProgressCheckerConfig,
     "/behavior_server": BehaviorConfig,
     "/bt_navigator": BtNavigatorConfig,
+    "/waypoint_follower": WaypointFollowerConfig,
     "/docking_server": DockingConfig,
     "/docking_server, sights of the dock": DockEstimateConfig,
 }
@@ -255,7 +257,7 @@ def _parameters() -> str:
     alive = gc.get_objects()
     lines = []
     for title, kind in PARAMETERS.items():
-        (config,) = [item for item in alive if type(item) is kind]
+        config = next(item for item in alive if type(item) is kind)  # the first made is the configured one
         lines += _table(title, config, skip=())
     costmaps = {item.name: item.layers for item in alive if type(item) is CostmapNodeConfig}
     for name, layers in sorted(costmaps.items()):

@@ -45,6 +45,8 @@ class DiffDriveNodeConfig:
     use_imu: bool = False
     """Whether odometry takes its heading from the gyroscope (`odometry.use_imu` of turtlebot3_node)."""
     imu_topic: str = "imu"
+    enable_odom_tf: bool = True
+    """Whether odom → base is published; not where a filter does."""
 
 
 class DiffDriveControllerNode:
@@ -129,9 +131,10 @@ class DiffDriveControllerNode:
                 ),
             )
         )
-        self._tf.send_transform(
-            transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
-        )
+        if self.config.enable_odom_tf:
+            self._tf.send_transform(
+                transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
+            )
 
 
 _UNUSED_AXIS = 1e6

@@ -129,5 +129,53 @@ def _with(config: Any, path: tuple[str, ...], value: Any) -> Any:
     return dataclasses.replace(config, **{head: inner})
 
 
+def overlay(
+    config: C, values: Mapping[str, Any], names: Mapping[str, str] = _NO_NAMES
+) -> tuple[C, dict[str, str]]:
+    """Return a config with values by parameter name, and why some of them were not taken.
+
+    Args:
+        config: A frozen dataclass, as for `declare_config`.
+        values: Parameter name -> value; those that the config does not have are left alone.
+        names: As for `declare_config`.
+    """
+    found = {unit.name: (path, unit, value) for path, unit, value in _fields(config, names)}
+    refused: dict[str, str] = {}
+    for name, value in values.items():
+        if name not in found:
+            continue
+        path, unit, old = found[name]
+        try:
+            following = _with(config, path, unit.read(_as(value, unit.tell(old))))
+        except (ValueError, ZeroDivisionError) as error:
+            refused[name] = str(error) if isinstance(error, ValueError) else "must be more than zero"
+        else:
+            config = following
+    return config, refused
+
+
+def parameter_names(config: Any, names: Mapping[str, str] = _NO_NAMES) -> tuple[str, ...]:
+    """Return the names of a config's parameters, as `declare_config` declares them."""
+    return tuple(unit.name for _, unit, _ in _fields(config, names))
+
+
+def _as(value: Any, old: Any) -> Any:
+    """Return a value as the type of the one that it replaces; a whole number is a double too."""
+    if type(old) is float and type(value) is int:
+        return float(value)
+    if isinstance(old, list) and isinstance(value, list) and value:
+        return [_as(item, old[0]) for item in value]
+    if type(value) is not type(old):
+        meant = {
+            bool: "true or false",
+            int: "a whole number",
+            float: "a number",
+            str: "a text",
+            list: "a list",
+        }
+        raise ValueError(f"must be {meant[type(old)]}, not {value!r}")
+    return value
+
+
 def _part(config: Any, name: str) -> Any:
     return config[name] if isinstance(config, Mapping) else getattr(config, name)

@@ -19,6 +19,7 @@ from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.runtime.overrides import overridden as overridden
 from twin.scenario.navigation import NavigationConfig
@@ -43,6 +44,7 @@ class NavigationParameters:
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
     navigator: BtNavigatorConfig
+    waypoints: WaypointFollowerConfig
 
 
 def navigation_parameters(
@@ -99,6 +101,7 @@ def navigation_parameters(
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=_navigator(config.navigator.overrides()),
+        waypoints=WaypointFollowerConfig(),
     )
 
 

@@ -35,7 +35,7 @@ def _scalar_text(value: object) -> object:
 
 def _beside_the_file(value: str, info: ValidationInfo) -> str:
     folder = (info.context or {}).get("folder")
-    is_path = "/" in value or value.endswith((".yaml", ".urdf", ".xacro"))
+    is_path = "/" in value or value.endswith((".yaml", ".urdf", ".xacro", ".xml"))
     return str(folder / value) if is_path and folder is not None else value
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
@@ -56,8 +57,10 @@ class CostmapParameters(ParameterGroup):
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
-    default_nav_to_pose_bt_xml: str | None = None
-    """Behaviour tree of goals that name none: a shipped one by name, or a path."""
+    default_nav_to_pose_bt_xml: NameOrPath | None = None
+    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
+    default_nav_through_poses_bt_xml: NameOrPath | None = None
+    """The same for goals through poses."""
     bt_loop_frequency: Annotated[Hertz, Positive] | None = None
     """Rate of the tree's ticks [Hz]."""
 
@@ -75,6 +78,10 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother when braking [m/s²]."""
     max_angular_acceleration: Annotated[float, Positive] | None = None
     """Limit of the velocity smoother, also when braking [rad/s²]."""
+    collision_monitor: CollisionMonitorParameters | None = None
+    """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
+    params_file: NameOrPath | None = None
+    """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
     """Overrides of the navigator."""
     keepout_mask: NameOrPath | None = None

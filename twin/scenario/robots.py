@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from twin.scenario.fields import ArgumentText, NameOrPath, NotNegative, PoseConfig, RosName
-from twin.scenario.localisation import Localisation
+from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
 from twin.strict_yaml import Fault, Faults, Seconds, StrictModel
 
@@ -30,6 +30,8 @@ class RobotConfig(StrictModel):
     """`free`: moved by physics; `fixed`: bolted to the world; `kinematic`: moved by a publisher of poses."""
     command_latency: Annotated[Seconds, NotNegative] = 0.0
     """Between a command to its motors and their start [s]; a whole number of control periods."""
+    odometry: Odometry = WheelOdometry(type="wheels")
+    """Who publishes odom → base; absent: the wheels' controller."""
     localisation: Localisation | None = None
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None

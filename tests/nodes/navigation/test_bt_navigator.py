@@ -55,8 +55,10 @@ class Stack:
             local,
             np.array(FOOTPRINT),
             ControllerServerConfig(
-                controller=RegulatedPurePursuitConfig(xy_goal_tolerance=0.05),
-                goal_checker=GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.1),
+                controllers={"FollowPath": RegulatedPurePursuitConfig(xy_goal_tolerance=0.05)},
+                goal_checkers={
+                    "general_goal_checker": GoalCheckerConfig(xy_goal_tolerance=0.05, yaw_goal_tolerance=0.1)
+                },
             ),
         )
         BehaviorServerNode(bus, pose, BehaviorConfig(footprint=FOOTPRINT), costmap=local)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,8 +18,11 @@ from twin.navigation.costmaps.costmap import (
     Costmap,
 )
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.costmaps.kernels import steps_to_collision
+from twin.navigation.costmaps.kernels import escapes, outline_hits, steps_to_collision
 from twin.navigation.failures import NoValidControl
+
+_ESCAPE_TURN = 0.5
+"""Rate at which the robot turns away from what it nearly touches [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,11 +208,11 @@ class RegulatedPurePursuit:
         self._stopped = self._cancelling and v == 0.0
         if costmap is None or not config.use_collision_detection:
             return v, w
-        commands = [(v, w)]
         if config.turn_before_collision and v > 0.0:
-            commands.append((0.0, self._rotate(bearing, velocity[1], dt)))
-            commands.append((config.creep_speed, w * config.creep_speed / v))
-        return self._first_free(commands, costmap_pose or pose, distance, costmap)
+            turn = self._rotate(bearing, velocity[1], dt)
+            return self._first_free(v, w, turn, costmap_pose or pose, distance, costmap)
+        self._check(costmap_pose or pose, v, w, distance, costmap)
+        return v, w
 
     def _curvature_point(self, local: Array) -> tuple[float, float]:
         """Return the point that curvature is taken at; beyond the goal, if that is asked for."""
@@ -258,21 +262,28 @@ class RegulatedPurePursuit:
         return min(v, limit)
 
     def _first_free(
-        self, commands: list[tuple[float, float]], pose: Pose2, carrot_dist: float, costmap: Costmap
+        self, v: float, w: float, turn: float, pose: Pose2, carrot_dist: float, costmap: Costmap
     ) -> tuple[float, float]:
-        """Return the first command that does not collide; raises NoValidControl if all do."""
-        blocked: NoValidControl | None = None
-        for v, w in commands:
-            if blocked is not None and abs(v) < 0.01 and abs(w) < 0.05:
-                continue  # standing still leads nowhere
-            try:
-                self._check(pose, v, w, carrot_dist, costmap)
-            except NoValidControl as failure:
-                blocked = blocked or failure
-            else:
-                return v, w
-        assert blocked is not None
-        raise blocked
+        """Return the command, or what may be done instead of it; raises NoValidControl if nothing may."""
+        creep = self.config.creep_speed
+        try:
+            self._check(pose, v, w, carrot_dist, costmap)
+        except NoValidControl:
+            at = float(pose.x), float(pose.y), float(pose.yaw)
+            if outline_hits(costmap.costs, self.footprint, *at, *costmap.frame):
+                ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
+                for way in ways:
+                    if escapes(costmap.costs, self.footprint, *at, *way, 0.05, 10, *costmap.frame):
+                        return way
+                raise
+            for way in ((0.0, turn), (creep, w * creep / v)):
+                if abs(way[0]) < 0.01 and abs(way[1]) < 0.05:
+                    continue  # standing still leads nowhere
+                with suppress(NoValidControl):
+                    self._check(pose, *way, carrot_dist, costmap)
+                    return way
+            raise
+        return v, w
 
     def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
         """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""

@@ -1,0 +1,198 @@
+"""Nav2's parameter files: what is taken, what is told, what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from twin.controllers.limiter import AxisLimits
+from twin.errors import NavigationError
+from twin.models.specs import DriveSpec
+from twin.navigation.costmaps.footprint import rectangle
+from twin.nodes.navigation.robot_pose import Frames
+from twin.runtime.nav2_parameters import with_file, with_plugins
+from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.scenario.navigation import NavigationConfig
+
+FILE = """\
+/**:
+  ros__parameters:
+    use_sim_time: true
+    log_level: info
+amcl:
+  ros__parameters:
+    alpha1: 0.2
+bt_navigator:
+  ros__parameters:
+    bt_loop_duration: 20
+    error_code_names: [compute_path_error_code, follow_path_error_code]
+controller_server:
+  ros__parameters:
+    controller_frequency: 25.0
+    min_x_velocity_threshold: 0.001
+    costmap_update_timeout: 0.3
+    goal_checker_plugins: ["precise"]
+    controller_plugins: ["FollowPath"]
+    progress_checker:
+      plugin: "nav2_controller::SimpleProgressChecker"
+      movement_time_allowance: 7
+    precise:
+      plugin: "nav2_controller::SimpleGoalChecker"
+      xy_goal_tolerance: 0.11
+    FollowPath:
+      plugin: "{plugin}"
+      lookahead_dist: 0.55
+local_costmap:
+  local_costmap:
+    ros__parameters:
+      update_frequency: 4.0
+      width: 3
+      plugins: ["voxel_layer", "inflation_layer"]
+      inflation_layer:
+        plugin: "nav2_costmap_2d::InflationLayer"
+        inflation_radius: 0.66
+      voxel_layer:
+        scan:
+          obstacle_max_range: 2.4
+planner_server:
+  ros__parameters:
+    planner_plugins: ["Smac"]
+    Smac:
+      plugin: "nav2_smac_planner::SmacPlanner2D"
+      tolerance: 0.3
+velocity_smoother:
+  ros__parameters:
+    max_velocity: [0.4, 0.0, 1.3]
+    max_decel: [-1.1, 0.0, -3.3]
+waypoint_follower:
+  ros__parameters:
+    stop_on_failure: false
+    wait_at_waypoint: {{waypoint_pause_duration: 300}}
+"""
+RPP = "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+
+
+def applied(
+    tmp_path: Path, text: str, config: dict[str, object] | None = None, namespace: str = ""
+) -> tuple[NavigationParameters, list[str]]:
+    file = tmp_path / "nav2.yaml"
+    file.write_text(text)
+    scenario = NavigationConfig.model_validate({"params_file": str(file), **(config or {})})
+    drive = DriveSpec(
+        kind="diff_drive",
+        left_joints=("left",),
+        right_joints=("right",),
+        wheel_separation=0.3,
+        wheel_radius=0.05,
+    )
+    scenario = with_plugins(scenario, namespace)
+    before = navigation_parameters(scenario, drive, rectangle(0.3, 0.3), Frames())
+    return with_file(before, scenario, namespace)
+
+
+def _controller(got: NavigationParameters) -> Any:
+    return got.controller_server.controllers["FollowPath"]
+
+
+def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
+    got, told = applied(tmp_path, FILE.format(plugin=RPP))
+    assert got.navigator.bt_loop_duration == 20
+    assert got.navigator.error_code_name_prefixes == ("compute_path", "follow_path")
+    assert got.controller_server.controller_period_ns == 40_000_000
+    assert _controller(got).lookahead_dist == 0.55
+    assert got.controller_server.goal_checkers["general_goal_checker"].xy_goal_tolerance == 0.11, (
+        "whatever the plugin is called"
+    )
+    assert got.controller_server.progress_checkers["progress_checker"].movement_time_allowance == 7.0
+    assert got.local_costmap.update_period_ns == 250_000_000
+    assert got.local_costmap.layers.width == 3.0
+    assert got.local_costmap.layers.inflation_radius == 0.66
+    assert got.local_costmap.layers.obstacle_max_range == 2.4
+    assert got.planner.tolerance == 0.3
+    assert got.smoother.linear == AxisLimits(max_velocity=0.4, max_acceleration=0.8, max_deceleration=1.1)
+    assert got.smoother.angular.max_velocity == 1.3
+    assert not got.waypoints.stop_on_failure
+    assert got.waypoints.wait_at_waypoint.waypoint_pause_duration == 300
+    assert told == [
+        "nav2.yaml: controller_server does not have costmap_update_timeout",
+        "nav2.yaml: not read for amcl",
+    ]
+
+
+def test_a_plugin_that_is_not_here_is_told_and_its_parameters_are_not_taken(tmp_path: Path) -> None:
+    got, told = applied(tmp_path, FILE.format(plugin="teb_local_planner::TebLocalPlannerROS"))
+    assert _controller(got).lookahead_dist != 0.55
+    assert "does not have teb_local_planner::TebLocalPlannerROS (FollowPath.*)" in "\n".join(told)
+
+
+def test_the_file_chooses_controller_and_planner(tmp_path: Path) -> None:
+    text = """\
+controller_server:
+  ros__parameters:
+    FollowPath:
+      plugin: nav2_rotation_shim_controller::RotationShimController
+      primary_controller: nav2_mppi_controller::MPPIController
+      batch_size: 321
+planner_server:
+  ros__parameters:
+    GridBased: {plugin: nav2_navfn_planner/NavfnPlanner, tolerance: 0.3}
+    planner_plugins: [GridBased]
+"""
+    got, _ = applied(tmp_path, text.replace("nav2_navfn_planner/", "nav2_navfn_planner::"))
+    assert type(_controller(got).primary_controller).__name__ == "MPPIConfig"
+    assert _controller(got).primary_controller.batch_size == 321
+    assert type(got.planner).__name__ == "PlannerConfig"
+    assert got.planner.tolerance == 0.3
+    got, _ = applied(tmp_path, text, {"controller": {"plugin": "dwb"}})
+    assert type(_controller(got).primary_controller).__name__ == "DWBConfig", "the scenario goes before it"
+
+
+def test_what_the_scenario_gives_goes_before_the_file(tmp_path: Path) -> None:
+    config: dict[str, object] = {
+        "max_linear_speed": "0.3 m/s",
+        "controller": {"lookahead_dist": "0.9 m"},
+        "planner": {"tolerance": "0.05 m"},
+    }
+    got, _ = applied(tmp_path, FILE.format(plugin=RPP), config)
+    assert got.smoother.linear.max_velocity == 0.3
+    assert _controller(got).lookahead_dist == 0.9
+    assert got.planner.tolerance == 0.05
+
+
+def test_a_robot_in_a_namespace_finds_its_own(tmp_path: Path) -> None:
+    text = "planner_server: {ros__parameters: {GridBased: {tolerance: 0.3}}}\n"
+    text += "two: {planner_server: {ros__parameters: {GridBased: {tolerance: 0.4}}}}\n"
+    assert applied(tmp_path, text, namespace="/one")[0].planner.tolerance == 0.3
+    assert applied(tmp_path, text, namespace="/two")[0].planner.tolerance == 0.4
+
+
+def test_mistakes_are_told_all_at_once_with_their_lines(tmp_path: Path) -> None:
+    text = """\
+planner_server:
+  ros__parameters:
+    GridBased:
+      tolerence: 0.5
+      allow_unknown: maybe
+controller_server:
+  ros__parameters:
+    controller_frequency: 0.0
+    FollowPath:
+      lookahead_dist: far
+"""
+    with pytest.raises(NavigationError) as caught:
+        applied(tmp_path, text)
+    said = str(caught.value)
+    assert (
+        "nav2.yaml:4: planner_server has no parameter GridBased.tolerence; did you mean 'tolerance'?" in said
+    )
+    assert "nav2.yaml:5: planner_server: GridBased.allow_unknown must be true or false, not 'maybe'" in said
+    assert "nav2.yaml:8: controller_server: controller_frequency must be more than zero" in said
+    assert "nav2.yaml:10: controller_server: FollowPath.lookahead_dist must be a number, not 'far'" in said
+
+
+@pytest.mark.parametrize(("text", "words"), [("- a", "no mapping"), ("a: [", "no YAML")])
+def test_a_file_that_is_none(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(NavigationError, match=words):
+        applied(tmp_path, text)
