@@ -257,7 +257,9 @@ def _parameters() -> str:
     alive = gc.get_objects()
     lines = []
     for title, kind in PARAMETERS.items():
-        config = next(item for item in alive if type(item) is kind)  # the first made is the configured one
+        found = [item for item in alive if type(item) is kind]
+        # Defaults of dataclass fields are alive, too; what the robot has is another one, or the same.
+        config = next((item for item in found if item != kind()), found[0])
         lines += _table(title, config, skip=())
     costmaps = {item.name: item.layers for item in alive if type(item) is CostmapNodeConfig}
     for name, layers in sorted(costmaps.items()):
