@@ -31,6 +31,7 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a
 	$(BIN)/python -m tests.benchmarks.run_cost
 	$(BIN)/python -m tests.benchmarks.cdr_cost
 	$(BIN)/python -m tests.benchmarks.lockstep_cost
+	$(BIN)/python -m tests.benchmarks.tracking
 
 oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
