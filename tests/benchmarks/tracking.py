@@ -1,7 +1,7 @@
-"""How well each controller follows a planned path, and what a command costs, as a ratio to regulated pure pursuit.
+"""How well each controller follows a planned path, and what a command costs next to regulated pure pursuit's.
 
-`make bench` prints it. A unicycle with the warehouse robot's limits and a lag of 0.1 s drives through a hall of
-walls and pillars; every controller has the parameters of the runtime. CPU times are ratios within one run.
+`make bench` prints it. A unicycle with the warehouse robot's limits and a lag of 0.1 s drives through a hall
+of walls and pillars; every controller has the parameters of the runtime. CPU times are ratios within a run.
 """
 
 from __future__ import annotations
