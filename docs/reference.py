@@ -282,10 +282,11 @@ def _table(title: str, config: Any, skip: tuple[str, ...]) -> list[str]:
 
 
 def _field_docs(kind: type[Any]) -> dict[str, str]:
-    """Return the string below each field of a dataclass."""
+    """Return the string below each field of a dataclass, its bases' too."""
+    inherited = [_field_docs(base) for base in kind.__bases__ if dataclasses.is_dataclass(base)]
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
     assert isinstance(body, ast.ClassDef)
-    found = {}
+    found = {name: text for base in inherited for name, text in base.items()}
     for item, following in zip(body.body, body.body[1:], strict=False):
         if isinstance(item, ast.AnnAssign) and isinstance(following, ast.Expr):
             assert isinstance(item.target, ast.Name)
