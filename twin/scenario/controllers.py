@@ -64,6 +64,8 @@ class PurePursuitParameters(ParameterGroup):
     """But not below this [m/s]."""
     max_allowed_time_to_collision_up_to_carrot: Annotated[Seconds, Positive] | None = None
     """How far ahead a command is checked for collisions [s]."""
+    turn_before_collision: bool | None = None
+    """Whether, where the arc ahead is blocked, the robot turns in place or creeps before following fails."""
     use_collision_detection: bool | None = None
     """Whether commands are checked for collisions."""
     cost_scaling_dist: Annotated[Metres, Positive] | None = None
