@@ -87,7 +87,14 @@ def build(
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
         ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)
-        placements.append(RobotPlacement(name=robot.id, conversion=conversion, pose=starts[robot.id]))
+        placements.append(
+            RobotPlacement(
+                name=robot.id,
+                conversion=conversion,
+                pose=starts[robot.id],
+                command_latency=robot.command_latency,
+            )
+        )
     scene = _scene(scenario, _as_it_is(scenario, arena))
     maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
     world = World.compose(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.planning.commitment import CommitmentConfig
 from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
@@ -40,6 +42,7 @@ class NavigationParameters:
     local_costmap: CostmapNodeConfig
     planner: PlannerPluginConfig
     planner_server: PlannerServerConfig
+    commitment: CommitmentConfig
     controller_server: ControllerServerConfig
     behaviors: BehaviorConfig
     navigator: BtNavigatorConfig
@@ -85,8 +88,16 @@ def navigation_parameters(
         expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
     )
     smoother = VelocitySmootherConfig(
-        linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-        angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+        linear=AxisLimits(
+            max_velocity=linear,
+            max_acceleration=config.max_linear_acceleration or 0.8,
+            max_deceleration=config.max_linear_deceleration or 1.2,
+        ),
+        angular=AxisLimits(
+            max_velocity=angular,
+            max_acceleration=config.max_angular_acceleration or 2.0,
+            max_deceleration=config.max_angular_acceleration or 3.0,
+        ),
     )
     return NavigationParameters(
         smoother=smoother,
@@ -102,10 +113,20 @@ def navigation_parameters(
             PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
+        commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
-        navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
+        navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
+    )
+
+
+def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
+    defaults = BtNavigatorConfig()
+    frequency = overrides.get("bt_loop_frequency")
+    return replace(
+        overridden(defaults, overrides),
+        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
     )
 
 
@@ -116,7 +137,9 @@ def _costmap(
     return CostmapNodeConfig(
         name=name,
         frame=frame,
-        layers=overridden(layers, overrides),
+        layers=overridden(
+            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
+        ),
         range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )

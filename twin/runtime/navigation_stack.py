@@ -63,6 +63,7 @@ def build_navigation(
         global_costmap,
         config=parameters.planner,
         server=parameters.planner_server,
+        commitment=parameters.commitment,
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, namespace=namespace)

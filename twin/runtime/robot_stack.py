@@ -81,6 +81,7 @@ class RobotStack:
                 odom_frame=self.frames.odom,
                 base_frame=self.frames.base,
                 period_ns=context.control_period_ns,
+                use_imu=getattr(context.config.localisation, "use_imu", False),
                 enable_odom_tf=context.config.odometry.type == "wheels",
             ),
             namespace=context.namespace,

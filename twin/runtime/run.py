@@ -169,6 +169,7 @@ def run(
     bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
+    watch: Callable[[Run], bool] | None = None,
 ) -> Verdict:
     """Run a scenario to its verdict.
 
@@ -185,6 +186,7 @@ def run(
         bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
+        watch: Called after each tick; the run ends when it returns True.
 
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
@@ -214,7 +216,7 @@ def run(
         if sink is not None:
             sink.declare(parts.world)
         warm_up()
-        wall, cpu = _loop(simulation, pace, progress)
+        wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if out is not None:
             save_maps(parts.stacks, out)
@@ -244,7 +246,10 @@ def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
 
 
 def _loop(
-    simulation: Run, pace: float | None, progress: Callable[[Progress], None] | None
+    simulation: Run,
+    pace: float | None,
+    progress: Callable[[Progress], None] | None,
+    watch: Callable[[Run], bool] | None,
 ) -> tuple[float, float]:
     """Tick to the end; return the wall and CPU time it took [s]. Pacing is the only use of the wall clock."""
     gc.freeze()  # the model and the types stay; collections look only at what ticks make
@@ -252,6 +257,8 @@ def _loop(
     shown = wall
     while not simulation.over:
         simulation.tick()
+        if watch is not None and watch(simulation):
+            break
         now = time.perf_counter()
         simulated = simulation.world.time_ns * 1e-9
         if pace is not None and (ahead := simulated / pace - (now - wall)) > 0.0:

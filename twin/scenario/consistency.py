@@ -67,6 +67,9 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, VelocityProfile):
         for i, step in enumerate(mission.steps):
             periods.append((("mission", "steps", i, "duration"), "the duration of the step", step.duration))
+    for i, robot in enumerate(scenario.robots):
+        latency = robot.command_latency
+        periods.append((("robots", i, "command_latency"), "the latency of commands", latency))
     for loc, what, period in periods:
         if nanoseconds(period) % max(1, nanoseconds(control)):
             yield Fault(loc, f"{what} {_whole(period, 'control periods', control)}")

@@ -25,6 +25,8 @@ class RobotPlacement:
     conversion: Conversion
     pose: Pose2 | Pose3
     """Of the root link in the world; a Pose2 stands the robot on the floor."""
+    command_latency: float = 0.0
+    """Between a command to its actuators and their start [s]."""
 
     @property
     def T_world_root(self) -> Pose3:

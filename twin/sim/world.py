@@ -227,7 +227,14 @@ class World:
             create_sensor(spec, Mount(world=self, robot=name, link=spec.link, source=description.source))
             for spec in description.sensors
         )
-        hardware = Hardware(self.model, self.data, robot=name, description=description, seed=self.seed)
+        hardware = Hardware(
+            self.model,
+            self.data,
+            robot=name,
+            description=description,
+            seed=self.seed,
+            command_latency=placement.command_latency,
+        )
         root = self.model.body(f"{name}/{description.root}")
         return RobotHandle(
             name=name,

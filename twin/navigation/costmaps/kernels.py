@@ -147,3 +147,67 @@ def steps_to_collision(
         y += v * dt * math.sin(yaw)
         yaw += w * dt
     return -1
+
+
+@jit
+def outline_hits(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> int:
+    """Return how many samples of a footprint's outline, every half cell, are lethal or off the map."""
+    height, width = costs.shape
+    c, s = math.cos(yaw), math.sin(yaw)
+    n = corners.shape[0]
+    hits = 0
+    for k in range(n):
+        ax = (x + c * corners[k, 0] - s * corners[k, 1] - origin_x) / resolution
+        ay = (y + s * corners[k, 0] + c * corners[k, 1] - origin_y) / resolution
+        m = (k + 1) % n
+        bx = (x + c * corners[m, 0] - s * corners[m, 1] - origin_x) / resolution
+        by = (y + s * corners[m, 0] + c * corners[m, 1] - origin_y) / resolution
+        pieces = max(1, math.ceil(2.0 * math.hypot(bx - ax, by - ay)))
+        for i in range(pieces):
+            t = i / pieces
+            ix = math.floor(ax + t * (bx - ax))
+            iy = math.floor(ay + t * (by - ay))
+            if ix < 0 or iy < 0 or ix >= width or iy >= height or costs[iy, ix] == 254:
+                hits += 1
+    return hits
+
+
+@jit
+def escapes(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    v: float,
+    w: float,
+    dt: float,
+    steps: int,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> bool:
+    """Return whether a motion leads out of an obstacle: less and less of the outline is in one.
+
+    For a robot whose present pose is a collision by the costmap, which is coarser than the world.
+    """
+    first = outline_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+    last = first
+    for _ in range(steps):
+        x += v * dt * math.cos(yaw)
+        y += v * dt * math.sin(yaw)
+        yaw += w * dt
+        hits = outline_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        if hits > last:
+            return False
+        last = hits
+    return last < first

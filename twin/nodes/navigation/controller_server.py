@@ -119,6 +119,8 @@ class ControllerServerNode:
             node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
+        self._preempted: _Task | None = None
+        """What the next goal goes on from, if it comes before this one is over."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
@@ -157,6 +159,12 @@ class ControllerServerNode:
         finished = stop = False
         try:
             task = self._task(handle.request)
+            if self._preempted is not None:
+                # A path that is planned anew all the time is no news about progress, nor about valid control.
+                task.last_valid_ns = self._preempted.last_valid_ns
+                if task.progress_checker == self._preempted.progress_checker:  # of the same parameters
+                    task.progress_checker = self._preempted.progress_checker
+            self._preempted = task
             due = self.node.now_ns
             while True:
                 if handle.is_cancel_requested and task.controller.cancel():
@@ -178,6 +186,7 @@ class ControllerServerNode:
             if stop:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
             if finished:
+                self._preempted = None
                 for controller in self.controllers.values():
                     controller.reset()
 

@@ -19,9 +19,16 @@ from twin.navigation.control.mppi import kernels
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.noise import NoiseBank
+from twin.navigation.control.mppi.path_critics import (
+    follow_target,
+    score_align,
+    score_angle,
+    score_follow,
+)
+from twin.navigation.control.mppi.scene import Scene, free_points
 from twin.navigation.control.mppi.scoring import cost_tables, total
-from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import NoValidControl
 
 _EXACT = 2
@@ -32,23 +39,6 @@ _FILTERS = {
 }
 """Savitzky-Golay, by order."""
 _NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Scene:
-    """What one command is computed from, in metres from the costmap's corner."""
-
-    start: F32
-    """x, y, yaw, v, w."""
-    path: F32
-    """Shape (3, n)."""
-    along: F32
-    """Distance along it, shape (n) [m]."""
-    valid: np.ndarray
-    """Which of its poses are free, shape (n)."""
-    local: LocalPath
-    costmap: Costmap
-    cover: FootprintCover
 
 
 @dataclass(kw_only=True)
@@ -172,7 +162,7 @@ class MPPI:
 
     def _scene(
         self, pose: Pose2, velocity: tuple[float, float], costmap: Costmap | None, at: Pose2, dt: float
-    ) -> _Scene:
+    ) -> Scene:
         local = self._handler.local(pose)
         grid = costmap or _NO_COSTMAP
         to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw)
@@ -181,11 +171,11 @@ class MPPI:
         path = np.array([points[:, 0], points[:, 1], local.poses[:, 2] + turn], dtype=np.float32)
         step = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
         v, w = self._expected(velocity, dt)
-        return _Scene(
+        return Scene(
             start=np.array([*to_grid, v, w], dtype=np.float32),
             path=path,
             along=np.concatenate([[0.0], np.cumsum(step)]).astype(np.float32),
-            valid=_free(grid, points),
+            valid=free_points(grid, points),
             local=local,
             costmap=grid,
             cover=self._cover_for(grid),
@@ -219,7 +209,7 @@ class MPPI:
 
     # Optimization
 
-    def _optimize(self, scene: _Scene, dt: float) -> bool:
+    def _optimize(self, scene: Scene, dt: float) -> bool:
         """Improve the controls; return False if nothing is left that does not collide."""
         for _ in range(self.config.iteration_count):
             noise = self._noise.draw()
@@ -244,7 +234,7 @@ class MPPI:
                     return False
         return True
 
-    def _roll_out(self, scene: _Scene, noise: F32) -> None:
+    def _roll_out(self, scene: Scene, noise: F32) -> None:
         config, local = self.config, scene.local
         limits = self._limits
         goal, angle = config.GoalCritic, config.GoalAngleCritic
@@ -281,81 +271,22 @@ class MPPI:
             self._hit,
         )
 
-    def _score(self, scene: _Scene) -> None:
-        config, length = self.config, scene.local.length
+    def _score(self, scene: Scene) -> None:
+        config, length, raw = self.config, scene.local.length, self._raw
         stride = max(1, config.batch_size // 256)
         furthest = kernels.furthest_reached(self._state, scene.path, scene.along, stride)
+        at = follow_target(config, scene, furthest)
+        self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
         active = {
             "GoalCritic": length <= config.GoalCritic.threshold_to_consider,
             "GoalAngleCritic": length <= config.GoalAngleCritic.threshold_to_consider,
-            "PathAlignCritic": self._align(scene, furthest),
-            "PathFollowCritic": self._follow(scene, furthest),
-            "PathAngleCritic": self._angle(scene, furthest),
+            "PathAlignCritic": score_align(config, scene, furthest, self._points, raw),
+            "PathFollowCritic": score_follow(config, scene, at, self._state, raw),
+            "PathAngleCritic": score_angle(config, scene, furthest, self._state, raw),
             "PreferForwardCritic": length >= config.PreferForwardCritic.threshold_to_consider
             and not scene.local.reversing,
         }
-        total(config, self._raw, self._hit, active, self._total)
-
-    def _align(self, scene: _Scene, furthest: int) -> bool:
-        critic = self.config.PathAlignCritic
-        if (
-            not self.config.scores("PathAlignCritic")
-            or scene.local.length < critic.threshold_to_consider
-            or furthest < max(1, critic.offset_from_furthest)
-        ):
-            return False
-        blocked = np.cumsum(~scene.valid[:furthest])
-        if blocked[-1] > 2 and blocked[-1] / furthest > critic.max_path_occupancy_ratio:
-            return False
-        kernels.align_to_path(
-            self._points,
-            scene.start,
-            scene.path,
-            scene.along,
-            scene.valid,
-            furthest,
-            critic.trajectory_point_step,
-            critic.use_path_orientations,
-            self._raw,
-        )
-        return True
-
-    def _follow(self, scene: _Scene, furthest: int) -> bool:
-        critic = self.config.PathFollowCritic
-        last = len(scene.along) - 1
-        at = min(furthest + critic.offset_from_furthest, last)
-        while at < last and not scene.valid[at]:
-            at += 1
-        self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
-        if scene.local.length < critic.threshold_to_consider:
-            return False
-        x, y = scene.path[:2, at]
-        np.hypot(self._state[kernels.X] - x, self._state[kernels.Y] - y, out=self._raw[kernels.FOLLOW])
-        if at == last:
-            # Being at the end in time is not enough: the robot would put off to go there, again and again.
-            self._raw[kernels.FOLLOW] += self._raw[kernels.LAG]
-        return True
-
-    def _angle(self, scene: _Scene, furthest: int) -> bool:
-        critic = self.config.PathAngleCritic
-        if not self.config.scores("PathAngleCritic") or scene.local.length < critic.threshold_to_consider:
-            return False
-        at = min(furthest + critic.offset_from_furthest, len(scene.along) - 1)
-        x, y, path_yaw = (float(value) for value in scene.path[:, at])
-        x0, y0, yaw0 = (float(value) for value in scene.start[:3])
-        mode = critic.mode if self.config.vx_min < 0.0 or critic.mode != 1 else 0
-        if _off_heading(math.atan2(y - y0, x - x0), yaw0, path_yaw, mode) < critic.max_angle_to_furthest:
-            return False
-        yaws = self._state[kernels.YAW]
-        bearing = np.arctan2(y - self._state[kernels.Y], x - self._state[kernels.X])
-        off = np.abs(_wrapped(bearing - yaws))
-        if mode == 1:
-            off = np.minimum(off, np.float32(math.pi) - off)
-        elif mode == 2:
-            backwards = np.abs(_wrapped(bearing - np.float32(path_yaw))) > math.pi / 2.0
-            off = np.where(backwards, np.float32(math.pi) - off, off)
-        self._raw[kernels.ANGLE] = off
-        return True
+        total(config, raw, self._hit, active, self._total)
 
     # The controls
 
@@ -366,12 +297,12 @@ class MPPI:
         past = np.array(self._sent, dtype=np.float32).T
         kernels.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
 
-    def _constrain(self, scene: _Scene, dt: float) -> None:
+    def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)
         kernels.constrain(self._mean, scene.start, self._limits, np.float32(dt), model_dt)
         kernels.simulate(self._mean, self._under_way, self._delays, scene.start, model_dt, self._leads)
 
-    def _collides(self, scene: _Scene) -> bool:
+    def _collides(self, scene: Scene) -> bool:
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
         check = np.array([1, *scene.cover.costs])
         return bool(
@@ -399,29 +330,8 @@ class MPPI:
         at = np.minimum(steps + dt / self.config.model_dt, steps[-1])
         self._mean = np.stack([np.interp(at, steps, axis) for axis in self._mean]).astype(np.float32)
 
-    def _in_path_frame(self, trajectory: Array, pose: Pose2, at: Pose2, scene: _Scene) -> Array:
+    def _in_path_frame(self, trajectory: Array, pose: Pose2, at: Pose2, scene: Scene) -> Array:
         points = trajectory.copy()
         points[:, :2] = pose.apply(at.inverse().apply(points[:, :2] + scene.costmap.origin))
         points[:, 2] += pose.yaw - at.yaw
         return points
-
-
-def _free(costmap: Costmap, points: Array) -> np.ndarray:
-    """Return which points, shape (n, 2) from the corner [m], are neither inscribed nor lethal."""
-    height, width = costmap.costs.shape
-    cells = np.floor(points / costmap.resolution).astype(np.int64)
-    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-    costs = costmap.costs[np.where(inside, cells[:, 1], 0), np.where(inside, cells[:, 0], 0)]
-    return ~inside | (costs < INSCRIBED_INFLATED_OBSTACLE) | (costs == NO_INFORMATION)
-
-
-def _off_heading(bearing: float, yaw: float, path_yaw: float, mode: int) -> float:
-    """Return by how much a robot looks away from a bearing; see PathAngleCriticConfig.mode."""
-    off = abs(wrap_angle(bearing - yaw))
-    backwards = abs(wrap_angle(bearing - path_yaw)) > math.pi / 2.0
-    return min(off, math.pi - off) if mode == 1 else math.pi - off if mode == 2 and backwards else off
-
-
-def _wrapped(angles: F32) -> F32:
-    turn = np.float32(2.0 * math.pi)
-    return angles - turn * np.floor(angles / turn + np.float32(0.5))
