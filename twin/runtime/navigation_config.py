@@ -29,6 +29,8 @@ C = TypeVar("C")
 
 _GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
 _LOCAL_COSTMAP_PERIOD_NS = 200_000_000
+_MISSED_SCANS = 3.5
+"""After so many scan periods without a scan the robot stops: three in a row are missing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,13 @@ class NavigationParameters:
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
+    config: NavigationConfig,
+    drive: DriveSpec,
+    footprint: Array,
+    frames: Frames,
+    *,
+    mapping: bool = False,
+    scan_rate: float | None = None,
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -58,6 +66,7 @@ def navigation_parameters(
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
         mapping: Whether the map is made on the way: paths may lead through what is unknown.
+        scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
@@ -70,7 +79,14 @@ def navigation_parameters(
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
-    rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    rolling = replace(
+        layers,
+        rolling_window=True,
+        width=4.0,
+        height=4.0,
+        obstacle_max_range=3.0,
+        expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
+    )
     smoother = VelocitySmootherConfig(
         linear=AxisLimits(
             max_velocity=linear,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.scenario.checks.check import CheckConfig
+from twin.scenario.faults import RobotFault
 from twin.scenario.missions import (
     Behaviors,
     Explore,
@@ -28,6 +29,7 @@ def faults(scenario: Scenario) -> Iterator[Fault]:
     yield from _periods(scenario)
     yield from _arena(scenario)
     yield from _mission(scenario)
+    yield from _faults(scenario)
     yield from _checks(scenario)
 
 
@@ -97,6 +99,9 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         if entry.delivered is not None:
             yield Fault(("checks", i), f"delivered {message}")
+    for i, fault in enumerate(scenario.faults):
+        if fault.displacement is not None:
+            yield Fault(("faults", i), f"displacement {message}")
 
 
 def _mission(scenario: Scenario) -> Iterator[Fault]:
@@ -132,6 +137,21 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
                 )
 
 
+def _faults(scenario: Scenario) -> Iterator[Fault]:
+    robots = [robot.id for robot in scenario.robots]
+    for i, entry in enumerate(scenario.faults):
+        config, loc = entry.config, ("faults", i, entry.kind)
+        if not isinstance(config, RobotFault):
+            continue
+        if config.robot is None and len(robots) > 1:
+            names = ", ".join(robots)
+            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        elif config.robot is not None and config.robot not in robots:
+            yield Fault((*loc, "robot"), f"unknown robot '{config.robot}'; {nearest(config.robot, robots)}")
+        if config.at >= scenario.duration:
+            yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
+
+
 def _checks(scenario: Scenario) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
     mission = scenario.mission
@@ -146,7 +166,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
         if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
             names = ", ".join(robots)
             yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
-        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "time_limit"):
+        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
             yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
         tote = subjects.get("tote")
         if entry.kind == "tote_slip" and tote is not None and tote not in totes:

@@ -12,7 +12,7 @@ from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
 
 
 class CostmapParameters(ParameterGroup):
@@ -36,6 +36,8 @@ class CostmapParameters(ParameterGroup):
     """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
+    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
     raytrace_min_range: Annotated[Metres, NotNegative] | None = None
     """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None

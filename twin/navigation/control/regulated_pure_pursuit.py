@@ -24,6 +24,8 @@ from twin.navigation.failures import NoValidControl
 
 _ESCAPE_TURN = 0.5
 """Rate at which the robot turns away from what it nearly touches [rad/s]."""
+_STILL_THERE = 0.25
+"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +197,9 @@ class RegulatedPurePursuit:
         if config.use_fixed_curvature_lookahead:
             x, y = self._curvature_point(local)
         bearing = math.atan2(sign * y, sign * x)
-        self._reached_xy |= ahead.ends_at_goal and math.hypot(*local[-1]) < self._tolerance
+        off = math.hypot(*local[-1])
+        self._reached_xy |= ahead.ends_at_goal and off < self._tolerance
+        self._reached_xy &= off < self._tolerance + _STILL_THERE
         if config.use_rotate_to_heading and self._reached_xy:
             v, w = 0.0, self._rotate(wrap_angle(float(path[-1, 2]) - pose.yaw), velocity[1], dt)
         elif config.use_rotate_to_heading and abs(bearing) > config.rotate_to_heading_min_angle:
