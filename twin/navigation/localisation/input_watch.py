@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Pose2, wrap_angle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class InputWatch:
 
     def __init__(self, config: InputWatchConfig | None = None) -> None:
         self._config = config or InputWatchConfig()
-        self._ranges: Array | None = None
+        self._ranges = b""
         self._repeats = 0
         self._since: Pose2 | None = None
         self._odom: tuple[int, Pose2] | None = None
@@ -54,13 +54,13 @@ class InputWatch:
             odom: Pose of the base in the odom frame when the scan was taken.
         """
         values = np.asarray(ranges, dtype=np.float64)
-        if self._ranges is not None and np.array_equal(values, self._ranges, equal_nan=True):
+        raw = values.tobytes()
+        if self._since is not None and raw == self._ranges:
             self._repeats += 1
         else:
-            self._ranges, self._repeats, self._since = values, 0, odom
+            self._ranges, self._repeats, self._since = raw, 0, odom
         if np.count_nonzero(np.isfinite(values)) < self._config.least_share * len(values):
             return "the scan is blind: hardly a reading hit anything"
-        assert self._since is not None
         moved = self._since.distance(odom) >= self._config.frozen_distance
         turned = abs(wrap_angle(self._since.yaw - odom.yaw)) >= self._config.frozen_distance
         if self._repeats >= self._config.frozen_after and (moved or turned):
