@@ -153,7 +153,7 @@ class RotationShim:
             if self._at_goal:
                 self.carrot = goal[:2]
                 return wrap_angle(goal.yaw - pose.yaw)
-        if config.rotate_to_heading_once and self._aligned:
+        if self._aligned:
             return None
         far = np.hypot(*(local.poses[:, :2] - local.poses[0, :2]).T) >= config.forward_sampling_distance
         if not far.any() and pose.distance(goal) <= self._tolerance:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.detour import DetouringPathHandler, free_points
 from twin.navigation.control.footprint_cover import FootprintCover
 from twin.navigation.control.mppi import kernels
 from twin.navigation.control.mppi.config import MPPIConfig
@@ -25,14 +26,15 @@ from twin.navigation.control.mppi.path_critics import (
     score_angle,
     score_follow,
 )
-from twin.navigation.control.mppi.scene import Scene, free_points
+from twin.navigation.control.mppi.pursuit import pursue
+from twin.navigation.control.mppi.scene import Scene
 from twin.navigation.control.mppi.scoring import cost_tables, total
-from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import NoValidControl
 
-_EXACT = 2
-"""The first rollouts have no noise: one keeps the controls as they are, one brakes."""
+_EXACT = 3
+"""The first rollouts have no noise: one keeps the controls as they are, one brakes, one pursues the path."""
 _FILTERS = {
     1: np.full(9, 1.0 / 9.0, dtype=np.float32),
     2: (np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231.0).astype(np.float32),
@@ -83,14 +85,15 @@ class MPPI:
             [round(config.model_delay_vx / config.model_dt), round(config.model_delay_wz / config.model_dt)]
         )
         self._cover: tuple[tuple[float, ...], FootprintCover] | None = None
-        self._handler = PathHandler(
-            config=PathHandlerConfig(
+        self._handler = DetouringPathHandler(
+            PathHandlerConfig(
                 prune_distance=config.prune_distance,
                 max_robot_pose_search_dist=config.max_robot_pose_search_dist,
                 enforce_path_inversion=self.reverses,
                 inversion_xy_tolerance=config.inversion_xy_tolerance,
                 inversion_yaw_tolerance=config.inversion_yaw_tolerance,
-            )
+            ),
+            detours=config.detours,
         )
         self.reset()
 
@@ -163,7 +166,7 @@ class MPPI:
     def _scene(
         self, pose: Pose2, velocity: tuple[float, float], costmap: Costmap | None, at: Pose2, dt: float
     ) -> Scene:
-        local = self._handler.local(pose)
+        local = self._handler.local(pose, costmap, at)
         grid = costmap or _NO_COSTMAP
         to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw)
         turn = wrap_angle(at.yaw - pose.yaw)
@@ -175,7 +178,7 @@ class MPPI:
             start=np.array([*to_grid, v, w], dtype=np.float32),
             path=path,
             along=np.concatenate([[0.0], np.cumsum(step)]).astype(np.float32),
-            valid=free_points(grid, points),
+            valid=free_points(grid, points + grid.origin),
             local=local,
             costmap=grid,
             cover=self._cover_for(grid),
@@ -211,11 +214,14 @@ class MPPI:
 
     def _optimize(self, scene: Scene, dt: float) -> bool:
         """Improve the controls; return False if nothing is left that does not collide."""
+        tables = self._tables(scene)
+        pursuit = self._pursuit(scene, tables[2])
         for _ in range(self.config.iteration_count):
             noise = self._noise.draw()
             noise[:, :, 0] = 0.0
             noise[:, :, 1] = -self._mean
-            self._roll_out(scene, noise)
+            noise[:, :, 2] = pursuit - self._mean
+            self._roll_out(scene, noise, tables)
             if self._hit.all():
                 return False
             self._score(scene)
@@ -234,7 +240,28 @@ class MPPI:
                     return False
         return True
 
-    def _roll_out(self, scene: Scene, noise: F32) -> None:
+    def _tables(self, scene: Scene) -> F32:
+        near = scene.local.ends_at_goal and scene.local.length < self.config.CostCritic.near_goal_distance
+        limit = float(self._limits[0])
+        return cost_tables(self.config, scene.costmap, near_goal=near, vx_max=limit)
+
+    def _pursuit(self, scene: Scene, allowed: F32) -> F32:
+        controls = np.zeros_like(self._mean)
+        pursue(
+            scene.path,
+            scene.along,
+            scene.start,
+            self._limits,
+            np.float32(self.config.model_dt),
+            scene.costmap.costs,
+            np.float32(1.0 / scene.costmap.resolution),
+            allowed,
+            scene.local.reversing and self.reverses,
+            controls,
+        )
+        return controls
+
+    def _roll_out(self, scene: Scene, noise: F32, tables: F32) -> None:
         config, local = self.config, scene.local
         limits = self._limits
         goal, angle = config.GoalCritic, config.GoalAngleCritic
@@ -246,7 +273,6 @@ class MPPI:
         dead = config.VelocityDeadbandCritic.deadband_velocities
         if not config.scores("VelocityDeadbandCritic"):
             dead = (0.0, 0.0, 0.0)
-        near_goal = local.ends_at_goal and local.length < config.CostCritic.near_goal_distance
         kernels.roll_out(
             noise,
             self._mean,
@@ -257,7 +283,7 @@ class MPPI:
             np.float32(config.model_dt),
             scene.costmap.costs,
             np.float32(1.0 / scene.costmap.resolution),
-            cost_tables(config, scene.costmap, near_goal=near_goal, vx_max=float(limits[0])),
+            tables,
             np.array([config.CostCritic.trajectory_point_step, *scene.cover.costs]),
             scene.cover.circles,
             scene.cover.outline,

@@ -10,7 +10,7 @@ from twin.geometry import Array
 from twin.navigation.control.footprint_cover import FootprintCover
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.path_handler import LocalPath
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import Costmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,11 +29,3 @@ class Scene:
     costmap: Costmap
     cover: FootprintCover
 
-
-def free_points(costmap: Costmap, points: Array) -> np.ndarray:
-    """Return which points, shape (n, 2) from the corner [m], are neither inscribed nor lethal."""
-    height, width = costmap.costs.shape
-    cells = np.floor(points / costmap.resolution).astype(np.int64)
-    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-    costs = costmap.costs[np.where(inside, cells[:, 1], 0), np.where(inside, cells[:, 0], 0)]
-    return ~inside | (costs < INSCRIBED_INFLATED_OBSTACLE) | (costs == NO_INFORMATION)
