@@ -39,6 +39,7 @@ SLOW = {
     "docs/getting-started.md",
     "docs/navigation.md",
     "docs/arenas.md",
+    "docs/navigation/mapping.md",
     "docs/ros/commands.md",
 }
 """Pages whose commands take longer than some seconds."""
@@ -48,7 +49,9 @@ NOT_RUN = {
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
+    r"twin bench slam .*": "needs logs that are not shipped: tests/cli/bench has its own",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
+    r"twin bench .*": "needs ../shared/data: tests/benchmarks_ has small ones",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""

@@ -31,6 +31,7 @@ HEAVY = (
 )
 
 WALL_CLOCK = {
+    "twin/benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
     "twin/runtime/run.py": {"perf_counter", "process_time", "sleep"},  # pacing, and how long the run took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
@@ -40,6 +41,8 @@ WALL_CLOCK = {
     "twin/bridge/bags/recorder.py": {"time_ns", "monotonic"},  # when a message was received
     "twin/bridge/bags/asked_definitions.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/bags/player.py": {"monotonic_ns"},  # when a message is due
+    "twin/benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
+    "twin/benchmarks/grid_maps.py": {"perf_counter"},  # the same
     "twin/benchmarks/slam/trial.py": {"perf_counter"},  # how many times faster than the robot drove
     "twin/cli/folders.py": {"now"},  # the name of a run's folder
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -132,13 +131,13 @@ def random_pairs(path: Path, costmap: Costmap, config: MapBenchConfig) -> list[t
     Raises:
         MapError: there are none.
     """
-    draw = random.Random(config.seed)
+    draw = np.random.Generator(np.random.Philox(config.seed))
     height, width = costmap.costs.shape
     buffer = min(config.side_buffer, (min(height, width) - 1) // 2)
     found: list[tuple[Pose2, Pose2]] = []
 
     def cell() -> tuple[int, int]:
-        return draw.randint(buffer, width - 1 - buffer), draw.randint(buffer, height - 1 - buffer)
+        return int(draw.integers(buffer, width - buffer)), int(draw.integers(buffer, height - buffer))
 
     for _ in range(10_000 * config.pairs):
         if len(found) == config.pairs:

@@ -39,6 +39,8 @@ class DiffDriveNodeConfig:
     odom_frame: str = "odom"
     base_frame: str = "base_footprint"
     period_ns: int = 20_000_000
+    enable_odom_tf: bool = True
+    """Whether odom → base is published; not where a filter does."""
 
 
 class DiffDriveControllerNode:
@@ -105,9 +107,10 @@ class DiffDriveControllerNode:
                 ),
             )
         )
-        self._tf.send_transform(
-            transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
-        )
+        if self.config.enable_odom_tf:
+            self._tf.send_transform(
+                transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
+            )
 
 
 _UNUSED_AXIS = 1e6

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from twin.errors import ScenarioError
 from twin.geometry import Pose2
+from twin.models.specs import ImuSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.ekf import EkfNode, for_robot
 from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
-from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 from twin.nodes.navigation.static_localisation import StaticLocalisationNode
 from twin.runtime.navigation_config import overridden
@@ -62,6 +65,25 @@ def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> S
         slam=overridden(SlamConfig(), overrides),
     )
     return SlamToolboxNode(context.bus, pose, node_config, namespace=context.namespace)
+
+
+def build_odometry_filter(context: StackContext, frames: Frames) -> None:
+    """Create the filter that fuses wheels and IMU, if the scenario's `odometry` asks for it.
+
+    Raises:
+        ScenarioError: the robot has no drive or no IMU.
+    """
+    if context.config.odometry.type == "wheels":
+        return
+    description = context.handle.description
+    imus = [spec.topic for spec in description.sensors if isinstance(spec, ImuSpec)]
+    if description.drive is None or not imus:
+        raise ScenarioError(
+            f"robot '{context.handle.name}' has no {'drive' if description.drive is None else 'IMU'}; "
+            "odometry of type ekf needs both, type wheels needs no IMU"
+        )
+    config = for_robot(frames.odom, frames.base, context.control_period_ns, imus[0])
+    EkfNode(context.bus, config, namespace=context.namespace)
 
 
 def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:

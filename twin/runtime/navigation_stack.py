@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from twin.geometry import Array
 from twin.models.specs import LidarSpec
+from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
 from twin.nodes.navigation.controller_server import ControllerServerNode
@@ -12,9 +13,9 @@ from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.smoother_server import SmootherServerNode
-from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
+from twin.runtime.commands import build_commands
 from twin.runtime.nav2_parameters import with_file, with_plugins
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
@@ -41,7 +42,7 @@ def build_navigation(
     parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    TwistMuxNode(bus, namespace=namespace)
+    build_commands(context, config.collision_monitor, pose, footprint)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
@@ -57,9 +58,11 @@ def build_navigation(
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, namespace=namespace)
-    ControllerServerNode(
+    server = ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )
+    for controller in server.controllers.values():
+        warm_up_controller(controller)
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )

@@ -20,7 +20,7 @@ from twin.nodes.sensor_publishers import SensorPublisher
 from twin.nodes.tote_detector import ToteDetectorNode
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import derive
-from twin.runtime.localisation_stack import build_localisation
+from twin.runtime.localisation_stack import build_localisation, build_odometry_filter
 from twin.runtime.navigation_stack import build_navigation
 from twin.runtime.stack_context import StackContext
 
@@ -44,6 +44,7 @@ class RobotStack:
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
         self._build_drive(description)
+        build_odometry_filter(context, self.frames)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
@@ -80,6 +81,7 @@ class RobotStack:
                 odom_frame=self.frames.odom,
                 base_frame=self.frames.base,
                 period_ns=context.control_period_ns,
+                enable_odom_tf=context.config.odometry.type == "wheels",
             ),
             namespace=context.namespace,
         )

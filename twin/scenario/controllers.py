@@ -140,6 +140,8 @@ class CostCriticParameters(CriticParameters):
     """Of a point in the inscribed zone."""
     consider_footprint: bool | None = None
     """Whether the outline is checked, not the centre."""
+    footprint_padding: Annotated[Metres, NotNegative] | None = None
+    """An obstacle within this of the outline costs critical_cost [m]."""
     near_goal_distance: Annotated[Metres, NotNegative] | None = None
     """Nearer to the goal only collisions count [m]."""
     trajectory_point_step: _Power | None = None

@@ -51,6 +51,23 @@ class AmclParameters(ParameterGroup):
     """Rotation before the next update [rad]."""
 
 
+class WheelOdometry(StrictModel):
+    """The wheels alone: `/diff_drive_controller` publishes odom → base."""
+
+    type: Literal["wheels"]
+    """`wheels`"""
+
+
+class EkfOdometry(StrictModel):
+    """Wheels and IMU, fused by `/ekf_filter_node`, which publishes odom → base."""
+
+    type: Literal["ekf"]
+    """`ekf`"""
+
+
+Odometry = Annotated[WheelOdometry | EkfOdometry, Field(discriminator="type")]
+
+
 class NoLocalisation(StrictModel):
     """Nobody estimates the pose."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
@@ -65,6 +66,8 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [m/s]; absent: the robot's own."""
     max_angular_speed: Annotated[RadiansPerSecond, Positive] | None = None
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
+    collision_monitor: CollisionMonitorParameters | None = None
+    """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import model_validator
 
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName
-from twin.scenario.localisation import Localisation
+from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
 from twin.strict_yaml import Fault, Faults, StrictModel
 
@@ -28,6 +28,8 @@ class RobotConfig(StrictModel):
     """Name of one of the arena's poses to start from, instead of `pose`."""
     base: Literal["free", "fixed", "kinematic"] = "free"
     """`free`: moved by physics; `fixed`: bolted to the world; `kinematic`: moved by a publisher of poses."""
+    odometry: Odometry = WheelOdometry(type="wheels")
+    """Who publishes odom → base; absent: the wheels' controller."""
     localisation: Localisation | None = None
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None

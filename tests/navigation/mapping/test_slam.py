@@ -105,11 +105,11 @@ def test_two_drives_of_the_same_scans_are_the_same(drive_round):
     assert again.to_bytes() == slam.to_bytes()
 
 
-def test_a_slip_of_a_radian_is_found():
+def test_a_slip_of_a_hundred_degrees_is_found():
     truth = ring(0.5)
     odometry = drifting(truth, 0.0, 1.0)
     middle = len(truth) // 3
-    slip = odometry[middle] @ Pose2(0.0, 0.0, 1.0) @ odometry[middle].inverse()
+    slip = odometry[middle] @ Pose2(0.0, 0.0, math.radians(100.0)) @ odometry[middle].inverse()
     odometry = odometry[:middle] + [slip @ odom for odom in odometry[middle:]]
     slam = Slam(CONFIG)
     true, update = drive(slam, truth, odometry)[-1]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -69,7 +69,7 @@ def ring(rounds: float, step: float = 0.1) -> list[Pose2]:
 def drifting(poses: list[Pose2], heading_per_metre: float, scale: float) -> list[Pose2]:
     """What wheels say that turn a little to one side and count too far."""
     odometry = [Pose2(0.0, 0.0, 0.0)]
-    for before, after in itertools.pairwise(poses):
+    for before, after in pairwise(poses):
         step = before.inverse() @ after
         drift = heading_per_metre * math.hypot(step.x, step.y)
         odometry.append(odometry[-1] @ Pose2(scale * step.x, scale * step.y, step.yaw + drift))

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import typer
 
+from twin.cli.bench.amcl import amcl
 from twin.cli.bench.grid import grid
 from twin.cli.bench.slam import slam
 
 app = typer.Typer(no_args_is_help=True, help="Public benchmarks of navigation; exit code 1 below the bar.")
 
 _COMMANDS = (
+    ("amcl", amcl, "twin bench amcl --starts 20 --kidnaps 5 --distance 100"),
     ("grid", grid, "twin bench grid maze-32-32-2.json"),
     ("slam", slam, "twin bench slam aces.npz csail.npz --out slam"),
 )
 
 for _name, _function, _example in _COMMANDS:
-    app.command(_name, no_args_is_help=True, epilog=f"Example: [bold]{_example}[/bold]")(_function)
+    app.command(_name, no_args_is_help=_name != "amcl", epilog=f"Example: [bold]{_example}[/bold]")(_function)

@@ -66,7 +66,7 @@ def _problems_table(results: list[GridResult]) -> Table:
 
     from twin.benchmarks.grid import MAX_RATIO
 
-    table = Table(title="MovingAI", title_justify="left", box=None)
+    table = Table(title="MovingAI", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.caption = f"ms per plan; over nano_astar's at most {MAX_RATIO:g}"
     table.caption_justify = "left"
     table.add_column("", no_wrap=True, min_width=4)

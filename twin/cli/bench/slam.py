@@ -66,7 +66,9 @@ def slam(
     if json:
         sys.stdout.write(json_module.dumps([trial.to_dict() for trial in trials], indent=2) + "\n")
     else:
-        stdout().print(_table(trials))
+        console = stdout()
+        console.width = max(console.width, 100)  # a table that is cut tells nothing
+        console.print(_table(trials))
         if folder is not None:
             stdout().print(f"maps in {folder}", style="dim")
     raise typer.Exit(0 if all(trial.passed for trial in trials) else 1)
@@ -83,7 +85,9 @@ def _write(folder: Path, name: str, mapped: Slam) -> None:
 def _table(trials: list[SlamTrial]) -> Table:
     from rich.table import Table
 
-    table = Table(box=None, title="errors of relations: mean ± deviation", title_justify="left")
+    table = Table(
+        box=None, title="errors of relations: mean ± deviation", title_justify="left", padding=(0, 1, 0, 0)
+    )
     table.add_column("log", no_wrap=True)
     for heading in ("scans", "length", "slam [m]", "slam [°]", "odom [m]", "odom [°]"):
         table.add_column(heading, justify="right", no_wrap=True)

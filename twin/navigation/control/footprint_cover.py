@@ -24,13 +24,17 @@ class FootprintCover:
 
     outline: F32
     """Shape (n, 2), at most half a cell apart; empty: the centre alone is checked."""
+    padded: F32
+    """The same with the padding around it."""
     circles: F32
     """Shape (m, 2)."""
     costs: NDArray[np.int64]
     """The least cost of the centre at which a collision is possible, and that of a circle's centre."""
 
     @staticmethod
-    def of(footprint: Array, costmap: Costmap, *, consider_footprint: bool) -> FootprintCover:
+    def of(
+        footprint: Array, costmap: Costmap, *, consider_footprint: bool, padding: float = 0.0
+    ) -> FootprintCover:
         """Return the cover of a footprint, shape (n, 2) [m], for a costmap.
 
         Args:
@@ -38,14 +42,18 @@ class FootprintCover:
             costmap: Its inflation tells how far from an obstacle a cell is; where it ends too early to tell,
                 every look is at the outline.
             consider_footprint: False checks the centre for inscribed cost alone.
+            padding: Put around `padded` [m]; the circles cover that.
         """
         if not consider_footprint or len(footprint) < 3:
             none = np.zeros((0, 2), dtype=np.float32)
-            return FootprintCover(outline=none, circles=none, costs=np.array([253, 253]))
-        centres, radius = _circles(footprint)
-        outside = radii(footprint)[1]
+            return FootprintCover(outline=none, padded=none, circles=none, costs=np.array([253, 253]))
+        padded = _padded(footprint, padding)
+        centres, radius = _circles(padded)
+        outside = radii(padded)[1]
+        spacing = costmap.resolution / 2.0
         return FootprintCover(
-            outline=(_outline(footprint, costmap.resolution / 2.0) / costmap.resolution).astype(np.float32),
+            outline=(_outline(footprint, spacing) / costmap.resolution).astype(np.float32),
+            padded=(_outline(padded, spacing) / costmap.resolution).astype(np.float32),
             circles=(centres / costmap.resolution).astype(np.float32),
             costs=np.array([_cost(costmap, outside), _cost(costmap, radius)]),
         )
@@ -62,6 +70,11 @@ def _cost(costmap: Costmap, distance: float) -> int:
             cost_scaling_factor=costmap.cost_scaling_factor,
         )
     )
+
+
+def _padded(corners: Array, padding: float) -> Array:
+    """Return the corners moved out by the padding along x and along y (nav2_costmap_2d padFootprint)."""
+    return corners + padding * np.sign(corners)
 
 
 def _outline(corners: Array, spacing: float) -> Array:

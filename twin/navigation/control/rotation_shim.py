@@ -15,7 +15,6 @@ from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, Costmap, footprint_cost
-from twin.navigation.failures import NoValidControl
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,27 +126,20 @@ class RotationShim:
 
         Raises:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
-            NoValidControl: the turn, or whatever the primary controller could do, collides.
+            NoValidControl: the primary controller finds no command.
         """
         if self._handler.accept(path):
             self._turning = self._aligned = self._at_goal = False
         angle = self._angle(pose, path)
-        if angle is None:
+        w = 0.0 if angle is None else self._turn_rate(angle, velocity[1], dt)
+        # Where there is no room to turn the primary controller may know a way, as in Nav2.
+        if angle is None or self._collides(costmap_pose or pose, w, angle, dt, costmap):
             self._turning = False
             command = self.primary.compute_velocity(
                 pose, velocity, path, costmap, dt, costmap_pose=costmap_pose
             )
             self.carrot, self.trajectory = self.primary.carrot, self.primary.trajectory
         else:
-            known = velocity[1] if self.config.closed_loop or self._last_w is None else self._last_w
-            w = turn_rate(
-                angle,
-                known,
-                dt,
-                max_rate=self.config.rotate_to_heading_angular_vel,
-                acceleration=self.config.max_angular_accel,
-            )
-            self._check(costmap_pose or pose, w, angle, dt, costmap)
             command, self.trajectory = (0.0, w), None
         self._last_w = command[1]
         return command
@@ -180,13 +172,24 @@ class RotationShim:
         self._turning, self.carrot = True, (x, y)
         return angle
 
-    def _check(self, pose: Pose2, w: float, angle: float, dt: float, costmap: Costmap | None) -> None:
-        """Look at the footprint while it turns; raises NoValidControl."""
+    def _turn_rate(self, angle: float, w_now: float, dt: float) -> float:
+        config = self.config
+        return turn_rate(
+            angle,
+            w_now if config.closed_loop or self._last_w is None else self._last_w,
+            dt,
+            max_rate=config.rotate_to_heading_angular_vel,
+            acceleration=config.max_angular_accel,
+        )
+
+    def _collides(self, pose: Pose2, w: float, angle: float, dt: float, costmap: Costmap | None) -> bool:
+        """Return whether the footprint hits something while it turns."""
         if costmap is None or w == 0.0:
-            return
+            return False
         steps = math.ceil(min(self.config.simulate_ahead_time, abs(angle / w)) / dt)
         for step in range(1, steps + 1):
             at = Pose2(pose.x, pose.y, pose.yaw + w * dt * step)
             cost = footprint_cost(costmap, self.footprint, at)
             if self.config.max_cost_threshold <= cost != NO_INFORMATION:
-                raise NoValidControl(f"collision after turning for {step * dt:.2f} s at {w:.2f} rad/s")
+                return True
+        return False

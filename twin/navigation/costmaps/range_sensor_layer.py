@@ -170,6 +170,7 @@ def _update_cone(
     doubled = abs((bx - ax) * (oy - ay) - (by - ay) * (ox - ax))
     slack = -inflate_cone * doubled / 2.0
     sense = 1 if (bx - ax) * (oy - ay) - (by - ay) * (ox - ax) >= 0 else -1
+    margin = math.sqrt(0.5) * resolution  # from a cell's centre to its corners
     for v in range(window[1], window[3]):
         for u in range(window[0], window[2]):
             if inflate_cone < 1.0:
@@ -181,11 +182,11 @@ def _update_cone(
             dx, dy = origin_x + (u + 0.5) * resolution - x, origin_y + (v + 0.5) * resolution - y
             theta = math.atan2(dy, dx) - yaw
             theta = math.atan2(math.sin(theta), math.cos(theta))
-            sensed = 0.0
+            phi, sensed = math.hypot(dx, dy), 0.0
             if not clearing:
-                sensed = sensor_model(distance, math.hypot(dx, dy), theta, half, phi_v, resolution)
-            elif abs(theta) > half or math.hypot(dx, dy) > distance:
-                continue  # nav2 frees the whole bounding box here, also what the sensor cannot see
+                sensed = sensor_model(distance, phi, theta, half, phi_v, resolution)
+            elif phi > distance + margin or (phi > margin and abs(theta) > half + math.asin(margin / phi)):
+                continue  # nav2 frees the whole bounding box here, also what the cone does not touch
             prior = cells[v, u] / 254.0
             occupied, free = sensed * prior, (1.0 - sensed) * (1.0 - prior)
             if occupied + free > 0.0:

@@ -17,6 +17,8 @@ from twin.navigation._jit import jit
 
 Pyramid = NDArray[np.uint8]
 FULL = 255.0
+MOST_POINTS = 200
+"""Of a scan that are looked up: more do not tell places apart better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +75,7 @@ class CorrelationGrid:
         """
         if not len(points):
             return None
+        points = np.ascontiguousarray(points[:: math.ceil(len(points) / MOST_POINTS)])
         farthest = float(np.sqrt(np.max(np.sum(points * points, axis=1))))
         step = min(max(self.resolution / max(farthest, 1.0), 0.004), 0.05)
         half = math.ceil(window.half_angle / step)

@@ -40,6 +40,8 @@ SECTORS = 8
 """... in so many parts of a window that is twice as wide ..."""
 LOST = 0.3
 """... and below this in all directions."""
+ALONE = 0.4
+"""If nothing fits near odometry's guess, a match in another direction counts from this score on."""
 EXPANDED = np.diag([1.0, 1.0, 25.0])
 """By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip."""
 SLIPPED = np.diag([1.0, 1.0, 1e4])
@@ -223,6 +225,12 @@ class Slam:
         self._map.update(self._scans, self._graph.poses)
         return self._map.occupancy()
 
+    def optimise(self) -> None:
+        """Move the nodes to where they explain all that was measured best; done by itself at each loop."""
+        self._graph.optimise()
+        self._closer.forget()
+        self._waiting = 0
+
     def entropy(self) -> float:
         """Return the differential entropy of the latest pose [nats]: 0.5 ln det(2 pi e covariance).
 
@@ -364,7 +372,8 @@ class Slam:
         # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
         wide = replace(window, half_angle=math.pi)
         other = reference.best_match(scan, guess, wide, SLIPPED * prior, least, 4 * SECTORS)
-        return other if other is not None and other.score >= DOUBTFUL else match
+        enough = ALONE if match is None else DOUBTFUL
+        return other if other is not None and other.score >= enough else match
 
     def _close_loops(self, node: int) -> bool:
         edges = self._closer.search(self._graph, self._scans, node)

@@ -35,8 +35,8 @@ class PlannerServerConfig:
     """Parameters of the server itself."""
 
     compute_alternatives: int = 0
-    """How many other ways are tried when a goal is asked for again from where it was asked last: the path
-    could not be followed. For trees that plan anew only when they must."""
+    """How many other ways are tried when a goal is asked for again from the same place, which tells that the
+    path could not be followed. For trees that plan anew only when they must."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
@@ -54,8 +54,8 @@ class PlannerParameters:
 class PlannerServerNode:
     """Plans on request; publishes `plan`.
 
-    A request's `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with
-    its defaults.
+    `planner_id` is `GridBased`, the configured planner, or a plugin's name: that one with its own
+    defaults, but the tolerance and the unknown cells of the configured one.
     """
 
     def __init__(
@@ -72,8 +72,13 @@ class PlannerServerNode:
         self.node = bus.create_node("planner_server", namespace)
         self._robot_pose = robot_pose
         self._costmap = costmap
-        self._configs: dict[str, PlannerPluginConfig] = {DEFAULT_ID: config or PLUGINS[DEFAULT]()}
-        self._configs |= {name: plugin() for name, plugin in PLUGINS.items()}
+        chosen = config or PLUGINS[DEFAULT]()
+        self._configs: dict[str, PlannerPluginConfig] = {DEFAULT_ID: chosen}
+        for name, plugin in PLUGINS.items():
+            if isinstance(chosen, plugin):
+                self._configs[name] = chosen
+            else:
+                self._configs[name] = plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
         self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
         self._tried: list[Array] = []
         self._asked: tuple[Pose2, Pose2] | None = None

@@ -27,6 +27,7 @@ from twin.bridge.srvs import GetMap
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
 from twin.navigation.mapping.slam import Mode, Slam, SlamConfig, SlamUpdate
+from twin.navigation.mapping.warm_up import warm_up
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.navigation.graph_markers import graph_markers
@@ -77,6 +78,7 @@ class SlamToolboxNode:
         self._count = 0
         self._started = False
         declare_config(node, self.config, names={"slam": ""})
+        warm_up()
         self.slam = self._begin()
         self._tf = TransformBroadcaster(node)
         self._map_publisher = node.create_publisher(OccupancyGrid, "map", LATCHED)

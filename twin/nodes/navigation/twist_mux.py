@@ -16,12 +16,19 @@ DEFAULT_INPUTS = (
 
 
 class TwistMuxNode:
-    """Subscribes to every input's topic and publishes `cmd_vel`."""
+    """Subscribes to every input's topic and publishes `cmd_vel`, or what comes before it."""
 
-    def __init__(self, bus: Bus, *, inputs: Sequence[MuxInput] = DEFAULT_INPUTS, namespace: str = "") -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        *,
+        inputs: Sequence[MuxInput] = DEFAULT_INPUTS,
+        output: str = "cmd_vel",
+        namespace: str = "",
+    ) -> None:
         self.node = bus.create_node("twist_mux", namespace)
         self.mux = TwistMux(inputs)
-        self._publisher = self.node.create_publisher(Twist, "cmd_vel", 10)
+        self._publisher = self.node.create_publisher(Twist, output, 10)
         for source in inputs:
             self.node.create_subscription(Twist, source.topic, self._callback(source.name), 10)
 

@@ -48,6 +48,8 @@ class CostCriticConfig(CriticConfig):
     """Nearer to the goal only collisions count: goals may be near obstacles [m]."""
     consider_footprint: bool = True
     """Whether the outline is checked; otherwise the centre's inscribed cost is a collision."""
+    footprint_padding: float = 0.03
+    """Within this of the outline an obstacle is near: a point costs critical_cost; not Nav2's [m]."""
     trajectory_point_step: int = 2
 
 
@@ -149,7 +151,7 @@ class VelocityDeadbandCriticConfig(CriticConfig):
 class SpeedCriticConfig(CriticConfig):
     """Speed beyond what the clearance allows; not Nav2's, but regulated pure pursuit's rule as a critic."""
 
-    cost_weight: float = 4.0
+    cost_weight: float = 32.0
     cost_scaling_dist: float = 0.6
     """With this clearance and more, vx_max is allowed [m]."""
     cost_scaling_gain: float = 1.0

@@ -205,8 +205,16 @@ class MPPI:
     def _cover_for(self, costmap: Costmap) -> FootprintCover:
         key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
         if self._cover is None or self._cover[0] != key:
-            consider = self.config.CostCritic.consider_footprint
-            self._cover = key, FootprintCover.of(self.footprint, costmap, consider_footprint=consider)
+            critic = self.config.CostCritic
+            self._cover = (
+                key,
+                FootprintCover.of(
+                    self.footprint,
+                    costmap,
+                    consider_footprint=critic.consider_footprint,
+                    padding=critic.footprint_padding,
+                ),
+            )
         return self._cover[1]
 
     # Optimization
@@ -263,7 +271,9 @@ class MPPI:
             np.array([config.CostCritic.trajectory_point_step, *scene.cover.costs]),
             scene.cover.circles,
             scene.cover.outline,
-            np.array([*scene.path[:, -1], *near], dtype=np.float32),
+            scene.cover.padded,
+            np.float32(config.CostCritic.critical_cost),
+            np.array([*scene.path[:, -1], *near, local.length], dtype=np.float32),
             np.array([config.scores("TwirlingCritic"), dead[0], dead[2]], dtype=np.float32),
             self._state,
             self._points,
@@ -321,6 +331,9 @@ class MPPI:
             return False
         x, y = scene.path[:2, at]
         np.hypot(self._state[kernels.X] - x, self._state[kernels.Y] - y, out=self._raw[kernels.FOLLOW])
+        if at == last:
+            # Being at the end in time is not enough: the robot would put off to go there, again and again.
+            self._raw[kernels.FOLLOW] += self._raw[kernels.LAG]
         return True
 
     def _angle(self, scene: _Scene, furthest: int) -> bool:

@@ -16,11 +16,23 @@ from twin.navigation._jit import fast_jit
 
 F32 = NDArray[np.float32]
 
-CONSTRAINT, COST, OBSTACLES, GOAL, GOAL_ANGLE, ALIGN, FOLLOW, ANGLE, FORWARD, TWIRLING, DEADBAND, SPEED = (
-    range(12)
-)
-"""Rows of the critics' raw scores."""
-CRITIC_COUNT = 12
+(
+    CONSTRAINT,
+    COST,
+    OBSTACLES,
+    GOAL,
+    GOAL_ANGLE,
+    ALIGN,
+    FOLLOW,
+    ANGLE,
+    FORWARD,
+    TWIRLING,
+    DEADBAND,
+    SPEED,
+    LAG,
+) = range(13)
+"""Rows of the critics' raw scores; LAG, mean distance that is left of the local path, is a part of FOLLOW."""
+CRITIC_COUNT = 13
 
 X, Y, COS, SIN, YAW, V, W, LENGTH = range(8)
 """Rows of the state."""
@@ -86,6 +98,8 @@ def roll_out(
     check: NDArray[np.int64],
     circles: F32,
     outline: F32,
+    padded: F32,
+    near_cost: np.float32,
     goal: F32,
     extra: F32,
     state: F32,
@@ -109,7 +123,10 @@ def roll_out(
         check: Steps between looks at the costmap (0: none), least cost of a collision, circles' least cost.
         circles: Shape (n, 2): centres of circles that cover the footprint, in cells.
         outline: Shape (n, 2): points of the outline, in cells.
-        goal: x, y, yaw; whether GoalCritic, GoalAngleCritic count; whether the opposite heading is as good.
+        padded: The same of the outline with its padding.
+        near_cost: Added to CostCritic where only the padding touches something.
+        goal: x, y, yaw; whether GoalCritic, GoalAngleCritic count; whether the opposite heading is as good;
+            length of the local path.
         extra: Whether TwirlingCritic counts; dead bands of v and w.
         state: Shape (8, batch), written.
         points: Shape (3, time_steps, batch), written: x, y, yaw after each step.
@@ -123,7 +140,7 @@ def roll_out(
     _, steps, batch = noise.shape
     vx_max, vx_min, radius = limits[0], limits[1], limits[6]
     dv_up, dv_down, dw_max = limits[3] * dt, -limits[4] * dt, limits[5] * dt
-    goal_x, goal_y, goal_yaw = goal[0], goal[1], goal[2]
+    goal_x, goal_y, goal_yaw, path_length = goal[0], goal[1], goal[2], goal[6]
     dead_v, dead_w = extra[1], extra[2]
     x, y, c, s, yaw, v, w, length = (
         state[X], state[Y], state[COS], state[SIN], state[YAW], state[V], state[W], state[LENGTH]
@@ -168,6 +185,9 @@ def roll_out(
             dead = raw[DEADBAND]
             for k in range(batch):
                 dead[k] += max(dead_v - abs(v[k]), zero) + max(dead_w - abs(w[k]), zero)
+        lag = raw[LAG]
+        for k in range(batch):
+            lag[k] += max(path_length - length[k] * dt, zero)
         for k in range(batch):
             # The arc's chord has the heading of its middle.
             a = half * w[k] * dt
@@ -210,9 +230,11 @@ def roll_out(
             cost = int(costs[int(uy), int(ux)])
             if cost == 0 or cost == 255:
                 continue
-            if cost >= check[1] and collides(costs, cost, circles, check[2], outline, ux, uy, c[k], s[k]):
-                hit[k] = 1
-                continue
+            if cost >= check[1] and collides(costs, cost, circles, check[2], padded, ux, uy, c[k], s[k]):
+                if padded.shape[0] == 0 or cost == 254 or outline_hits(costs, outline, ux, uy, c[k], s[k]):
+                    hit[k] = 1
+                    continue
+                raw[COST, k] += near_cost
             raw[COST, k] += tables[0, cost]
             raw[OBSTACLES, k] += tables[1, cost]
             raw[SPEED, k] += max(abs(v[k]) - tables[2, cost], zero)
@@ -220,7 +242,7 @@ def roll_out(
     for row in (CONSTRAINT, FORWARD, DEADBAND):
         for k in range(batch):
             raw[row, k] *= dt
-    for row in (GOAL, GOAL_ANGLE, TWIRLING):
+    for row in (GOAL, GOAL_ANGLE, TWIRLING, LAG):
         for k in range(batch):
             raw[row, k] *= per_step
     for row in (COST, OBSTACLES, SPEED):

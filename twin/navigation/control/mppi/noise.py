@@ -16,15 +16,16 @@ _BLOCKS = 8
 class NoiseBank:
     """Noise of vx and wz for a batch of rollouts; a function of the parameters, seed included.
 
-    Every draw of wz is there with both signs, so that the mean of the noise turns neither left nor right: a
-    straight path is driven straight. The first rollouts are no noise but what `MPPI` puts there.
+    Every draw is there with all four pairs of signs: the noise has no mean, which the same noise in every
+    cycle would add up to a turn on a straight path, or to a slower drive. The first rollouts are no noise but
+    what `MPPI` puts there.
     """
 
     def __init__(self, config: MPPIConfig) -> None:
         generator = np.random.Generator(np.random.Philox(config.seed))
         blocks = _BLOCKS if config.regenerate_noises else 1
-        batch, half = config.batch_size, (config.batch_size + 1) // 2
-        drawn = generator.standard_normal((blocks, 2, config.time_steps, half), dtype=np.float32)
+        batch, quarter = config.batch_size, (config.batch_size + 3) // 4
+        drawn = generator.standard_normal((blocks, 2, config.time_steps, quarter), dtype=np.float32)
         keep = math.exp(-config.model_dt / config.noise_time_constant) if config.noise_time_constant else 0.0
         for t in range(1, config.time_steps):
             drawn[:, :, t] = keep * drawn[:, :, t - 1] + math.sqrt(1.0 - keep * keep) * drawn[:, :, t]
@@ -34,8 +35,9 @@ class NoiseBank:
         """What `average` charges for the noise of vx and wz."""
         drawn[:, 0] *= config.vx_std
         drawn[:, 1] *= config.wz_std
-        mirrored = drawn * np.array([1.0, -1.0], dtype=np.float32)[None, :, None, None]
-        self._blocks: F32 = np.ascontiguousarray(np.concatenate([drawn, mirrored], axis=-1)[..., :batch])
+        signs = np.array([(1, 1), (-1, -1), (1, -1), (-1, 1)], dtype=np.float32)
+        mirrored = [drawn * pair[None, :, None, None] for pair in signs]
+        self._blocks: F32 = np.ascontiguousarray(np.concatenate(mirrored, axis=-1)[..., :batch])
         self._next = 0
 
     def draw(self) -> F32:

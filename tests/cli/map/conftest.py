@@ -1,0 +1,1 @@
+from tests.navigation.conftest import shared_data as shared_data

@@ -1,0 +1,251 @@
+"""MPPI, DWB and the rotation shim drive straight, centred, to the end, and never into anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twin.geometry import Pose2, wrap_angle
+from twin.navigation.control.controller import Controller
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.mppi.config import (
+    CostCriticConfig,
+    GoalAngleCriticConfig,
+    GoalCriticConfig,
+    MPPIConfig,
+    PathAlignCriticConfig,
+    PathAngleCriticConfig,
+    SpeedCriticConfig,
+)
+from twin.navigation.control.mppi.controller import MPPI
+from twin.navigation.control.plugins import create_controller
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit, RegulatedPurePursuitConfig
+from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.costmaps.costmap import Costmap, footprint_cost
+from twin.navigation.costmaps.footprint import rectangle
+from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.failures import InvalidPath, NoValidControl
+from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.planning.planner import with_headings
+
+DT = 0.06
+FOOTPRINT = rectangle(0.42, 0.33)
+MPPI_CONFIG = MPPIConfig(
+    batch_size=400,
+    time_steps=40,
+    model_dt=DT,
+    vx_max=1.0,
+    vx_min=-0.15,
+    wz_max=1.5,
+    ax_max=0.8,
+    ax_min=-1.2,
+    az_max=2.0,
+    noise_time_constant=0.6,
+    prune_distance=2.4,
+    GoalCritic=GoalCriticConfig(cost_weight=15.0),
+    GoalAngleCritic=GoalAngleCriticConfig(enabled=False),
+    PathAlignCritic=PathAlignCriticConfig(offset_from_furthest=2, threshold_to_consider=0.05),
+)
+DWB_CONFIG = DWBConfig(
+    max_vel_x=1.0, acc_lim_x=0.8, decel_lim_x=-1.2, acc_lim_theta=2.0, sim_time=1.2, prune_distance=1.2
+)
+
+
+def shimmed(config: MPPIConfig | DWBConfig) -> Controller:
+    shim = RotationShimConfig(
+        primary_controller=config,
+        rotate_to_heading_angular_vel=1.2,
+        max_angular_accel=1.2,
+        rotate_to_goal_heading=True,
+    )
+    controller = create_controller(shim, FOOTPRINT)
+    controller.set_goal_tolerance(0.05)
+    return controller
+
+
+@pytest.fixture(params=[MPPI_CONFIG, DWB_CONFIG], ids=["mppi", "dwb"])
+def make(request: pytest.FixtureRequest) -> Callable[[], Controller]:
+    return lambda: shimmed(request.param)
+
+
+def hall(*boxes: tuple[float, float, float, float]) -> Costmap:
+    """8 x 4 m, walled; boxes are x0, y0, x1, y1."""
+    data = np.zeros((80, 160), dtype=np.int8)
+    data[:2] = data[-2:] = 100
+    data[:, :2] = data[:, -2:] = 100
+    for box in boxes:
+        x0, y0, x1, y1 = (round(value / 0.05) for value in box)
+        data[y0:y1, x0:x1] = 100
+    room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
+    polygon = tuple((float(x), float(y)) for x, y in FOOTPRINT)
+    config = CostmapConfig(footprint=polygon, inflation_radius=0.8, cost_scaling_factor=4.0)
+    return LayeredCostmap(config=config, static_map=room).costmap
+
+
+def line(x0: float, x1: float, y: float) -> np.ndarray:
+    x = np.linspace(x0, x1, 1 + round(abs(x1 - x0) / 0.05))
+    return with_headings(np.column_stack([x, np.full_like(x, y)]))
+
+
+def drive(
+    controller: Controller, start: Pose2, path: np.ndarray, costmap: Costmap | None, seconds: float = 30.0
+) -> np.ndarray:
+    """Return x, y, yaw, v, w until the goal is reached within 5 cm and 0.05 rad; the drive lags by 0.1 s."""
+    pose, v, w, log, there = start, 0.0, 0.0, [], False
+    for _ in range(round(seconds / DT)):
+        there |= pose.distance(Pose2(*path[-1])) < 0.05
+        if there and abs(wrap_angle(pose.yaw - path[-1, 2])) < 0.05:
+            return np.array(log)
+        command = controller.compute_velocity(pose, (v, w), path, costmap, DT)
+        v += min(max((command[0] - v) * 0.45, -1.2 * DT), 0.8 * DT)
+        w += min(max((command[1] - w) * 0.45, -3.0 * DT), 2.0 * DT)
+        pose = pose @ Pose2(v * DT * np.sinc(w * DT / (2 * np.pi)), 0.0, 0.0) @ Pose2(0.0, 0.0, w * DT)
+        log.append((*pose, v, w))
+        assert costmap is None or footprint_cost(costmap, FOOTPRINT, pose) < 254, "it hit something"
+    raise AssertionError(f"not there after {seconds} s, but at {pose}")
+
+
+def test_a_straight_line_is_driven_straight_and_to_its_end(make: Callable[[], Controller]) -> None:
+    log = drive(make(), Pose2(1.0, 2.0, 0.0), line(1.0, 6.5, 2.0), hall())
+    assert np.abs(log[:, 1] - 2.0).max() < 0.02
+    assert log[:, 3].max() > 0.9
+    assert len(log) * DT < 12.0
+
+
+def test_an_offset_is_steered_out_and_a_path_behind_is_turned_to(make: Callable[[], Controller]) -> None:
+    log = drive(make(), Pose2(6.0, 2.3, 0.3), line(6.0, 1.5, 2.0), hall())
+    assert np.abs(log[2 * len(log) // 3 :, 1] - 2.0).max() < 0.05
+    assert np.hypot(log[:10, 0] - 6.0, log[:10, 1] - 2.3).max() < 0.02, "it turns in place first"
+
+
+def test_the_middle_of_a_corridor_is_kept(make: Callable[[], Controller]) -> None:
+    corridor = hall((2.0, 0.1, 6.0, 1.5), (2.0, 2.5, 6.0, 3.9))
+    log = drive(make(), Pose2(1.0, 2.0, 0.0), line(1.0, 7.0, 2.0), corridor)
+    inside = (log[:, 0] > 2.0) & (log[:, 0] < 6.0)
+    assert np.abs(log[inside, 1] - 2.0).max() < 0.04
+
+
+def test_mppi_drives_around_what_stands_on_the_path() -> None:
+    costmap = hall((3.5, 1.9, 3.7, 2.1))
+    log = drive(shimmed(MPPI_CONFIG), Pose2(1.0, 2.05, 0.0), line(1.0, 6.5, 2.0), costmap)
+    assert np.abs(log[:, 1] - 2.0).max() > 0.3
+    assert abs(log[-1, 1] - 2.0) < 0.05
+
+
+def test_a_closed_way_is_never_driven_into(make: Callable[[], Controller]) -> None:
+    costmap = hall((4.0, 0.1, 4.2, 3.9))
+    controller, path, pose, v = make(), line(1.0, 6.5, 2.0), Pose2(1.0, 2.0, 0.0), 0.0
+    for _ in range(200):
+        try:
+            v, w = controller.compute_velocity(pose, (v, 0.0), path, costmap, DT)
+        except NoValidControl:
+            v = w = 0.0
+        pose = pose @ Pose2(v * DT, 0.0, 0.0) @ Pose2(0.0, 0.0, w * DT)
+        assert footprint_cost(costmap, FOOTPRINT, pose) < 254
+    assert pose.x < 4.0 - 0.21
+
+
+def test_mppi_slows_down_where_it_is_narrow() -> None:
+    path, corridor = line(1.0, 7.0, 2.0), hall((2.0, 0.1, 6.0, 1.65), (2.0, 2.35, 6.0, 3.9))
+    slow = drive(shimmed(MPPI_CONFIG), Pose2(1.0, 2.0, 0.0), path, corridor)
+    config = replace(MPPI_CONFIG, SpeedCritic=SpeedCriticConfig(enabled=False))
+    fast = drive(shimmed(config), Pose2(1.0, 2.0, 0.0), path, corridor)
+    speeds = [log[(log[:, 0] > 3.0) & (log[:, 0] < 5.5), 3].mean() for log in (slow, fast)]
+    assert speeds[0] < 0.75 * speeds[1]
+
+
+def test_the_same_inputs_give_the_same_commands_and_another_seed_others(
+    make: Callable[[], Controller],
+) -> None:
+    runs = [drive(make(), Pose2(1.0, 2.2, 0.0), line(1.0, 4.0, 2.0), hall()) for _ in range(2)]
+    assert np.array_equal(runs[0], runs[1])
+    controller = make()
+    drive(controller, Pose2(1.0, 2.2, 0.0), line(1.0, 4.0, 2.0), hall())
+    controller.reset()
+    again = drive(controller, Pose2(1.0, 2.2, 0.0), line(1.0, 4.0, 2.0), hall())
+    assert np.array_equal(runs[0], again), "reset forgets everything"
+
+
+def test_a_speed_limit_holds_and_is_lifted(make: Callable[[], Controller]) -> None:
+    controller = make()
+    controller.set_speed_limit(0.3)
+    log = drive(controller, Pose2(1.0, 2.0, 0.0), line(1.0, 3.0, 2.0), hall())
+    assert 0.25 < log[:, 3].max() <= 0.31
+    controller.set_speed_limit(None)
+    log = drive(controller, Pose2(1.0, 2.0, 0.0), line(1.0, 6.0, 2.0), hall())
+    assert log[:, 3].max() > 0.8
+
+
+def test_what_is_not_a_path(make: Callable[[], Controller]) -> None:
+    with pytest.raises(InvalidPath):
+        make().compute_velocity(Pose2(0.0, 0.0, 0.0), (0.0, 0.0), np.full((2, 3), np.nan), None, DT)
+
+
+def test_the_costmap_may_be_in_another_frame_than_the_path() -> None:
+    path, costmap = line(1.0, 6.0, 2.0), hall((3.5, 1.9, 3.7, 2.1))
+    away = Pose2(-3.0, 5.0, 1.1)
+    moved = np.column_stack([away.apply(path[:, :2]), path[:, 2] + away.yaw])
+    here = Pose2(2.0, 2.05, 0.1)
+    commands = []
+    for pose, followed in ((here, path), (away @ here, moved)):
+        controller = MPPI(config=MPPI_CONFIG, footprint=FOOTPRINT)
+        commands.append(
+            controller.compute_velocity(pose, (0.5, 0.0), followed, costmap, DT, costmap_pose=here)
+        )
+        assert controller.trajectory is not None
+        assert pose.inverse().apply(controller.trajectory[:1, :2])[0] == pytest.approx([0.03, 0.0], abs=0.01)
+    assert commands[0] == pytest.approx(commands[1], abs=1e-3)
+
+
+def test_mppi_backs_out_along_a_path_that_says_so() -> None:
+    """As Hybrid-A* plans it: backwards into the cusp, then forwards."""
+    back = line(4.0, 2.5, 2.0)
+    back[:, 2] = 0.0
+    path = np.concatenate([back, line(2.5, 5.5, 2.0)[1:]])
+    config = replace(MPPI_CONFIG, vx_min=-0.5, PathAngleCritic=PathAngleCriticConfig(mode=2))
+    for controller in (
+        MPPI(config=config, footprint=FOOTPRINT),
+        RegulatedPurePursuit(
+            config=RegulatedPurePursuitConfig(allow_reversing=True, xy_goal_tolerance=0.05),
+            footprint=FOOTPRINT,
+        ),
+    ):
+        log = drive(controller, Pose2(4.0, 2.0, 0.0), path, hall())
+        assert log[:, 0].min() < 2.75
+        assert np.abs(log[:, 2]).max() < 0.3, "it never turns around"
+        assert log[:, 3].min() < -0.2
+
+
+def test_an_ackermann_drive_never_turns_tighter_than_it_can() -> None:
+    angles = np.linspace(0.0, np.pi / 2, 40)
+    bend = np.column_stack([3.0 + np.sin(angles), 1.0 + 1.0 - np.cos(angles)])
+    path = with_headings(np.concatenate([line(1.0, 3.0, 1.0)[:-1, :2], bend]))
+    config = replace(MPPI_CONFIG, motion_model="Ackermann", min_turning_r=0.7)
+    controller, pose, v, w = MPPI(config=config, footprint=FOOTPRINT), Pose2(1.0, 1.0, 0.0), 0.0, 0.0
+    for _ in range(80):
+        v, w = controller.compute_velocity(pose, (v, w), path, hall(), DT)
+        assert abs(w) <= abs(v) / 0.7 + 1e-5
+        pose = pose @ Pose2(v * DT, 0.0, 0.0) @ Pose2(0.0, 0.0, w * DT)
+    assert pose.distance(Pose2(*path[-1])) < 0.6
+
+
+def test_the_outline_is_checked_not_a_circle() -> None:
+    """A gap wider than the robot but narrower than its circumscribed circle."""
+    costmap = hall((3.0, 0.1, 3.2, 1.75), (3.0, 2.25, 3.2, 3.9))
+    log = drive(shimmed(MPPI_CONFIG), Pose2(1.0, 2.0, 0.0), line(1.0, 6.0, 2.0), costmap)
+    assert log[-1, 0] > 5.9
+    wide = replace(MPPI_CONFIG, CostCritic=CostCriticConfig(consider_footprint=False))
+    assert drive(shimmed(wide), Pose2(1.0, 2.0, 0.0), line(1.0, 2.5, 2.0), hall())[-1, 0] > 2.4
+
+
+def test_where_there_is_no_room_to_turn_the_primary_controller_drives() -> None:
+    path = line(2.0, 4.0, 2.0)
+    for blocked in (False, True):
+        costmap = hall()
+        if blocked:
+            costmap.costs[40:42, 45] = 254  # beside the robot: not under it, but where its corner will be
+        w = shimmed(DWB_CONFIG).compute_velocity(Pose2(2.0, 2.0, -1.2), (0.0, 0.8), path, costmap, DT)
+        assert (w[0] == 0.0) is not blocked

@@ -1,0 +1,123 @@
+"""The EKF against a plain Kalman filter, numerical derivatives, and motions whose end is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from twin.navigation.localisation.ekf import (
+    AX,
+    OUT_OF_PLANE,
+    PITCH,
+    ROLL,
+    SIZE,
+    VX,
+    VYAW,
+    YAW,
+    Ekf,
+    EkfConfig,
+    X,
+    Y,
+    advanced,
+    rotation,
+)
+
+
+def started(two_d: bool = False) -> Ekf:
+    return Ekf(EkfConfig(two_d_mode=two_d, initial_estimate_covariance=(0.1,) * SIZE))
+
+
+def test_straight_motion_is_a_plain_kalman_filter() -> None:
+    """Along x, without turning, the filter is linear: x, v, a with a textbook recursion in three states."""
+    ekf, dt = started(), 0.05
+    q = np.array(EkfConfig().process_noise_covariance)[[X, VX, AX]]
+    F = np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    x, P = np.zeros(3), 0.1 * np.eye(3)
+    random = np.random.default_rng(0)
+    for step in range(200):
+        x, P = F @ x, F @ P @ F.T + dt * np.diag(q)
+        ekf.predict(dt)
+        H = np.array([[0.0, 1.0, 0.0]]) if step % 3 else np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        z, R = random.normal(0.5, 0.1, len(H)), np.diag([0.01, 0.04][: len(H)])
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+        x, P = x + K @ (z - H @ x), (np.eye(3) - K @ H) @ P
+        assert ekf.correct([VX, AX][: len(H)], z, R)
+        assert ekf.state[[X, VX, AX]] == pytest.approx(x, abs=1e-9)
+        assert ekf.covariance[np.ix_([X, VX, AX], [X, VX, AX])] == pytest.approx(P, abs=1e-9)
+
+
+def test_the_jacobian_is_the_derivative_of_the_motion() -> None:
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        ekf = started()
+        ekf.state = random.uniform(-0.7, 0.7, SIZE)
+        state, dt, step = ekf.state.copy(), 0.1, 1e-6
+        numerical = np.column_stack(
+            [
+                (advanced(state + step * e, dt) - advanced(state - step * e, dt)) / (2 * step)
+                for e in np.eye(SIZE)
+            ]
+        )
+        assert ekf._jacobian(dt) == pytest.approx(numerical, abs=1e-7)
+
+
+def test_a_circle_closes() -> None:
+    ekf = started(two_d=True)
+    ekf.state[VX], ekf.state[VYAW] = 1.0, 2.0 * math.pi / 10.0
+    for _ in range(10_000):
+        ekf.predict(0.001)
+    assert ekf.state[[X, Y, YAW]] == pytest.approx([0.0, 0.0, 0.0], abs=5e-3)
+
+
+def test_the_rotation_is_rep_103s() -> None:
+    turned = rotation(0.0, 0.0, math.pi / 2) @ [1.0, 0.0, 0.0]
+    assert turned == pytest.approx([0.0, 1.0, 0.0])
+    nose_down = rotation(0.0, math.pi / 2, 0.0) @ [1.0, 0.0, 0.0]
+    assert nose_down == pytest.approx([0.0, 0.0, -1.0])
+
+
+def test_a_flat_world_stays_flat() -> None:
+    ekf = started(two_d=True)
+    ekf.correct(range(SIZE), np.full(SIZE, 0.3), 0.01 * np.eye(SIZE))
+    ekf.predict(0.1)
+    assert not ekf.state[list(OUT_OF_PLANE)].any()
+    assert ekf.state[X] > 0.2
+    assert np.linalg.eigvalsh(ekf.covariance).min() > 0.0
+
+
+def test_yaw_innovations_take_the_short_way() -> None:
+    ekf = started()
+    ekf.state[YAW] = math.pi - 0.1
+    ekf.correct([YAW], [-math.pi + 0.1], [[1e-6]])
+    assert abs(ekf.state[YAW]) == pytest.approx(math.pi - 0.1, abs=1e-3)
+    assert ekf.state[YAW] < 0.0
+
+
+def test_what_is_not_finite_or_too_far_off_is_left_out() -> None:
+    ekf = started()
+    assert not ekf.correct([X], [math.nan], [[0.1]])
+    assert ekf.correct([X, Y], [math.inf, 1.0], np.eye(2))
+    assert ekf.state[X] == 0.0
+    assert ekf.state[Y] > 0.0
+    before = ekf.state.copy()
+    assert not ekf.correct([X], [100.0], [[0.1]], threshold=3.0)
+    assert (ekf.state == before).all()
+
+
+def test_measurements_make_it_surer_and_time_less_sure() -> None:
+    ekf = started()
+    before = ekf.covariance[ROLL, ROLL], ekf.covariance[PITCH, PITCH]
+    ekf.correct([ROLL], [0.0], [[0.1]])
+    assert ekf.covariance[ROLL, ROLL] == pytest.approx(before[0] / 2.0)
+    ekf.predict(1.0)
+    assert ekf.covariance[PITCH, PITCH] > before[1]
+    ekf.set_pose([1.0, 2.0, 0.0, 0.0, 0.0, 0.5], 0.2 * np.eye(6))
+    assert ekf.state[[X, Y, YAW]] == pytest.approx([1.0, 2.0, 0.5])
+    assert ekf.covariance[X, X] == 0.2
+
+
+def test_bad_matrices_are_refused() -> None:
+    with pytest.raises(ValueError, match="process_noise_covariance must be 15 numbers"):
+        EkfConfig(process_noise_covariance=(1.0,) * 14)

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+
+from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.planning.alternatives import AlternativesConfig, other_way
+from twin.navigation.planning.planner import Planner, ThetaStarConfig
+
+START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(9.5, 2.5, 0.0)
+
+
+def walls(*gaps: float) -> Costmap:
+    """A hall of 10 x 5 m, divided by a wall with gaps of 0.4 m at these heights."""
+    costs = np.zeros((50, 100), dtype=np.uint8)
+    costs[:, 50] = 254
+    for gap in gaps:
+        costs[round(gap * 10) : round(gap * 10) + 4, 50] = 0
+    return Costmap(costs=costs, resolution=0.1)
+
+
+def crossings(costmap: Costmap, count: int) -> list[float]:
+    planner, tried = Planner(config=ThetaStarConfig()), []
+    for _ in range(count):
+        tried.append(other_way(planner, costmap, START, GOAL, tried, AlternativesConfig()))
+    return [float(np.interp(5.05, path[:, 0], path[:, 1])) for path in tried]
+
+
+def test_each_try_takes_another_gap_the_short_ways_first() -> None:
+    first, second, third = crossings(walls(0.5, 2.3, 3.9), 3)
+    assert 2.3 < first < 2.7
+    assert 3.9 < second < 4.3
+    assert 0.5 < third < 0.9
+
+
+def test_the_only_way_is_tried_again() -> None:
+    assert all(2.3 < y < 2.7 for y in crossings(walls(2.3), 2))

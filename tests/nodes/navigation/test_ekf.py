@@ -1,0 +1,127 @@
+"""`/ekf_filter_node` on the drive's odometry and a gyroscope."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.nodes.conftest import Bench, Joints
+from twin.bridge.conversions import pose_from_pose2, twist_from_planar, yaw_from_quaternion
+from twin.bridge.msgs import (
+    Imu,
+    Odometry,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Twist,
+    Vector3,
+    header,
+)
+from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
+from twin.controllers.diff_drive import DiffDriveConfig
+from twin.geometry import Pose2, Pose3
+from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
+from twin.nodes.navigation.ekf import EkfNode, EkfNodeConfig
+from twin.nodes.transforms import TransformListenerNode
+
+
+class Driven:
+    """Wheels whose controller believes in a track 10 % too wide, and a gyroscope with a bias."""
+
+    bias = 0.004
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench, self.joints, self.yaw, self.blind = bench, Joints(wheels=("left", "right")), 0.0, False
+        drive = DiffDriveConfig(wheel_separation=0.33, wheel_radius=0.05)
+        self.drive = DiffDriveControllerNode(
+            bench.bus,
+            self.joints,
+            DiffDriveNodeConfig(
+                drive=drive, left_joints=("left",), right_joints=("right",), enable_odom_tf=False
+            ),
+        )
+        self.ekf = EkfNode(bench.bus, EkfNodeConfig())
+        self.buffer = TransformListenerNode(bench.bus).buffer
+        # The IMU is mounted upside down.
+        mount = Pose3.from_xyz_rpy((0.1, 0.0, 0.1), (math.pi, 0.0, 0.0))
+        static = transform_stamped("base_footprint", "imu_link", 0, mount)
+        StaticTransformBroadcaster(bench.node).send_transform(static)
+        self._imu = bench.node.create_publisher(Imu, "imu", SENSOR_DATA)
+        self._command = bench.node.create_publisher(Twist, "cmd_vel", 10)
+        self.filtered = bench.listen(Odometry, "odometry/filtered", 10)
+        bench.each_tick.append(self._tick)
+
+    def _tick(self) -> None:
+        self.joints.advance()
+        left, right = self.joints.velocity
+        rate = (right - left) * 0.05 / 0.30
+        self.yaw += rate * 0.02
+        self._imu.publish(
+            Imu(
+                header=header(self.bench.clock.now_ns, "imu_link"),
+                orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+                orientation_covariance=np.array([-1.0] + [0.0] * 8),
+                angular_velocity=Vector3(0.0, 0.0, math.nan if self.blind else -rate + self.bias),
+                angular_velocity_covariance=np.eye(3).ravel() * 4e-6,
+                linear_acceleration=Vector3(0.0, 0.0, -9.81),
+                linear_acceleration_covariance=np.eye(3).ravel() * 4e-4,
+            )
+        )
+
+    def go(self, seconds: float, linear: float, angular: float) -> None:
+        for _ in range(round(seconds / 0.1)):
+            self._command.publish(twist_from_planar(linear, angular))
+            self.bench.run(0.1)
+
+    @property
+    def error(self) -> float:
+        found = yaw_from_quaternion(self.filtered[-1].pose.pose.orientation) - self.yaw
+        return abs(math.remainder(found, 2.0 * math.pi))
+
+
+def test_the_gyroscope_is_believed_about_turns_and_its_bias_is_learnt(bench: Bench) -> None:
+    robot = Driven(bench)
+    robot.go(3.0, 0.0, 0.0)
+    robot.go(20.0, 0.3, 0.5)
+    wheels = abs(math.remainder(robot.drive.odometry.pose.yaw - robot.yaw, 2.0 * math.pi))
+    assert wheels > 0.5
+    assert robot.error < 0.04
+    assert robot.ekf.bias.value[2] == pytest.approx(robot.bias, abs=1e-4)
+
+
+def test_it_publishes_the_transform_and_the_covariance_grows(bench: Bench) -> None:
+    robot = Driven(bench)
+    robot.go(1.0, 0.3, 0.0)
+    early = robot.filtered[-1].pose.covariance.reshape(6, 6)
+    robot.go(5.0, 0.3, 0.0)
+    late = robot.filtered[-1].pose.covariance.reshape(6, 6)
+    assert late[0, 0] > early[0, 0] > 0.0
+    assert np.linalg.eigvalsh(late).min() > 0.0
+    assert robot.buffer.lookup("odom", "base_footprint").xyz[0] == pytest.approx(1.8, abs=0.15)
+    assert robot.filtered[-1].twist.twist.linear.x == pytest.approx(0.3, abs=0.01)
+
+
+def test_set_pose_starts_again_and_refuses_what_is_not_finite(bench: Bench) -> None:
+    robot = Driven(bench)
+    robot.go(1.0, 0.0, 0.0)
+    publisher = bench.node.create_publisher(PoseWithCovarianceStamped, "set_pose", 1)
+    for x in (3.0, math.nan):
+        pose = PoseWithCovariance(
+            pose=pose_from_pose2(Pose2(x, 1.0, 0.5)), covariance=np.eye(6).ravel() * 0.01
+        )
+        publisher.publish(PoseWithCovarianceStamped(header=header(0, "odom"), pose=pose))
+        bench.run(0.2)
+        assert robot.filtered[-1].pose.pose.position.x == pytest.approx(3.0, abs=0.01)
+
+
+def test_an_imu_that_returns_nan_leaves_the_wheels(bench: Bench) -> None:
+    robot = Driven(bench)
+    robot.go(1.0, 0.0, 0.0)
+    robot.blind = True
+    robot.go(4.0, 0.3, 0.5)
+    assert np.isfinite(robot.ekf.filter.state).all()
+    wheels = robot.drive.odometry.pose.yaw
+    assert yaw_from_quaternion(robot.filtered[-1].pose.pose.orientation) == pytest.approx(wheels, abs=0.05)

@@ -1,0 +1,166 @@
+"""Slows down or stops a command that leads into what the sensors see: nav2_collision_monitor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from twin.geometry import Array
+from twin.navigation._jit import jit
+
+ActionType = Literal["stop", "slowdown", "limit", "approach"]
+INVALID_SOURCE = "invalid source"
+"""What the action's polygon is called while a sensor is silent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MonitorPolygon:
+    """One polygon about the robot and what is done about points in it; names and defaults are Nav2's."""
+
+    name: str
+    action_type: ActionType
+    points: tuple[tuple[float, float], ...] = ()
+    """Corners in the base frame [m]; empty: the robot's footprint."""
+    min_points: int = 4
+    """Fewer points inside are none."""
+    slowdown_ratio: float = 0.5
+    """What `slowdown` multiplies the command with."""
+    linear_limit: float = 0.5
+    """Of `limit` [m/s]."""
+    angular_limit: float = 0.5
+    """Of `limit` [rad/s]."""
+    time_before_collision: float = 2.0
+    """`approach` scales a command down that would collide sooner, by what is left of this time [s]."""
+    simulation_time_step: float = 0.1
+    """Of the projection that `approach` makes [s]."""
+    enabled: bool = True
+
+
+FOOTPRINT_APPROACH = MonitorPolygon(name="FootprintApproach", action_type="approach", min_points=3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CollisionMonitorConfig:
+    """Parameters of the monitor; names are Nav2's."""
+
+    polygons: tuple[MonitorPolygon, ...] = (FOOTPRINT_APPROACH,)
+    source_timeout_ns: int = 1_000_000_000
+    """Data older than this is none, and stops the robot; 0: it does not [ns]."""
+    enabled: bool = True
+
+
+@dataclass(frozen=True)
+class Action:
+    """What became of a command."""
+
+    velocity: tuple[float, float]
+    """v [m/s], w [rad/s]."""
+    action_type: ActionType | None = None
+    polygon_name: str = ""
+
+
+@dataclass(kw_only=True)
+class CollisionMonitor:
+    """Looks at one command at a time; of several polygons the slowest result holds.
+
+    Source: nav2_collision_monitor, CollisionMonitor::process.
+    """
+
+    footprint: Array
+    """Corners in the base frame, shape (n, 2) [m]."""
+    config: CollisionMonitorConfig = field(default_factory=CollisionMonitorConfig)
+
+    def process(self, velocity: tuple[float, float], points: Array | None) -> Action:
+        """Return what may be driven.
+
+        Args:
+            velocity: The command: v [m/s], w [rad/s].
+            points: What the sensors see, in the base frame, shape (n, 2) [m]; None: a sensor is silent.
+        """
+        if not self.config.enabled:
+            return Action(velocity)
+        if points is None:
+            return Action((0.0, 0.0), "stop", INVALID_SOURCE)
+        seen = np.ascontiguousarray(points, dtype=np.float64)
+        action = Action(velocity)
+        for polygon in self.config.polygons:
+            if polygon.enabled and action.action_type != "stop":
+                ratio = self._ratio(polygon, velocity, seen)
+                safe = (ratio * velocity[0], ratio * velocity[1])
+                if math.hypot(*safe) < math.hypot(*action.velocity) or (
+                    polygon.action_type == "stop" and ratio == 0.0
+                ):
+                    action = Action(safe, polygon.action_type, polygon.name)
+        return action
+
+    def _ratio(self, polygon: MonitorPolygon, velocity: tuple[float, float], points: Array) -> float:
+        """Return what a polygon multiplies the command with."""
+        v, w = velocity
+        corners = np.array(polygon.points) if polygon.points else self.footprint
+        if polygon.action_type == "approach":
+            time = time_to_collision(
+                points,
+                corners,
+                float(v),
+                float(w),
+                polygon.simulation_time_step,
+                polygon.time_before_collision,
+                polygon.min_points,
+            )
+            return 1.0 if time < 0.0 else min(1.0, time / polygon.time_before_collision)
+        if time_to_collision(points, corners, 0.0, 0.0, 1.0, -1.0, polygon.min_points) < 0.0:
+            return 1.0
+        if polygon.action_type == "stop":
+            return 0.0
+        if polygon.action_type == "slowdown":
+            return polygon.slowdown_ratio
+        # One ratio for both keeps the curvature.
+        linear = polygon.linear_limit / abs(v) if v else 1.0
+        angular = polygon.angular_limit / abs(w) if w else 1.0
+        return min(1.0, linear, angular)
+
+
+@jit
+def time_to_collision(
+    points: Array, corners: Array, v: float, w: float, dt: float, horizon: float, min_points: int
+) -> float:
+    """Return when so many points are in a polygon that drives on at (v, w) [s]; -1: not within `horizon`.
+
+    0 if they are inside now. A step's result is the time at its beginning, as Nav2's getCollisionTime.
+
+    Args:
+        points: In the base frame, shape (n, 2) [m].
+        corners: Of the polygon, in the base frame, shape (n, 2) [m].
+        v: [m/s]
+        w: [rad/s]
+        dt: Step of the projection [s].
+        horizon: How far is looked ahead [s]; negative: only at the present.
+        min_points: How many points make a collision.
+    """
+    x, y, yaw, time = 0.0, 0.0, 0.0, -dt
+    n = corners.shape[0]
+    while True:
+        c, s, inside = math.cos(yaw), math.sin(yaw), 0
+        for k in range(points.shape[0]):
+            dx, dy = points[k, 0] - x, points[k, 1] - y
+            px, py = c * dx + s * dy, -s * dx + c * dy
+            odd, j = False, n - 1
+            for i in range(n):
+                if (corners[i, 1] > py) != (corners[j, 1] > py) and px < (corners[j, 0] - corners[i, 0]) * (
+                    py - corners[i, 1]
+                ) / (corners[j, 1] - corners[i, 1]) + corners[i, 0]:
+                    odd = not odd
+                j = i
+            if odd:
+                inside += 1
+        if inside >= min_points:
+            return max(time, 0.0)
+        time += dt
+        if time > horizon + 1e-9:
+            return -1.0
+        x += v * dt * math.cos(yaw)
+        y += v * dt * math.sin(yaw)
+        yaw += w * dt

@@ -1,0 +1,131 @@
+"""`/collision_monitor`: the last before the wheels, for commands of navigation and of people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.conversions import twist_from_planar
+from twin.bridge.msgs import CollisionMonitorState, LaserScan, Range, Twist, new, ns
+from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.srvs import Toggle
+from twin.geometry import Array
+from twin.navigation.control.collision_monitor import (
+    INVALID_SOURCE,
+    Action,
+    CollisionMonitor,
+    CollisionMonitorConfig,
+)
+from twin.nodes.navigation.costmap import scan_points
+from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.node_parameters import declare_config
+
+_ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
+_RANGE_STEP = np.radians(1.0)
+
+
+class CollisionMonitorNode:
+    """Takes `cmd_vel_in`, scans and ranges; publishes `cmd_vel_out` and, when it changes, what it does."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        robot_pose: RobotPose,
+        footprint: Array,
+        config: CollisionMonitorConfig | None = None,
+        *,
+        cmd_vel_in: str = "cmd_vel_smoothed",
+        cmd_vel_out: str = "cmd_vel",
+        scan_topics: tuple[str, ...] = ("scan",),
+        range_topics: tuple[str, ...] = (),
+        namespace: str = "",
+    ) -> None:
+        self.node = node = bus.create_node("collision_monitor", namespace)
+        self.monitor = CollisionMonitor(footprint=footprint, config=config or CollisionMonitorConfig())
+        declare_config(node, self.monitor.config, self._reconfigure)
+        self._robot_pose = robot_pose
+        self._enabled = True
+        self._polygon = ""
+        self._scans: dict[str, LaserScan | None] = dict.fromkeys(scan_topics)
+        self._ranges: dict[str, Range | None] = dict.fromkeys(range_topics)
+        self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
+        self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
+        for topic in scan_topics:
+            node.create_subscription(LaserScan, topic, self._keep(self._scans, topic), SENSOR_DATA)
+        for topic in range_topics:
+            node.create_subscription(Range, topic, self._keep(self._ranges, topic), SENSOR_DATA)
+        node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10)
+        node.create_service(Toggle, "collision_monitor/toggle", self._on_toggle)
+
+    def _reconfigure(self, config: CollisionMonitorConfig) -> None:
+        self.monitor.config = config
+
+    def _on_toggle(self, request: Any) -> Any:
+        self._enabled = bool(request.enable)
+        text = f"Collision monitor toggled {'on' if self._enabled else 'off'} successfully"
+        return new(Toggle.Response, success=True, message=text)
+
+    @staticmethod
+    def _keep(kept: dict[str, Any], topic: str) -> Callable[[Any], None]:
+        def on_message(message: Any) -> None:
+            # A scan without a single reading (NaN) is a sensor that is broken, not one that sees nothing.
+            if not isinstance(message, LaserScan) or not np.isnan(message.ranges).all():
+                kept[topic] = message
+
+        return on_message
+
+    def _on_twist(self, message: Twist) -> None:
+        velocity = (message.linear.x, message.angular.z)
+        if not np.isfinite(velocity).all():
+            self._publisher.publish(message)  # refused, and said, by who drives
+            return
+        action = self.monitor.process(velocity, self._points()) if self._enabled else Action(velocity)
+        if action.polygon_name != self._polygon:
+            self._tell(action)
+        self._publisher.publish(twist_from_planar(*action.velocity))
+
+    def _tell(self, action: Action) -> None:
+        self._polygon = action.polygon_name
+        self._state.publish(
+            CollisionMonitorState(action_type=_ACTIONS[action.action_type], polygon_name=action.polygon_name)
+        )
+        if action.polygon_name == INVALID_SOURCE:
+            self.node.get_logger().warn("stop: a sensor is silent, or there is no transform to it")
+        else:
+            what = f"{action.action_type}: {action.polygon_name}" if action.action_type else "the way is free"
+            self.node.get_logger().info(what)
+
+    def _points(self) -> Array | None:
+        """Return what all sensors see, in the base frame as it is now; None if one of them is silent."""
+        here = self._robot_pose.in_odom()
+        timeout = self.monitor.config.source_timeout_ns
+        found = []
+        for message in (*self._scans.values(), *self._ranges.values()):
+            fresh = message is not None and (
+                timeout == 0 or self.node.now_ns - ns(message.header.stamp) <= timeout
+            )
+            T_odom_sensor = (
+                self._robot_pose.at_stamp(self._robot_pose.frames.odom, message.header)
+                if fresh and message is not None
+                else None
+            )
+            if here is None or message is None or T_odom_sensor is None:
+                if timeout:
+                    return None
+                continue
+            local = scan_points(message, np.nan) if isinstance(message, LaserScan) else _arc(message)
+            local = local[np.isfinite(local).all(axis=1)]
+            found.append((here.inverse() @ T_odom_sensor).apply(local))
+        return np.concatenate(found) if found else np.zeros((0, 2))
+
+
+def _arc(message: Range) -> Array:
+    """Return points along the arc where a range sensor sees something, in its frame, shape (n, 2)."""
+    if not message.min_range <= message.range < message.max_range:
+        return np.zeros((0, 2))
+    half = 0.5 * float(message.field_of_view)
+    angles = np.linspace(-half, half, int(np.ceil(2.0 * half / _RANGE_STEP)) + 1)
+    return float(message.range) * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -1,0 +1,46 @@
+"""The collision monitor of a robot in a scenario; names are Nav2's."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from twin.scenario.fields import Fraction, NotNegative, Positive, RosName
+from twin.strict_yaml import Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
+
+
+class MonitorPolygonConfig(StrictModel):
+    """A polygon about the robot, and what is done about obstacles in it."""
+
+    name: RosName
+    """What messages call it."""
+    action_type: Literal["stop", "slowdown", "limit", "approach"]
+    """`approach` looks ahead along the command, the others at the polygon as it is."""
+    points: tuple[tuple[Metres, Metres], ...] = Field(default=(), max_length=100)
+    """Corners in the base frame [m]; absent: the robot's footprint."""
+    min_points: Annotated[int, Positive] = 4
+    """Fewer points in it are none."""
+    slowdown_ratio: Annotated[float, Fraction] = 0.5
+    """What `slowdown` multiplies the command with."""
+    linear_limit: Annotated[MetresPerSecond, NotNegative] = 0.5
+    """Of `limit` [m/s]."""
+    angular_limit: Annotated[RadiansPerSecond, NotNegative] = 0.5
+    """Of `limit` [rad/s]."""
+    time_before_collision: Annotated[Seconds, Positive] = 2.0
+    """Of `approach`: a command that collides sooner is slowed down [s]."""
+    simulation_time_step: Annotated[Seconds, Positive] = 0.1
+    """Of `approach`: step of the projection [s]."""
+
+
+class CollisionMonitorParameters(StrictModel):
+    """Guards all commands, people's too; `collision_monitor: {}` slows down before the footprint collides."""
+
+    polygons: tuple[MonitorPolygonConfig, ...] = (
+        MonitorPolygonConfig(name="FootprintApproach", action_type="approach", min_points=3),
+    )
+    """The slowest of their results holds."""
+    source_timeout: Annotated[Seconds, NotNegative] = 1.0
+    """The robot stops when a sensor is silent for so long [s]; 0: it does not."""
+    range_topics: tuple[str, ...] = ()
+    """Topics of sensor_msgs/Range that it looks at, beside `scan`."""
