@@ -32,7 +32,7 @@ controller_server:
   ros__parameters:
     controller_frequency: 25.0
     min_x_velocity_threshold: 0.001
-    costmap_update_timeout: 0.3
+    min_y_velocity_threshold: 0.5
     goal_checker_plugins: ["precise"]
     controller_plugins: ["FollowPath"]
     progress_checker:
@@ -116,7 +116,7 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert not got.waypoints.stop_on_failure
     assert got.waypoints.wait_at_waypoint.waypoint_pause_duration == 300
     assert told == [
-        "nav2.yaml: controller_server does not have costmap_update_timeout",
+        "nav2.yaml: controller_server does not have min_y_velocity_threshold",
         "nav2.yaml: not read for amcl",
     ]
 

@@ -172,7 +172,8 @@ class Nav2Parameters:
         section, _, last = name.rpartition(".")
         beside = [other.rpartition(".")[2] for other in known if other.rpartition(".")[0] == section]
         close = difflib.get_close_matches(last, beside, n=1, cutoff=_TYPO)
-        if close and last not in _ONLY_NAV2S:
+        sideways = bool(close) and last.replace("y", "x") == close[0].replace("y", "x")
+        if close and not sideways and last not in _ONLY_NAV2S:
             said = f"{node} has no parameter {entry.said}; did you mean '{close[0]}'?"
             self._problems.append(Problem(said, self.path, entry.line))
         else:

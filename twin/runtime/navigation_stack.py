@@ -76,7 +76,7 @@ def build_navigation(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
     if lidars:
-        DockingServerNode(bus, pose, namespace=namespace)
+        DockingServerNode(bus, pose, parameters.docking, namespace=namespace)
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:

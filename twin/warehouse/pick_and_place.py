@@ -11,7 +11,6 @@ from py_trees.common import Status
 from twin.bridge.bus import Bus
 from twin.manipulation.telescopic_arm import TelescopicArm
 from twin.nodes.navigation.bt.control import RecoveryNode, sequence
-from twin.nodes.navigation.docking_server import DockingConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.warehouse.skills import MobileManipulationNode, Station
 
@@ -39,8 +38,6 @@ class PickAndPlaceConfig:
     """Of the grasp frame above the surface while docking and looking for the tote [m]."""
     place_depth: float = 0.24
     """From the table's face to the tote's centre [m]."""
-    docked_distance: float = DockingConfig.docked_distance
-    """From the base's origin to the table's face when docked [m]."""
     lift_off: float = 0.05
     """Raised above the surface before the arm moves with the tote [m]."""
     set_down_clearance: float = 0.002
@@ -154,7 +151,7 @@ class PickAndPlaceNode(MobileManipulationNode):
         config = self.config
         set_down = task.place.surface_z + task.tote_height / 2.0 + config.set_down_clearance
         above = set_down + config.lift_off
-        x = config.docked_distance + config.place_depth
+        x = self.skills.docked_distance + config.place_depth
         dock = RecoveryNode(
             "DockWithRetries",
             config.dock_attempts - 1,

@@ -37,10 +37,10 @@ from twin.bridge.srvs import SetBool
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
+from twin.navigation.docking.docks import DockType
 from twin.nodes.messages import pose_stamped
 from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.navigation.bt.leaves import CallAction, CallService, Condition, Do
-from twin.nodes.navigation.docking_server import DockingConfig
 from twin.nodes.navigation.robot_pose import Frames
 
 
@@ -59,7 +59,9 @@ class Station:
 class SkillsConfig:
     """How gently, and how sure, the robot handles goods."""
 
-    staging_distance: float = DockingConfig.staging_distance
+    docked_distance: float = -DockType.external_detection_translation_x
+    """From the face to the base's origin when docked [m]."""
+    staging_distance: float = -DockType.external_detection_translation_x - DockType.staging_x_offset
     """From the face to the base's origin before docking [m]."""
     gripper_effort: float = 160.0
     """[N]"""
@@ -133,13 +135,14 @@ class MobileManipulationNode(MissionNode):
 
     def dock_at(self, station: Station, dock_type: str) -> Behaviour:
         """Dock at a station; `tote` centres the robot on the tote there, `table` on the plan's point."""
+        docked = station.face @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
         return CallAction(
             f"Dock[{station.name}]",
             self._dock,
             lambda: new(
                 DockRobot.Goal,
                 use_dock_id=False,
-                dock_pose=pose_stamped(station.face, self._frames.map, self.node.now_ns),
+                dock_pose=pose_stamped(docked, self._frames.map, self.node.now_ns),
                 dock_type=dock_type,
                 navigate_to_staging_pose=False,
             ),

@@ -162,8 +162,8 @@ def footprint_hits(
 ) -> int:
     """Return how many samples of a footprint, its inside too, are lethal or off the map.
 
-    They lie half a cell apart. An outline alone would not do: a lidar sees the surface of a thing only, and the
-    outline can be past it.
+    They lie half a cell apart. An outline alone would not do: a lidar sees the surface of a thing only, and
+    the outline can be past it.
 
     Args:
         costs: The grid.

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.geometry import Array
 from twin.navigation.control.footprint_cover import FootprintCover
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.path_handler import LocalPath
@@ -28,4 +27,3 @@ class Scene:
     local: LocalPath
     costmap: Costmap
     cover: FootprintCover
-
