@@ -137,7 +137,7 @@ def _braking(limits: AxisLimits) -> float:
 
 def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:
     kind = overrides.get("goal_checker")
-    there = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
+    there: dict[str, Any] = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
     if kind == "position":
         return overridden(PositionGoalCheckerConfig(**there), overrides)
     of = StoppedGoalCheckerConfig if kind == "stopped" else GoalCheckerConfig

@@ -1,7 +1,7 @@
 """A way around what stands on the path, for controllers that look for the way themselves.
 
-A rollout sees as far as it drives: beside an obstacle every step along the path costs, every step aside is away
-from it, and the robot stays where it is. A search over the local costmap knows the way out.
+A rollout sees as far as it drives: beside an obstacle every step along the path costs, every step aside is
+away from it, and the robot stays where it is. A search over the local costmap knows the way out.
 """
 
 from __future__ import annotations

@@ -215,7 +215,7 @@ class MPPIConfig:
     inversion_yaw_tolerance: float = 0.4
     """[rad]"""
     detours: bool = True
-    """Whether, where the path is blocked, a way around is searched in the costmap and followed; not Nav2's."""
+    """Whether a way around is searched and followed where the path is blocked; not Nav2's."""
     max_robot_pose_search_dist: float = 3.0
     """How far along the path the nearest pose is searched each time [m]."""
     seed: int = 0

@@ -1,7 +1,7 @@
 """One rollout that follows the path by pure pursuit: the way out where noise alone finds none.
 
-Trevisan, Alonso-Mora: Biased-MPPI, RA-L 2024: samples may come from any controller. Turning round in place and
-then driving is far from every noisy copy of standing still.
+Trevisan, Alonso-Mora: Biased-MPPI, RA-L 2024: samples may come from any controller. Turning round in place
+and then driving is far from every noisy copy of standing still.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def pursue(
         distance = math.hypot(dx, dy)
         off = math.atan2(dy, dx) - yaw + (math.pi if backwards else 0.0)
         off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
-        u, r = int(math.floor(x * per_metre)), int(math.floor(y * per_metre))
+        u, r = math.floor(x * per_metre), math.floor(y * per_metre)
         speed = -limits[1] if backwards else limits[0]
         if 0 <= u < width and 0 <= r < height:
             speed = min(speed, allowed[costs[r, u]])
