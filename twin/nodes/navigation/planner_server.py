@@ -39,7 +39,7 @@ class PlannerServerConfig:
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
     path_distance: float = 1.0
-    """A path farther away from the robot than this is not valid: it was carried away, or localised anew [m]."""
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
