@@ -18,6 +18,7 @@ from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.runtime.docking_config import docking_config
@@ -41,6 +42,7 @@ class NavigationParameters:
     planner: PlannerPluginConfig
     planner_server: PlannerServerConfig
     controller_server: ControllerServerConfig
+    path_smoother: SmootherServerConfig
     behaviors: BehaviorConfig
     docking: DockingServerConfig
     navigator: BtNavigatorConfig
@@ -91,6 +93,7 @@ def navigation_parameters(
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
+        path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
         navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
