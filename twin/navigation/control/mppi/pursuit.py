@@ -1,7 +1,7 @@
 """One rollout that follows the path by pure pursuit: the way out where noise alone finds none.
 
-Trevisan, Alonso-Mora: Biased-MPPI, RA-L 2024: samples may come from any controller. Turning round in place and
-then driving is far from every noisy copy of standing still.
+Trevisan, Alonso-Mora: Biased-MPPI, RA-L 2024: samples may come from any controller. Turning round in place
+and then driving is far from every noisy copy of standing still.
 """
 
 from __future__ import annotations
@@ -56,14 +56,14 @@ def pursue(
             d = (path[0, j] - x) ** 2 + (path[1, j] - y) ** 2
             if d < nearest:
                 nearest, i = d, j
-        ahead, j = min(max(0.8 * abs(v), 0.3), 0.8), i
+        ahead, j = min(max(0.5 * abs(v), 0.25), 0.8), i
         while j < n - 1 and along[j] < along[i] + ahead:
             j += 1
         dx, dy = path[0, j] - x, path[1, j] - y
         distance = math.hypot(dx, dy)
         off = math.atan2(dy, dx) - yaw + (math.pi if backwards else 0.0)
         off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
-        u, r = int(math.floor(x * per_metre)), int(math.floor(y * per_metre))
+        u, r = math.floor(x * per_metre), math.floor(y * per_metre)
         speed = -limits[1] if backwards else limits[0]
         if 0 <= u < width and 0 <= r < height:
             speed = min(speed, allowed[costs[r, u]])
