@@ -89,7 +89,7 @@ def test_the_gyroscope_is_believed_about_turns_and_its_bias_is_learnt(bench: Ben
     wheels = abs(math.remainder(robot.drive.odometry.pose.yaw - robot.yaw, 2.0 * math.pi))
     assert wheels > 0.5
     assert robot.error < 0.04
-    assert robot.ekf.bias.value[2] == pytest.approx(robot.bias, abs=1e-4)
+    assert robot.ekf.biases[1].value[2] == pytest.approx(robot.bias, abs=1e-4)
 
 
 def test_it_publishes_the_transform_and_the_covariance_grows(bench: Bench) -> None:
