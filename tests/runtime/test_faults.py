@@ -1,4 +1,4 @@
-"""Hardware that fails, a robot carried away, a wrong map: each ends in a recovery or in an abort that says why."""
+"""Hardware that fails, a robot carried away, a wrong map: each ends in a recovery or an abort that says why."""
 
 from __future__ import annotations
 
@@ -177,7 +177,9 @@ def test_faults_act_on_the_hardware_and_are_told(
         run.tick()
     assert all(np.array_equal(scans[i], scans[3]) for i in (4, 5, 6, 7)), "the last scan again and again"
     assert not np.array_equal(scans[8], scans[7])
-    assert odometry[-1] == pytest.approx(1.0, abs=0.02), "wheels were miscounted, and stood when it was carried"
+    assert odometry[-1] == pytest.approx(1.0, abs=0.02), (
+        "wheels were miscounted, and stood when it was carried"
+    )
     assert run.world.pose("warehouse_bot/base_footprint").xyz[:2] == pytest.approx((3.0, 0.0), abs=0.02)
     assert [text.partition("warehouse_bot")[2] for text in told] == [
         ": freeze",

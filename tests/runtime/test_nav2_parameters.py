@@ -33,6 +33,7 @@ controller_server:
     controller_frequency: 25.0
     min_x_velocity_threshold: 0.001
     costmap_update_timeout: 0.3
+    use_realtime_priority: false
     goal_checker_plugins: ["precise"]
     controller_plugins: ["FollowPath"]
     progress_checker:
@@ -101,6 +102,7 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert got.navigator.bt_loop_duration == 20
     assert got.navigator.error_code_name_prefixes == ("compute_path", "follow_path")
     assert got.controller_server.controller_period_ns == 40_000_000
+    assert got.controller_server.costmap_update_timeout_ns == 300_000_000
     assert _controller(got).lookahead_dist == 0.55
     assert got.controller_server.goal_checkers["general_goal_checker"].xy_goal_tolerance == 0.11, (
         "whatever the plugin is called"
@@ -116,7 +118,7 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert not got.waypoints.stop_on_failure
     assert got.waypoints.wait_at_waypoint.waypoint_pause_duration == 300
     assert told == [
-        "nav2.yaml: controller_server does not have costmap_update_timeout",
+        "nav2.yaml: controller_server does not have use_realtime_priority",
         "nav2.yaml: not read for amcl",
     ]
 
