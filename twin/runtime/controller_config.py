@@ -137,13 +137,11 @@ def _braking(limits: AxisLimits) -> float:
 
 def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:
     kind = overrides.get("goal_checker")
-    there = PositionGoalCheckerConfig(
-        xy_goal_tolerance=_TOLERANCE, xy_goal_tolerance_buffer=_TOLERANCE_BUFFER
-    )
+    there: dict[str, Any] = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
     if kind == "position":
-        return overridden(there, overrides)
+        return overridden(PositionGoalCheckerConfig(**there), overrides)
     of = StoppedGoalCheckerConfig if kind == "stopped" else GoalCheckerConfig
-    return overridden(of(**vars(there), yaw_goal_tolerance=_TOLERANCE), overrides)
+    return overridden(of(**there, yaw_goal_tolerance=_TOLERANCE), overrides)
 
 
 def _progress_checker(overrides: Mapping[str, Any]) -> ProgressCheckerConfig:

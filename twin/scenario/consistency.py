@@ -20,6 +20,7 @@ from twin.scenario.missions import (
 from twin.strict_yaml import Fault, Loc
 
 if TYPE_CHECKING:
+    from twin.scenario.robots import RobotConfig
     from twin.scenario.schema import Scenario
 
 
@@ -129,12 +130,20 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
         yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
     if isinstance(mission, RandomGoals) and (robot.localisation is None or robot.localisation.type != "amcl"):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
-    if isinstance(mission, Behaviors) and robot.navigation is None:
-        for i, step in enumerate(mission.steps):
-            if step.navigate_to_pose is not None:
-                yield Fault(
-                    ("mission", "steps", i), f"navigate_to_pose needs a navigation of robot '{robot.id}'"
-                )
+    if isinstance(mission, Behaviors):
+        yield from _behaviors(mission, robot)
+
+
+def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
+    docks = robot.navigation.docking.docks if robot.navigation is not None else {}
+    for i, step in enumerate(mission.steps):
+        at = ("mission", "steps", i)
+        if robot.navigation is None and step.kind in ("navigate_to_pose", "dock_robot", "undock_robot"):
+            yield Fault(at, f"{step.kind} needs a navigation of robot '{robot.id}'")
+        elif step.dock_robot is not None and step.dock_robot.dock not in docks:
+            name = step.dock_robot.dock
+            valid = nearest(name, docks) if docks else "navigation.docking.docks is empty"
+            yield Fault((*at, "dock_robot", "dock"), f"robot '{robot.id}' knows no dock '{name}'; {valid}")
 
 
 def _faults(scenario: Scenario) -> Iterator[Fault]:

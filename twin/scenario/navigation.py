@@ -9,6 +9,7 @@ from typing import Annotated
 
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerParameters
+from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
@@ -98,3 +99,5 @@ class NavigationConfig(StrictModel):
     """Overrides of the costmap that plans are made on."""
     local_costmap: CostmapParameters = CostmapParameters()
     """Overrides of the rolling costmap around the robot."""
+    docking: DockingParameters = DockingParameters()
+    """Docks, and overrides of the docking server."""

@@ -14,11 +14,12 @@ from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
     INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
     NO_INFORMATION,
     Costmap,
 )
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.costmaps.kernels import escapes, outline_hits, steps_to_collision
+from twin.navigation.costmaps.kernels import escapes, outline_cost, steps_to_collision
 from twin.navigation.failures import NoValidControl
 
 _ESCAPE_TURN = 0.5
@@ -107,6 +108,8 @@ class RegulatedPurePursuit:
     """The lookahead point of the last command, in the path's frame [m]."""
     trajectory: Array | None = field(init=False, default=None)
     """None: it plans none."""
+    candidates: None = field(init=False, default=None)
+    """It shows none."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
@@ -274,7 +277,7 @@ class RegulatedPurePursuit:
             self._check(pose, v, w, carrot_dist, costmap)
         except NoValidControl:
             at = float(pose.x), float(pose.y), float(pose.yaw)
-            if outline_hits(costmap.costs, self.footprint, *at, *costmap.frame):
+            if outline_cost(costmap.costs, self.footprint, *at, *costmap.frame) == LETHAL_OBSTACLE:
                 ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
                 for way in ways:
                     if escapes(costmap.costs, self.footprint, *at, *way, 0.05, 10, *costmap.frame):
