@@ -31,6 +31,7 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a
 	$(BIN)/python -m tests.benchmarks.run_cost
 	$(BIN)/python -m tests.benchmarks.cdr_cost
 	$(BIN)/python -m tests.benchmarks.lockstep_cost
+	$(BIN)/python -m tests.benchmarks.tracking
 
 soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory
 	$(BIN)/python -m tests.benchmarks.soak

@@ -257,7 +257,9 @@ def _parameters() -> str:
     alive = gc.get_objects()
     lines = []
     for title, kind in PARAMETERS.items():
-        config = next(item for item in alive if type(item) is kind)  # the first made is the configured one
+        found = [item for item in alive if type(item) is kind]
+        # Defaults of dataclass fields are alive, too; what the robot has is another one, or the same.
+        config = next((item for item in found if item != kind()), found[0])
         lines += _table(title, config, skip=())
     costmaps = {item.name: item.layers for item in alive if type(item) is CostmapNodeConfig}
     for name, layers in sorted(costmaps.items()):
@@ -280,10 +282,11 @@ def _table(title: str, config: Any, skip: tuple[str, ...]) -> list[str]:
 
 
 def _field_docs(kind: type[Any]) -> dict[str, str]:
-    """Return the string below each field of a dataclass."""
+    """Return the string below each field of a dataclass, its bases' too."""
+    inherited = [_field_docs(base) for base in kind.__bases__ if dataclasses.is_dataclass(base)]
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
     assert isinstance(body, ast.ClassDef)
-    found = {}
+    found = {name: text for base in inherited for name, text in base.items()}
     for item, following in zip(body.body, body.body[1:], strict=False):
         if isinstance(item, ast.AnnAssign) and isinstance(following, ast.Expr):
             assert isinstance(item.target, ast.Name)

@@ -109,6 +109,10 @@ class SimulationError(TwinError):
     """The physics cannot go on."""
 
 
+class BenchmarkError(TwinError):
+    """A benchmark's file is wrong."""
+
+
 def nearest(word: str, valid: Iterable[str]) -> str:
     """Return the tail of an error message that lists valid names, the nearest one first.
 

@@ -33,7 +33,7 @@ from twin.nodes.navigation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import run
-from twin.runtime.robot_stack import _initial_guess
+from twin.runtime.localisation_stack import _initial_guess
 from twin.scenario.schema import load
 from twin.warehouse import arena
 

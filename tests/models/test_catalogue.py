@@ -14,8 +14,9 @@ from twin.models import catalogue, link_poses, load
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_positions
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
+from twin.runtime.derive import footprint
 
-ROBOTS = ("diff_bot", "r2d2", "sp1s", "test_robot", "warehouse_bot")
+ROBOTS = ("diff_bot", "jackal", "r2d2", "sp1s", "test_robot", "warehouse_bot")
 
 
 def random_positions(description: RobotDescription, seed: int) -> dict[str, float]:
@@ -127,6 +128,20 @@ def test_sp1s_has_the_blogs_dimensions_and_a_cone_ahead() -> None:
     assert (sonar.range_min, sonar.range_max) == (0.02, 4.0)
     turned = link_poses(car, {"head_servo_joint": math.pi / 2})["ultrasonic_link"]
     np.testing.assert_allclose(turned.apply((1.0, 0.0, 0.0)) - turned.xyz, (0.0, 1.0, 0.0), atol=1e-9)
+
+
+def test_jackal_has_the_numbers_of_the_barn_challenge() -> None:
+    robot = load("jackal")
+    assert robot.mass == pytest.approx(17.0)
+    assert robot.drive is not None
+    assert robot.drive.kind == "skid_steer"
+    assert (robot.drive.wheel_separation, robot.drive.wheel_radius) == (0.37559, 0.098)
+    assert (robot.drive.max_linear_velocity, robot.drive.max_angular_velocity) == (2.0, 4.0)
+    scan = next(sensor for sensor in robot.sensors if isinstance(sensor, LidarSpec))
+    assert (scan.samples, scan.range_max, scan.noise_stddev) == (720, 30.0, 0.01)
+    assert math.degrees(scan.angle_max - scan.angle_min) == pytest.approx(270.0)
+    corners = footprint(robot, padding=0.0)
+    np.testing.assert_allclose(np.ptp(corners, axis=0), (0.458, 0.41559), atol=1e-5)
 
 
 def test_r2d2_has_the_tutorials_joints() -> None:

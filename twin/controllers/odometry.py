@@ -37,8 +37,16 @@ class Odometry:
         self._variances = (0.0,) * 6  # of xx, xy, yy, x yaw, y yaw, yaw yaw
         self._last: tuple[float, float] | None = None
 
-    def update(self, left: float, right: float, dt: float) -> Pose2:
-        """Take the mean wheel angle of each side [rad], `dt` [s] after the last; return the pose."""
+    def update(self, left: float, right: float, dt: float, *, yaw_rate: float | None = None) -> Pose2:
+        """Take the mean wheel angle of each side [rad], `dt` [s] after the last; return the pose.
+
+        Args:
+            left: Of the left side.
+            right: Of the right side.
+            dt: Since the last update.
+            yaw_rate: Of a gyroscope, the mean over `dt` [rad/s]; it is believed instead of the wheels, which
+                on a skid steer slip in every turn.
+        """
         if self._last is None:
             self._last = (left, right)
             return self.pose
@@ -46,7 +54,7 @@ class Odometry:
         step_left, step_right = (left - self._last[0]) * radius, (right - self._last[1]) * radius
         self._last = (left, right)
         distance = (step_left + step_right) / 2.0
-        angle = (step_right - step_left) / self.config.track
+        angle = (step_right - step_left) / self.config.track if yaw_rate is None else yaw_rate * dt
         heading = self.pose.yaw + angle / 2.0
         # The chord of an arc is its length times sinc of half the angle.
         half = angle / 2.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.costmaps.kernels import steps_to_collision
+from twin.navigation.costmaps.kernels import escapes, steps_to_collision
 
 COLLISION_AHEAD = "collision_ahead"
 TIMEOUT = "timeout"
@@ -108,7 +108,11 @@ class _Behavior:
             steps,
             *costmap.frame,
         )
-        return hit > 0  # 0 is the present pose: a robot that touches something may still move away
+        if hit != 0:
+            return hit > 0
+        # The present pose is a collision: a robot that touches something may move away, not further in.
+        state = float(pose.x), float(pose.y), float(pose.yaw), float(v), float(w)
+        return not escapes(costmap.costs, self._footprint, *state, time / steps, steps, *costmap.frame)
 
 
 @dataclass(kw_only=True)

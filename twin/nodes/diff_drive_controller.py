@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import (
     Header,
+    Imu,
     Point,
     Pose,
     PoseWithCovariance,
@@ -21,6 +23,7 @@ from twin.bridge.msgs import (
 from twin.bridge.msgs import (
     Odometry as OdometryMsg,
 )
+from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
@@ -39,6 +42,9 @@ class DiffDriveNodeConfig:
     odom_frame: str = "odom"
     base_frame: str = "base_footprint"
     period_ns: int = 20_000_000
+    use_imu: bool = False
+    """Whether odometry takes its heading from the gyroscope (`odometry.use_imu` of turtlebot3_node)."""
+    imu_topic: str = "imu"
     enable_odom_tf: bool = True
     """Whether odom → base is published; not where a filter does."""
 
@@ -63,6 +69,10 @@ class DiffDriveControllerNode:
         self._publisher = self.node.create_publisher(OdometryMsg, "odom", 10)
         self._tf = TransformBroadcaster(self.node)
         self.node.create_subscription(Twist, "cmd_vel", self._on_cmd_vel, 10)
+        self._gyro: list[float] = []
+        """Yaw rates since the last update, that of the update before first [rad/s]."""
+        if config.use_imu:
+            self.node.create_subscription(Imu, config.imu_topic, self._on_imu, SENSOR_DATA)
         self.node.create_timer(config.period_ns, self._update)
 
     def _on_cmd_vel(self, message: Twist) -> None:
@@ -71,12 +81,26 @@ class DiffDriveControllerNode:
                 f"cmd_vel refused: linear.x {message.linear.x}, angular.z {message.angular.z} must be finite"
             )
 
+    def _on_imu(self, message: Imu) -> None:
+        rate = message.angular_velocity.z
+        if math.isfinite(rate):
+            self._gyro.append(rate)
+
+    def _yaw_rate(self) -> float | None:
+        """Return the mean yaw rate since the last update; None without a reading: wheels must do."""
+        if len(self._gyro) < 2:
+            return None
+        mean = sum(self._gyro[:-1]) / 2.0 + sum(self._gyro[1:]) / 2.0
+        rate = mean / (len(self._gyro) - 1)
+        del self._gyro[:-1]
+        return rate
+
     def _update(self) -> None:
         dt = self.config.period_ns * 1e-9
         position = self._hardware.read().position.tolist()
         left = sum(position[i] for i in self._left) / len(self._left)
         right = sum(position[i] for i in self._right) / len(self._right)
-        pose = self.odometry.update(left, right, dt)
+        pose = self.odometry.update(left, right, dt, yaw_rate=self._yaw_rate())
         wheels = self.controller.update(dt)
         for joint in self.config.left_joints:
             self._hardware.command(joint, wheels.left)

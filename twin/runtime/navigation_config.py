@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.planning.commitment import CommitmentConfig
 from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
@@ -30,6 +32,8 @@ C = TypeVar("C")
 
 _GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
 _LOCAL_COSTMAP_PERIOD_NS = 200_000_000
+_MISSED_SCANS = 3.5
+"""After so many scan periods without a scan the robot stops: three in a row are missing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +45,7 @@ class NavigationParameters:
     local_costmap: CostmapNodeConfig
     planner: PlannerPluginConfig
     planner_server: PlannerServerConfig
+    commitment: CommitmentConfig
     controller_server: ControllerServerConfig
     path_smoother: SmootherServerConfig
     behaviors: BehaviorConfig
@@ -50,7 +55,13 @@ class NavigationParameters:
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
+    config: NavigationConfig,
+    drive: DriveSpec,
+    footprint: Array,
+    frames: Frames,
+    *,
+    mapping: bool = False,
+    scan_rate: float | None = None,
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -60,6 +71,7 @@ def navigation_parameters(
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
         mapping: Whether the map is made on the way: paths may lead through what is unknown.
+        scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
@@ -72,10 +84,25 @@ def navigation_parameters(
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
-    rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    rolling = replace(
+        layers,
+        rolling_window=True,
+        width=4.0,
+        height=4.0,
+        obstacle_max_range=3.0,
+        expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
+    )
     smoother = VelocitySmootherConfig(
-        linear=AxisLimits(max_velocity=linear, max_acceleration=0.8, max_deceleration=1.2),
-        angular=AxisLimits(max_velocity=angular, max_acceleration=2.0, max_deceleration=3.0),
+        linear=AxisLimits(
+            max_velocity=linear,
+            max_acceleration=config.max_linear_acceleration or 0.8,
+            max_deceleration=config.max_linear_deceleration or 1.2,
+        ),
+        angular=AxisLimits(
+            max_velocity=angular,
+            max_acceleration=config.max_angular_acceleration or 2.0,
+            max_deceleration=config.max_angular_acceleration or 3.0,
+        ),
     )
     return NavigationParameters(
         smoother=smoother,
@@ -91,12 +118,22 @@ def navigation_parameters(
             PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
+        commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
-        navigator=overridden(BtNavigatorConfig(), config.navigator.overrides()),
+        navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
+    )
+
+
+def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
+    defaults = BtNavigatorConfig()
+    frequency = overrides.get("bt_loop_frequency")
+    return replace(
+        overridden(defaults, overrides),
+        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
     )
 
 
@@ -107,7 +144,9 @@ def _costmap(
     return CostmapNodeConfig(
         name=name,
         frame=frame,
-        layers=overridden(layers, overrides),
+        layers=overridden(
+            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
+        ),
         range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )

@@ -39,7 +39,15 @@ def build_navigation(
     localisation = context.config.localisation
     mapping = localisation is not None and localisation.type == "slam"
     config = with_plugins(config, namespace)
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
+    lidars = [s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == "scan"]
+    parameters = navigation_parameters(
+        config,
+        description.drive,
+        footprint,
+        pose.frames,
+        mapping=mapping,
+        scan_rate=lidars[0].rate_hz if lidars else None,
+    )
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
     build_commands(context, monitor_with_file(config, namespace), pose, footprint)
@@ -55,6 +63,7 @@ def build_navigation(
         global_costmap,
         config=parameters.planner,
         server=parameters.planner_server,
+        commitment=parameters.commitment,
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)
@@ -66,7 +75,7 @@ def build_navigation(
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
-    if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
+    if lidars:
         DockingServerNode(bus, pose, parameters.docking, namespace=namespace)
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)

@@ -19,6 +19,7 @@ from twin.errors import RecordingError, ScenarioError
 from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
+from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
@@ -72,6 +73,7 @@ class Run:
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
+        self._faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
@@ -114,11 +116,12 @@ class Run:
             self.lockstep.step()
 
     def actuate(self) -> None:
-        """3. Actuators take the commands; obstacles come into the way."""
+        """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
         bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
         self._obstacles.update(bases)
+        self._faults.update()
 
     def step(self) -> None:
         """4. Physics."""
@@ -166,6 +169,7 @@ def run(
     bag: Path | None = None,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
+    watch: Callable[[Run], bool] | None = None,
 ) -> Verdict:
     """Run a scenario to its verdict.
 
@@ -182,6 +186,7 @@ def run(
         bag: Folder for a bag of every message.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
+        watch: Called after each tick; the run ends when it returns True.
 
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
@@ -211,7 +216,7 @@ def run(
         if sink is not None:
             sink.declare(parts.world)
         warm_up()
-        wall, cpu = _loop(simulation, pace, progress)
+        wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if out is not None:
             save_maps(parts.stacks, out)
@@ -241,7 +246,10 @@ def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
 
 
 def _loop(
-    simulation: Run, pace: float | None, progress: Callable[[Progress], None] | None
+    simulation: Run,
+    pace: float | None,
+    progress: Callable[[Progress], None] | None,
+    watch: Callable[[Run], bool] | None,
 ) -> tuple[float, float]:
     """Tick to the end; return the wall and CPU time it took [s]. Pacing is the only use of the wall clock."""
     gc.freeze()  # the model and the types stay; collections look only at what ticks make
@@ -249,6 +257,8 @@ def _loop(
     shown = wall
     while not simulation.over:
         simulation.tick()
+        if watch is not None and watch(simulation):
+            break
         now = time.perf_counter()
         simulated = simulation.world.time_ns * 1e-9
         if pace is not None and (ahead := simulated / pace - (now - wall)) > 0.0:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.scenario.checks.check import CheckConfig
+from twin.scenario.faults import RobotFault
 from twin.scenario.missions import (
     Behaviors,
     Explore,
@@ -29,6 +30,7 @@ def faults(scenario: Scenario) -> Iterator[Fault]:
     yield from _periods(scenario)
     yield from _arena(scenario)
     yield from _mission(scenario)
+    yield from _faults(scenario)
     yield from _checks(scenario)
 
 
@@ -66,6 +68,9 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, VelocityProfile):
         for i, step in enumerate(mission.steps):
             periods.append((("mission", "steps", i, "duration"), "the duration of the step", step.duration))
+    for i, robot in enumerate(scenario.robots):
+        latency = robot.command_latency
+        periods.append((("robots", i, "command_latency"), "the latency of commands", latency))
     for loc, what, period in periods:
         if nanoseconds(period) % max(1, nanoseconds(control)):
             yield Fault(loc, f"{what} {_whole(period, 'control periods', control)}")
@@ -95,6 +100,9 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         if entry.delivered is not None:
             yield Fault(("checks", i), f"delivered {message}")
+    for i, fault in enumerate(scenario.faults):
+        if fault.displacement is not None:
+            yield Fault(("faults", i), f"displacement {message}")
 
 
 def _mission(scenario: Scenario) -> Iterator[Fault]:
@@ -138,6 +146,21 @@ def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
             yield Fault((*at, "dock_robot", "dock"), f"robot '{robot.id}' knows no dock '{name}'; {valid}")
 
 
+def _faults(scenario: Scenario) -> Iterator[Fault]:
+    robots = [robot.id for robot in scenario.robots]
+    for i, entry in enumerate(scenario.faults):
+        config, loc = entry.config, ("faults", i, entry.kind)
+        if not isinstance(config, RobotFault):
+            continue
+        if config.robot is None and len(robots) > 1:
+            names = ", ".join(robots)
+            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        elif config.robot is not None and config.robot not in robots:
+            yield Fault((*loc, "robot"), f"unknown robot '{config.robot}'; {nearest(config.robot, robots)}")
+        if config.at >= scenario.duration:
+            yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
+
+
 def _checks(scenario: Scenario) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
     mission = scenario.mission
@@ -152,7 +175,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
         if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
             names = ", ".join(robots)
             yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
-        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "time_limit"):
+        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
             yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
         tote = subjects.get("tote")
         if entry.kind == "tote_slip" and tote is not None and tote not in totes:

@@ -80,6 +80,8 @@ class OdometryLocalisation(StrictModel):
 
     type: Literal["odometry"]
     """`odometry`"""
+    use_imu: bool = False
+    """Whether odometry takes its heading from the robot's gyroscope instead of from its wheels."""
     initial_pose_error: InitialPoseError = InitialPoseError()
     """How wrong the first guess is."""
 

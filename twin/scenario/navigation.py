@@ -13,7 +13,7 @@ from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
 
 
 class CostmapParameters(ParameterGroup):
@@ -37,6 +37,8 @@ class CostmapParameters(ParameterGroup):
     """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
+    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
     raytrace_min_range: Annotated[Metres, NotNegative] | None = None
     """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
@@ -49,6 +51,10 @@ class CostmapParameters(ParameterGroup):
     """Whether keep-out zones are inflated, so that no part of the robot enters them."""
     range_topics: tuple[str, ...] | None = None
     """Topics of sensor_msgs/Range for the range sensor layer."""
+    robot_radius: Annotated[Metres, Positive] | None = None
+    """Takes the robot as a circle of this radius instead of by its footprint [m]."""
+    rolling_window: bool | None = None
+    """Whether the grid follows the robot, without a static map."""
 
 
 class NavigatorParameters(ParameterGroup):
@@ -58,6 +64,8 @@ class NavigatorParameters(ParameterGroup):
     """Behaviour tree of goals that name none: one that ships with twin, or a file."""
     default_nav_through_poses_bt_xml: NameOrPath | None = None
     """The same for goals through poses."""
+    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    """Rate of the tree's ticks [Hz]."""
 
 
 class NavigationConfig(StrictModel):
@@ -67,6 +75,12 @@ class NavigationConfig(StrictModel):
     """Limit of the velocity smoother [m/s]; absent: the robot's own."""
     max_angular_speed: Annotated[RadiansPerSecond, Positive] | None = None
     """Limit of the velocity smoother [rad/s]; absent: the robot's own."""
+    max_linear_acceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother when speeding up [m/s²]."""
+    max_linear_deceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother when braking [m/s²]."""
+    max_angular_acceleration: Annotated[float, Positive] | None = None
+    """Limit of the velocity smoother, also when braking [rad/s²]."""
     collision_monitor: CollisionMonitorParameters | None = None
     """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
     params_file: NameOrPath | None = None

@@ -12,7 +12,9 @@ from twin.strict_yaml import Metres
 
 _AtLeastOne = Field(ge=1.0)
 
-_SERVER = frozenset({"plugin", "compute_alternatives", "tolerance", "allow_unknown"})
+_SERVER = frozenset(
+    {"plugin", "compute_alternatives", "tolerance", "allow_unknown", "commitment_cost", "commitment_width"}
+)
 _KEYS = {
     "grid_based": frozenset({"cost_factor"}),
     "theta_star": frozenset({"w_euc_cost", "w_traversal_cost"}),
@@ -45,6 +47,10 @@ class PlannerParameters(ParameterGroup):
     """Whether a plan may cross unknown cells."""
     compute_alternatives: Annotated[int, NotNegative] | None = None
     """How many other ways are tried when a goal is asked for again from the same place."""
+    commitment_cost: Annotated[int, Field(ge=0, le=252)] | None = None
+    """Added to the cost of each cell off the last path, so that routes are not changed lightly."""
+    commitment_width: Annotated[Metres, Positive] | None = None
+    """To each side of the last path that counts as on it [m]."""
     cost_factor: Annotated[float, NotNegative] | None = None
     """`grid_based`: a metre at cost 252 counts as 1 + cost_factor metres of free space."""
     w_euc_cost: Annotated[float, Positive] | None = None

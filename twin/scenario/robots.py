@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName
+from twin.scenario.fields import ArgumentText, NameOrPath, NotNegative, PoseConfig, RosName
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
-from twin.strict_yaml import Fault, Faults, StrictModel
+from twin.strict_yaml import Fault, Faults, Seconds, StrictModel
 
 
 class RobotConfig(StrictModel):
@@ -28,6 +28,8 @@ class RobotConfig(StrictModel):
     """Name of one of the arena's poses to start from, instead of `pose`."""
     base: Literal["free", "fixed", "kinematic"] = "free"
     """`free`: moved by physics; `fixed`: bolted to the world; `kinematic`: moved by a publisher of poses."""
+    command_latency: Annotated[Seconds, NotNegative] = 0.0
+    """Between a command to its motors and their start [s]; a whole number of control periods."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
     localisation: Localisation | None = None

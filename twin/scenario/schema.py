@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from twin.errors import ScenarioError
 from twin.scenario import consistency
 from twin.scenario.checks import Check, CheckEntry
+from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import NotNegative, Positive, RosName
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
@@ -40,6 +41,8 @@ class Scenario(StrictModel):
     """The robots."""
     mission: Mission = Idle(type="idle")
     """What they are to do."""
+    faults: tuple[FaultEntry, ...] = ()
+    """What goes wrong, and when."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
     recording: RecordingConfig = RecordingConfig()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -60,8 +61,9 @@ class Hardware:
         description: RobotDescription,
         seed: int,
         config: HardwareConfig | None = None,
+        command_latency: float = 0.0,
     ) -> None:
-        """Bind the names of a robot to a compiled model."""
+        """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
         self._data = data
         self._timestep = float(model.opt.timestep)
@@ -78,6 +80,7 @@ class Hardware:
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
         wheels = {wheel.joint.name for wheel in commanded_wheels(description)}
         self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
+        self._miscounted = np.zeros(len(joints))
         self._counts = self._count()
         self._step = 0
         n = len(self.joint_names)
@@ -90,6 +93,9 @@ class Hardware:
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
         self._commands = data.ctrl[self._actuators].copy()
+        self._latency_steps = round(command_latency / self._timestep)
+        self._under_way: deque[tuple[int, Array]] = deque()
+        self._last_arrived = self._commands.copy()
         driven = [i for i, name in zip(self._actuators, names, strict=True) if name in wheels]
         self._servos = _WheelServos(
             model, data, np.array(driven, dtype=np.intp), self.config.wheel_integral_gain
@@ -140,15 +146,43 @@ class Hardware:
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
-        self._data.ctrl[self._actuators] = self._commands
+        if self._latency_steps:
+            self._data.ctrl[self._actuators] = self._arrived()
+        else:
+            self._data.ctrl[self._actuators] = self._commands
         self._servos.apply()
+
+    def miscount(self, joint: str, angle: float) -> None:
+        """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
+
+        Args:
+            joint: One of `joint_names` that has an encoder.
+            angle: By which it is wrong from now on [rad].
+
+        Raises:
+            SimulationError: No encoder measures this joint.
+        """
+        encoders = [
+            name for name, is_encoder in zip(self.joint_names, self._encoder, strict=True) if is_encoder
+        ]
+        if joint not in encoders:
+            raise SimulationError(f"no encoder measures joint '{joint}'; {nearest(joint, encoders)}")
+        self._miscounted[self.joint_names.index(joint)] += round(angle / self._tick)
+
+    def _arrived(self) -> Array:
+        """Send the present commands on their way; return the newest ones that have arrived."""
+        now = round(self._data.time / self._timestep)
+        self._under_way.append((now + self._latency_steps, self._commands.copy()))
+        while self._under_way and self._under_way[0][0] <= now:
+            self._last_arrived = self._under_way.popleft()[1]
+        return self._last_arrived
 
     def reset(self) -> None:
         """Forget the past; to be called when the state of the physics was set from outside."""
         self._servos.reset()
 
     def _count(self) -> Array:
-        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick)
+        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick) + self._miscounted
 
 
 class _WheelServos:

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.strict_yaml import Fault, Faults, Kilograms, Metres, Radians, StrictModel
+from twin.strict_yaml import Fault, Faults, Kilograms, Metres, StrictModel
+from twin.warehouse.arena_types import Colour, Interval, Length, Point, PoseList
+from twin.warehouse.cylinders import CylindersEntry, outside
 from twin.warehouse.footprint import Rectangle, overlap
-
-Length = Annotated[Metres, Field(gt=0.0)]
-Point = tuple[Metres, Metres]
-PoseList = tuple[Metres, Metres, Radians]
-Interval = tuple[Metres, Metres]
-Colour = Literal["red", "yellow", "green", "blue", "orange", "grey", "white", "wood"]
 
 
 class Hall(StrictModel):
@@ -27,6 +23,8 @@ class Hall(StrictModel):
     y: Interval
     wall_height: Length = 1.0
     wall_thickness: Length = 0.2
+    walls: bool = True
+    """False: a floor of this extent, open on all sides."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Hall:
@@ -187,6 +185,7 @@ class ArenaFile(StrictModel):
     racks: dict[str, RackEntry] = Field(default_factory=dict)
     pallets: dict[str, PalletEntry] = Field(default_factory=dict)
     obstacles: dict[str, ObstacleEntry] = Field(default_factory=dict)
+    cylinders: dict[str, CylindersEntry] = Field(default_factory=dict)
     tote: ToteKind = ToteKind()
     totes: dict[str, ToteEntry] = Field(default_factory=dict)
     stock: Stock | None = None
@@ -206,7 +205,7 @@ def slot_count(length: float, spacing: float) -> int:
     return int(length / spacing + 1e-9)
 
 
-_SECTIONS = ("partitions", "pillars", "racks", "pallets", "obstacles", "totes", "zones")
+_SECTIONS = ("partitions", "pillars", "racks", "pallets", "obstacles", "cylinders", "totes", "zones")
 
 
 def _names(arena: ArenaFile) -> Iterator[Fault]:
@@ -280,6 +279,7 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
     for loc, what, rectangle in _solids(arena):
         if not hall.contains(rectangle.corners):
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
+    yield from outside(arena.cylinders, arena.hall.x, arena.hall.y)
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]
@@ -289,6 +289,9 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
         for _, solid, rectangle in _solids(arena):
             if rectangle.contains([pose[:2]]):
                 yield Fault(loc, f"{what} is inside {solid}; move one of them")
+        for name, group in arena.cylinders.items():
+            if group.covers(*pose[:2]):
+                yield Fault(loc, f"{what} is inside a cylinder of '{name}'; move one of them")
 
 
 def _overlaps(arena: ArenaFile) -> Iterator[Fault]:

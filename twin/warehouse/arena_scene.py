@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twin.geometry import Pose2, Pose3
-from twin.models.shapes import Box
+from twin.models.shapes import Box, Cylinder
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
 from twin.warehouse.arena_file import PartitionEntry, RackEntry, ToteKind
+from twin.warehouse.cylinders import CylindersEntry
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena
@@ -58,7 +59,8 @@ _DECK = 0.144
 def structure(arena: Arena) -> Iterator[StaticBody]:
     """Yield all that is not a tote."""
     file = arena.file
-    yield _walls(arena)
+    if file.hall.walls:
+        yield _walls(arena)
     for name, partition in file.partitions.items():
         yield _partition(name, partition)
     for name, pillar in file.pillars.items():
@@ -75,6 +77,8 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
         yield StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*pallet.pose)), shapes=shapes)
     for name, obstacle in file.obstacles.items():
         yield _block(name, Pose2(*obstacle.pose), obstacle.size, PALETTE[obstacle.colour])
+    for name, cylinders in file.cylinders.items():
+        yield _cylinders(name, cylinders)
     for zone in arena.zones.values():
         yield from _zone(zone)
 
@@ -168,6 +172,19 @@ def _partition(name: str, entry: PartitionEntry) -> StaticBody:
     pose = Pose2((x0 + x1) / 2.0, (y0 + y1) / 2.0, math.atan2(y1 - y0, x1 - x0))
     size = (math.hypot(x1 - x0, y1 - y0), entry.thickness, entry.height)
     return _block(name, pose, size, _PARTITION)
+
+
+def _cylinders(name: str, entry: CylindersEntry) -> StaticBody:
+    upright = Cylinder(radius=entry.radius, length=entry.height)
+    shapes = tuple(
+        Shape(
+            geometry=upright,
+            T_body_geometry=Pose3.from_xyz_rpy((x, y, entry.height / 2.0)),
+            rgba=PALETTE[entry.colour],
+        )
+        for x, y in entry.centres
+    )
+    return StaticBody(name=name, T_world_body=Pose3.from_xyz_rpy(), shapes=shapes)
 
 
 def _rack(name: str, rack: RackEntry) -> StaticBody:

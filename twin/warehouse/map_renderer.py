@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -43,6 +44,10 @@ def render(
     grid[inside] = FREE
     for rectangle in sections(arena, height):
         grid[_covered(rectangle, xs, ys, resolution)] = OCCUPIED
+    for group in arena.file.cylinders.values():
+        if height <= group.height:
+            for x, y in group.centres:
+                _draw_disc(grid, x - x0, y - y0, group.radius, resolution)
     return OccupancyMap(data=grid, resolution=resolution, origin=Pose2(x0, y0, 0.0))
 
 
@@ -56,6 +61,23 @@ def sections(arena: Arena, height: float) -> Iterator[Rectangle]:
             size = shape.geometry.size
             if abs(height - T_map_shape.xyz[2]) <= size[2] / 2.0:
                 yield Rectangle(T_map_shape.to_pose2(), size[0], size[1])
+
+
+def _draw_disc(grid: NDArray[np.int8], x: float, y: float, radius: float, resolution: float) -> None:
+    """Occupy the cells that share an area with a disc, its centre from the grid's corner [m]."""
+    rows, columns = grid.shape
+    c0, r0 = (max(0, math.floor((centre - radius) / resolution)) for centre in (x, y))
+    c1, r1 = min(columns, c0 + _span(radius, resolution)), min(rows, r0 + _span(radius, resolution))
+    gap_x, gap_y = (
+        np.maximum(0.0, np.abs((np.arange(low, high) + 0.5) * resolution - centre) - resolution / 2.0)
+        for low, high, centre in ((c0, c1, x), (r0, r1, y))
+    )
+    near = np.hypot(gap_x, gap_y[:, None]) < radius - _TOUCH
+    grid[r0:r1, c0:c1][near] = OCCUPIED
+
+
+def _span(radius: float, resolution: float) -> int:
+    return math.ceil(2.0 * radius / resolution) + 1
 
 
 def _covered(rectangle: Rectangle, xs: Axis, ys: Axis, resolution: float) -> NDArray[np.bool_]:

@@ -207,7 +207,9 @@ def test_a_robot_obeys_the_speed_limit_of_a_zone(bench: Bench) -> None:
     serve_mask(bench, "speed", mask, type=1)
     local = costmap(bench, robot, ROLLING, speed_filter_info_topic="speed_info")
     limits = bench.listen(SpeedLimit, "speed_limit", 10)
-    config = ControllerServerConfig(controller=RegulatedPurePursuitConfig(desired_linear_vel=0.5))
+    config = ControllerServerConfig(
+        controllers={"FollowPath": RegulatedPurePursuitConfig(desired_linear_vel=0.5)}
+    )
     ControllerServerNode(bench.bus, robot.pose_lookup, local, np.array(FOOTPRINT), config)
     follow = ActionClient(bench.node, FollowPath, "follow_path")
     bench.run(0.5)

@@ -11,12 +11,13 @@ import pytest
 from tests.nodes.conftest import Bench, Robot, map_of_room, open_room
 from twin.bridge.action_types import ComputePathToPose, FollowPath
 from twin.bridge.actions import ActionClient
-from twin.bridge.msgs import GoalStatus, OccupancyGrid, Path, new
+from twin.bridge.msgs import GoalStatus, OccupancyGrid, Path, SpeedLimit, new
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import ClearEntireCostmap, GetMap, IsPathValid
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
@@ -353,3 +354,56 @@ def test_an_unlocalised_robot_does_not_drive(bench: Bench) -> None:
     bench.until(lambda: goal.done, 1.0)
     assert goal.result.error_code == 102
     assert robot.commands[-1] == (0.0, 0.0)
+
+
+def test_controllers_and_checkers_are_chosen_by_name(bench: Bench) -> None:
+    stack = Stack(
+        bench,
+        controllers={
+            "FollowPath": RegulatedPurePursuitConfig(desired_linear_vel=0.4),
+            "Slow": RegulatedPurePursuitConfig(
+                desired_linear_vel=0.2, regulated_linear_scaling_min_speed=0.1
+            ),
+        },
+    )
+    message = path_msg(np.array([[0, 0, 0], [2, 0, 0]], dtype=float), "map", 0)
+    for name, speed in (("", 0.4), ("Slow", 0.2), ("FollowPath", 0.4)):
+        goal = stack.follow.send_goal(new(FollowPath.Goal, path=message, controller_id=name))
+        bench.run(1.0)
+        assert stack.robot.commands[-1][0] == pytest.approx(speed)
+        goal.cancel()
+        bench.until(lambda goal=goal: goal.done, 0.2)  # type: ignore[misc]
+    for field in ("controller_id", "goal_checker_id", "progress_checker_id"):
+        goal = stack.follow.send_goal(new(FollowPath.Goal, path=message, **{field: "Fats"}))
+        bench.until(lambda goal=goal: goal.done, 1.0)  # type: ignore[misc]
+        assert goal.result.error_code == 101
+        assert "'Fats'; valid: " in goal.result.error_msg
+
+
+def test_a_speed_limit_is_absolute_or_in_percent_until_it_is_lifted(bench: Bench, stack: Stack) -> None:
+    limits = bench.node.create_publisher(SpeedLimit, "speed_limit", 1)
+    said = bench.logs()
+    stack.drive(np.array([[-2, 0, 0], [2, 0, 0]], dtype=float))
+    for limit, percentage, speed in (
+        (0.3, False, 0.3),
+        (80.0, True, 0.4),
+        (0.0, False, 0.5),
+        (math.nan, False, 0.5),
+    ):
+        limits.publish(new(SpeedLimit, speed_limit=limit, percentage=percentage))
+        bench.run(0.3)
+        assert stack.robot.commands[-1][0] == pytest.approx(speed)
+    assert any("speed_limit refused" in text for text in said)
+
+
+def test_the_feedback_and_the_local_plan_tell_where_it_goes(bench: Bench, stack: Stack) -> None:
+    plans = bench.listen(Path, "transformed_global_plan", 1)
+    heard: list[Any] = []
+    path = path_msg(np.array([[0, 0, 0], [2, 0, 0]], dtype=float), "map", 0)
+    stack.follow.send_goal(new(FollowPath.Goal, path=path), feedback_callback=heard.append)
+    bench.run(2.0)
+    assert heard[-1].speed == pytest.approx(0.5, abs=0.05)
+    assert heard[-1].distance_to_goal == pytest.approx(2.0 - stack.robot.pose.x, abs=0.05)
+    ahead = path_array(plans[-1])
+    assert ahead[0, 0] == pytest.approx(stack.robot.pose.x, abs=0.08)
+    assert ahead[-1, :2] == pytest.approx([2.0, 0.0])

@@ -5,12 +5,14 @@ from __future__ import annotations
 import typer
 
 from twin.cli.bench.amcl import amcl
+from twin.cli.bench.barn import barn
 from twin.cli.bench.grid import grid
 from twin.cli.bench.slam import slam
 
 app = typer.Typer(no_args_is_help=True, help="Public benchmarks of navigation; exit code 1 below the bar.")
 
 _COMMANDS = (
+    ("barn", barn, "twin bench barn barn_worlds.json --worlds 3,9,60-90 --out barn"),
     ("amcl", amcl, "twin bench amcl --starts 20 --kidnaps 5 --distance 100"),
     ("grid", grid, "twin bench grid maze-32-32-2.json"),
     ("slam", slam, "twin bench slam aces.npz csail.npz --out slam"),

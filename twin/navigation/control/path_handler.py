@@ -93,6 +93,20 @@ class PathHandler:
         """Length of the path from the nearest pose to its end [m]."""
         return float(self._along[-1] - self._along[self._nearest])
 
+    def lead(self, way: Array, target: int) -> None:
+        """Lead along another way to the pose that is `target` poses past the nearest one, and on from there.
+
+        Args:
+            way: x, y of the way there, shape (n, 2); the first is where the robot is now.
+            target: Not past the end of the local path.
+        """
+        at = self._nearest + target
+        poses, _ = dense(_headed(way, self._poses[at]), SPACING)
+        self._poses = np.concatenate([poses[:-1], self._poses[at:]])
+        self._along = _arc_length(self._poses)
+        self._segments = [(last + len(poses) - 1 - at, reversing) for last, reversing in self._segments]
+        self._nearest = 0
+
     def local(self, pose: Pose2) -> LocalPath:
         """Return what lies ahead of the robot at `pose`; moves on along the path."""
         last, reversing = self._segments[0]
@@ -151,6 +165,13 @@ def cusps(poses: Array) -> list[int]:
 
 def _arc_length(poses: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+
+
+def _headed(way: Array, end: Array) -> Array:
+    """Return x, y of a way, shape (n, 2), as poses, shape (n, 3), the last of which is `end`."""
+    points = np.concatenate([way[:-1], end[None, :2]])
+    step = np.diff(points, axis=0)
+    return np.column_stack([points, np.append(np.arctan2(step[:, 1], step[:, 0]), end[2])])
 
 
 def _reversing(poses: Array) -> bool:

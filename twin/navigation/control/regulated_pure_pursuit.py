@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,12 +14,18 @@ from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
     INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
     NO_INFORMATION,
     Costmap,
 )
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.costmaps.kernels import steps_to_collision
+from twin.navigation.costmaps.kernels import escapes, outline_cost, steps_to_collision
 from twin.navigation.failures import NoValidControl
+
+_ESCAPE_TURN = 0.5
+"""Rate at which the robot turns away from what it nearly touches [rad/s]."""
+_STILL_THERE = 0.25
+"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +66,11 @@ class RegulatedPurePursuitConfig:
     use_collision_detection: bool = True
     max_allowed_time_to_collision_up_to_carrot: float = 1.0
     """[s]"""
+    turn_before_collision: bool = False
+    """Where the arc to the lookahead point is blocked: whether to turn towards that point on the spot, or to
+    creep along the arc, before giving up (ours, not Nav2's)."""
+    creep_speed: float = 0.15
+    """Of that creeping [m/s]."""
     xy_goal_tolerance: float = 0.25
     """The goal checker's: closer than this the robot only turns to the goal's heading [m]."""
     max_robot_pose_search_dist: float = 3.0
@@ -96,6 +108,8 @@ class RegulatedPurePursuit:
     """The lookahead point of the last command, in the path's frame [m]."""
     trajectory: Array | None = field(init=False, default=None)
     """None: it plans none."""
+    candidates: None = field(init=False, default=None)
+    """It shows none."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
@@ -185,7 +199,9 @@ class RegulatedPurePursuit:
         if config.use_fixed_curvature_lookahead:
             x, y = self._curvature_point(local)
         bearing = math.atan2(sign * y, sign * x)
-        self._reached_xy |= ahead.ends_at_goal and math.hypot(*local[-1]) < self._tolerance
+        off = math.hypot(*local[-1])
+        self._reached_xy |= ahead.ends_at_goal and off < self._tolerance
+        self._reached_xy &= off < self._tolerance + _STILL_THERE
         if config.use_rotate_to_heading and self._reached_xy:
             v, w = 0.0, self._rotate(wrap_angle(float(path[-1, 2]) - pose.yaw), velocity[1], dt)
         elif config.use_rotate_to_heading and abs(bearing) > config.rotate_to_heading_min_angle:
@@ -197,8 +213,12 @@ class RegulatedPurePursuit:
                 v = sign * max(0.0, sign * velocity[0] - config.cancel_deceleration * dt)
             w = v * curvature
         self._stopped = self._cancelling and v == 0.0
-        if costmap is not None and config.use_collision_detection:
-            self._check(costmap_pose or pose, v, w, distance, costmap)
+        if costmap is None or not config.use_collision_detection:
+            return v, w
+        if config.turn_before_collision and v > 0.0:
+            turn = self._rotate(bearing, velocity[1], dt)
+            return self._first_free(v, w, turn, costmap_pose or pose, distance, costmap)
+        self._check(costmap_pose or pose, v, w, distance, costmap)
         return v, w
 
     def _curvature_point(self, local: Array) -> tuple[float, float]:
@@ -247,6 +267,30 @@ class RegulatedPurePursuit:
             remaining = math.hypot(end[0], end[1])
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
+
+    def _first_free(
+        self, v: float, w: float, turn: float, pose: Pose2, carrot_dist: float, costmap: Costmap
+    ) -> tuple[float, float]:
+        """Return the command, or what may be done instead of it; raises NoValidControl if nothing may."""
+        creep = self.config.creep_speed
+        try:
+            self._check(pose, v, w, carrot_dist, costmap)
+        except NoValidControl:
+            at = float(pose.x), float(pose.y), float(pose.yaw)
+            if outline_cost(costmap.costs, self.footprint, *at, *costmap.frame) == LETHAL_OBSTACLE:
+                ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
+                for way in ways:
+                    if escapes(costmap.costs, self.footprint, *at, *way, 0.05, 10, *costmap.frame):
+                        return way
+                raise
+            for way in ((0.0, turn), (creep, w * creep / v)):
+                if abs(way[0]) < 0.01 and abs(way[1]) < 0.05:
+                    continue  # standing still leads nowhere
+                with suppress(NoValidControl):
+                    self._check(pose, *way, carrot_dist, costmap)
+                    return way
+            raise
+        return v, w
 
     def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
         """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""

@@ -147,3 +147,86 @@ def steps_to_collision(
         y += v * dt * math.sin(yaw)
         yaw += w * dt
     return -1
+
+
+@jit
+def footprint_hits(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> int:
+    """Return how many samples of a footprint, its inside too, are lethal or off the map.
+
+    They lie half a cell apart. An outline alone would not do: a lidar sees the surface of a thing only, and
+    the outline can be past it.
+
+    Args:
+        costs: The grid.
+        corners: Of a convex polygon, counter-clockwise or clockwise, shape (n, 2) [m].
+        x: Of the base [m].
+        y: Of the base [m].
+        yaw: Of the base [rad].
+        origin_x: Of the grid [m].
+        origin_y: Of the grid [m].
+        resolution: Of the grid [m].
+    """
+    height, width = costs.shape
+    c, s = math.cos(yaw), math.sin(yaw)
+    n = corners.shape[0]
+    half = resolution / 2.0
+    low_x, high_x = corners[:, 0].min(), corners[:, 0].max()
+    low_y, high_y = corners[:, 1].min(), corners[:, 1].max()
+    hits = 0
+    for i in range(math.floor((high_x - low_x) / half) + 1):
+        for j in range(math.floor((high_y - low_y) / half) + 1):
+            bx, by = low_x + i * half, low_y + j * half
+            left, right = True, True
+            for k in range(n):
+                m = (k + 1) % n
+                cross = (corners[m, 0] - corners[k, 0]) * (by - corners[k, 1]) - (
+                    corners[m, 1] - corners[k, 1]
+                ) * (bx - corners[k, 0])
+                left, right = left and cross >= -1e-9, right and cross <= 1e-9
+            if not (left or right):
+                continue
+            ix = math.floor((x + c * bx - s * by - origin_x) / resolution)
+            iy = math.floor((y + s * bx + c * by - origin_y) / resolution)
+            if ix < 0 or iy < 0 or ix >= width or iy >= height or costs[iy, ix] == 254:
+                hits += 1
+    return hits
+
+
+@jit
+def escapes(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    v: float,
+    w: float,
+    dt: float,
+    steps: int,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> bool:
+    """Return whether a motion leads out of obstacles: at no time further in, and in the end less than now.
+
+    For a robot whose present pose is a collision by the costmap, which is coarser than the world.
+    """
+    first = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+    last = first
+    for _ in range(steps):
+        x += v * dt * math.cos(yaw)
+        y += v * dt * math.sin(yaw)
+        yaw += w * dt
+        last = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        if last > first:
+            return False
+    return last < 0.8 * first

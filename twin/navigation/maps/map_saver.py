@@ -93,7 +93,6 @@ def save_map(occupancy: OccupancyMap, path: Path, parameters: SaveParameters | N
         f"free_thresh: {thresholds[1]}",
     )
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_image(image, gray, alpha)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as fault:

@@ -18,6 +18,7 @@ from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
+from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
@@ -37,6 +38,8 @@ class PlannerServerConfig:
     compute_alternatives: int = 0
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
+    path_distance: float = 1.0
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
@@ -48,6 +51,7 @@ class PlannerParameters:
     planner_plugins: tuple[str, ...]
     server: PlannerServerConfig
     planner: PlannerPluginConfig
+    commitment: CommitmentConfig
     smoother: SmootherConfig
 
 
@@ -67,6 +71,7 @@ class PlannerServerNode:
         config: PlannerPluginConfig | None = None,
         server: PlannerServerConfig | None = None,
         smoother: SmootherConfig | None = None,
+        commitment: CommitmentConfig | None = None,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("planner_server", namespace)
@@ -81,15 +86,23 @@ class PlannerServerNode:
                 self._configs[name] = plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
         self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
         self._tried: list[Array] = []
+        self._last: tuple[Pose2, Array] | None = None
+        """The goal of the last leg, and its path."""
         self._asked: tuple[Pose2, Pose2] | None = None
         parameters = PlannerParameters(
             planner_plugins=tuple(self._configs),
             server=server or PlannerServerConfig(),
             planner=self._configs[DEFAULT_ID],
+            commitment=commitment or CommitmentConfig(),
             smoother=smoother or SmootherConfig(),
         )
         self._apply(parameters)
-        declare_config(self.node, parameters, self._apply, {"planner": DEFAULT_ID, "server": ""})
+        declare_config(
+            self.node,
+            parameters,
+            self._apply,
+            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "server": ""},
+        )
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)
@@ -102,6 +115,7 @@ class PlannerServerNode:
     def _apply(self, parameters: PlannerParameters) -> None:
         """Plan the next path with these parameters."""
         self._server = parameters.server
+        self._commitment = parameters.commitment
         self._smoother = SimpleSmoother(config=parameters.smoother)
         if parameters.planner != self._configs[DEFAULT_ID]:
             self._configs[DEFAULT_ID] = parameters.planner
@@ -148,9 +162,12 @@ class PlannerServerNode:
 
     def _leg(self, name: str, start: Pose2, goal: Pose2) -> Array:
         costmap, planner = self._known_costmap(), self._planners[name]
+        if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
+            costmap = committed(costmap, self._last[1], self._commitment)
         tried = self._tried_before(start, goal)
         path = other_way(planner, costmap, start, goal, tried, AlternativesConfig())
         self._tried.append(path)
+        self._last = (goal, path)
         if isinstance(self._configs[name], HybridConfig):
             return path
         smooth = self._smoother.smooth(path, costmap)
@@ -197,7 +214,10 @@ class PlannerServerNode:
         path, costmap, robot = path_array(request.path), self._costmap.costmap, self._robot_pose.in_map()
         if not len(path) or costmap is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
-        nearest = int(np.argmin(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)))
+        away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
+        nearest = int(np.argmin(away))
+        if away[nearest] > self._server.path_distance:
+            return new(IsPathValid.Response, is_valid=False)
         columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
         height, width = costmap.costs.shape
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)

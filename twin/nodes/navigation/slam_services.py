@@ -40,8 +40,8 @@ class SlamServices:
         path = Path(f"{request.name.data or _DEFAULT_MAP}.yaml")
         try:
             grid.save(path)
-        except OSError as fault:
-            self._say(f"{path}: the map cannot be written there: {fault.strerror}")
+        except MapError as fault:
+            self._say(str(fault))
             return new(SaveSlamMap.Response, result=SaveSlamMap.Response.RESULT_UNDEFINED_FAILURE)
         return new(SaveSlamMap.Response)
 

@@ -1,0 +1,1 @@
+"""The BARN challenge in the twin: worlds, scenarios, the referee, the report."""
