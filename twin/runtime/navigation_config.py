@@ -98,7 +98,7 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
         navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
