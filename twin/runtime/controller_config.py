@@ -30,6 +30,8 @@ from twin.scenario.controllers import ControllerParameters
 _PERIOD_NS = 60_000_000
 _TOLERANCE = 0.05
 """Of position [m] and heading [rad]: what docking can start from."""
+_TOLERANCE_BUFFER = 0.25
+"""A robot that is farther off while it turns at the goal was carried away, or localised anew [m]."""
 _TURN = 1.2
 """Rate [rad/s] and acceleration [rad/s²] of turns in place."""
 
@@ -153,10 +155,11 @@ def _braking(limits: AxisLimits) -> float:
 
 def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:
     kind = overrides.get("goal_checker")
+    there: dict[str, Any] = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
     if kind == "position":
-        return overridden(PositionGoalCheckerConfig(xy_goal_tolerance=_TOLERANCE), overrides)
+        return overridden(PositionGoalCheckerConfig(**there), overrides)
     of = StoppedGoalCheckerConfig if kind == "stopped" else GoalCheckerConfig
-    return overridden(of(xy_goal_tolerance=_TOLERANCE, yaw_goal_tolerance=_TOLERANCE), overrides)
+    return overridden(of(**there, yaw_goal_tolerance=_TOLERANCE), overrides)
 
 
 def _progress_checker(overrides: Mapping[str, Any]) -> ProgressCheckerConfig:

@@ -73,6 +73,22 @@ class NavigateToPose(StrictModel):
     """Goal heading [rad]."""
 
 
+class DockRobot(StrictModel):
+    """Drive to a dock of `robots[].navigation.docking.docks` and dock (Nav2 `dock_robot`)."""
+
+    dock: str
+    """Its name."""
+    max_staging_time: Annotated[Seconds, Positive] = 1000.0
+    """For the way to the pose before it [s]."""
+
+
+class UndockRobot(StrictModel):
+    """Drive straight back from the dock (Nav2 `undock_robot`)."""
+
+    dock_type: str = ""
+    """Type of the dock; absent: that of the dock at which the robot docked."""
+
+
 class BehaviorStep(OneOf):
     """One step: exactly one of these keys."""
 
@@ -86,6 +102,10 @@ class BehaviorStep(OneOf):
     """Stand still."""
     navigate_to_pose: NavigateToPose | None = None
     """Drive to a pose."""
+    dock_robot: DockRobot | None = None
+    """Drive to a dock and dock."""
+    undock_robot: UndockRobot | None = None
+    """Leave the dock."""
 
 
 class Behaviors(StrictModel):

@@ -11,10 +11,11 @@ from pydantic import Field
 
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
+from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
 
 
 class CostmapParameters(ParameterGroup):
@@ -38,6 +39,8 @@ class CostmapParameters(ParameterGroup):
     """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
+    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
     raytrace_min_range: Annotated[Metres, NotNegative] | None = None
     """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
@@ -100,3 +103,5 @@ class NavigationConfig(StrictModel):
     """Overrides of the costmap that plans are made on."""
     local_costmap: CostmapParameters = CostmapParameters()
     """Overrides of the rolling costmap around the robot."""
+    docking: DockingParameters = DockingParameters()
+    """Docks, and overrides of the docking server."""

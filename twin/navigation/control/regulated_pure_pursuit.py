@@ -14,15 +14,18 @@ from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
     INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
     NO_INFORMATION,
     Costmap,
 )
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.costmaps.kernels import escapes, outline_hits, steps_to_collision
+from twin.navigation.costmaps.kernels import escapes, outline_cost, steps_to_collision
 from twin.navigation.failures import NoValidControl
 
 _ESCAPE_TURN = 0.5
 """Rate at which the robot turns away from what it nearly touches [rad/s]."""
+_STILL_THERE = 0.25
+"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +199,9 @@ class RegulatedPurePursuit:
         if config.use_fixed_curvature_lookahead:
             x, y = self._curvature_point(local)
         bearing = math.atan2(sign * y, sign * x)
-        self._reached_xy |= ahead.ends_at_goal and math.hypot(*local[-1]) < self._tolerance
+        off = math.hypot(*local[-1])
+        self._reached_xy |= ahead.ends_at_goal and off < self._tolerance
+        self._reached_xy &= off < self._tolerance + _STILL_THERE
         if config.use_rotate_to_heading and self._reached_xy:
             v, w = 0.0, self._rotate(wrap_angle(float(path[-1, 2]) - pose.yaw), velocity[1], dt)
         elif config.use_rotate_to_heading and abs(bearing) > config.rotate_to_heading_min_angle:
@@ -272,7 +277,7 @@ class RegulatedPurePursuit:
             self._check(pose, v, w, carrot_dist, costmap)
         except NoValidControl:
             at = float(pose.x), float(pose.y), float(pose.yaw)
-            if outline_hits(costmap.costs, self.footprint, *at, *costmap.frame):
+            if outline_cost(costmap.costs, self.footprint, *at, *costmap.frame) == LETHAL_OBSTACLE:
                 ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
                 for way in ways:
                     if escapes(costmap.costs, self.footprint, *at, *way, 0.05, 10, *costmap.frame):

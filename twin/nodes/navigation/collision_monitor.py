@@ -21,6 +21,7 @@ from twin.navigation.control.collision_monitor import (
 )
 from twin.nodes.navigation.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.scan_input import ScanInput
 from twin.nodes.node_parameters import declare_config
 
 _ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
@@ -68,11 +69,12 @@ class CollisionMonitorNode:
         text = f"Collision monitor toggled {'on' if self._enabled else 'off'} successfully"
         return new(Toggle.Response, success=True, message=text)
 
-    @staticmethod
-    def _keep(kept: dict[str, Any], topic: str) -> Callable[[Any], None]:
+    def _keep(self, kept: dict[str, Any], topic: str) -> Callable[[Any], None]:
+        scans = ScanInput(self._robot_pose, self.node.now_ns)
+
         def on_message(message: Any) -> None:
-            # A scan without a single reading (NaN) is a sensor that is broken, not one that sees nothing.
-            if not isinstance(message, LaserScan) or not np.isnan(message.ranges).all():
+            # A lidar that broke or froze is as good as silent.
+            if not isinstance(message, LaserScan) or scans.accept(message, self.node.now_ns):
                 kept[topic] = message
 
         return on_message

@@ -35,7 +35,7 @@ from twin.nodes.node_parameters import declare_config
 P = TypeVar("P")
 
 _INVALID_CONTROLLER, _TF_ERROR, _INVALID_PATH = 101, 102, 103
-_PATIENCE_EXCEEDED, _FAILED_TO_MAKE_PROGRESS = 104, 105
+_PATIENCE_EXCEEDED, _FAILED_TO_MAKE_PROGRESS, _CONTROLLER_TIMED_OUT = 104, 105, 107
 
 _PARAMETER_NAMES = {
     "controllers": "",
@@ -61,6 +61,8 @@ class ControllerServerConfig:
     controller_period_ns: int = 60_000_000
     failure_tolerance_ns: int = 300_000_000
     """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
+    costmap_update_timeout_ns: int = 5_000_000_000
+    """How long the robot stands and waits for a local costmap that is not current; Nav2: 0.3 s [ns]."""
     min_x_velocity_threshold: float = 0.0001
     """Measured speeds below this count as none [m/s]."""
     min_theta_velocity_threshold: float = 0.0001
@@ -79,6 +81,10 @@ class _Task:
     progress_checker: ProgressChecker
     handler: PathHandler
     last_valid_ns: int
+    current_ns: int
+    """When the costmap was current last."""
+    waiting: bool = False
+    """Whether the robot stands because it is not."""
 
 
 class _Abort(Exception):
@@ -203,6 +209,7 @@ class ControllerServerNode:
             progress_checker=create_progress_checker(progress),
             handler=handler,
             last_valid_ns=self.node.now_ns,
+            current_ns=self.node.now_ns,
         )
 
     def _control(self, task: _Task, handle: GoalHandle) -> bool:
@@ -214,6 +221,9 @@ class ControllerServerNode:
         goal = Pose2(*task.path[-1].tolist())
         if task.goal_checker.is_goal_reached(in_map, goal, self._velocity, task.handler.remaining):
             return True
+        if not self._is_costmap_current(task):
+            self._publisher.publish(twist_from_planar(0.0, 0.0))
+            return False
         if not task.progress_checker.check(in_map, self.node.now_ns):
             raise _Abort(_FAILED_TO_MAKE_PROGRESS, "failed to make progress")
         dt = self.config.controller_period_ns * 1e-9
@@ -233,6 +243,18 @@ class ControllerServerNode:
             new(FollowPath.Feedback, distance_to_goal=in_map.distance(goal), speed=abs(self._velocity[0]))
         )
         return False
+
+    def _is_costmap_current(self, task: _Task) -> bool:
+        """Return whether to drive on by the costmap; raises _Abort if it has been out of date for long."""
+        now, fault = self.node.now_ns, self._costmap.fault
+        if not fault:
+            task.current_ns, task.waiting = now, False
+        elif now - task.current_ns > self.config.costmap_update_timeout_ns:
+            raise _Abort(_CONTROLLER_TIMED_OUT, f"the local costmap is not current: {fault}")
+        elif not task.waiting:
+            task.waiting = True
+            self.node.get_logger().warn(f"waiting: the local costmap is not current: {fault}")
+        return not fault
 
     def _be_patient(self, task: _Task, failure: NoValidControl) -> None:
         """Wait for a valid control for as long as the tolerance says; raises _Abort."""
