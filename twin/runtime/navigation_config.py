@@ -119,7 +119,7 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
