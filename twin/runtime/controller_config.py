@@ -28,6 +28,8 @@ from twin.runtime.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 
 _PERIOD_NS = 60_000_000
+_PATIENCE_NS = 4_000_000_000
+"""How long somebody in the way is waited for: until they have walked past, or are planned around."""
 _TOLERANCE = 0.05
 """Of position [m] and heading [rad]: what docking can start from."""
 _TOLERANCE_BUFFER = 0.25
@@ -61,7 +63,7 @@ def controller_server_config(
         goal_checkers=checkers,
         progress_checkers={"progress_checker": _progress_checker(overrides)},
         controller_period_ns=period_ns,
-        failure_tolerance_ns=300_000_000 if tolerance is None else round(tolerance * 1e9),
+        failure_tolerance_ns=_PATIENCE_NS if tolerance is None else round(tolerance * 1e9),
     )
 
 
@@ -101,6 +103,8 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         rotate_to_heading_min_angle=0.6,
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
+        max_linear_decel=_braking(smoother.linear),
+        cost_scaling_dist=0.7,
     )
 
 

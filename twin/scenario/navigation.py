@@ -84,7 +84,7 @@ class NavigationConfig(StrictModel):
     max_angular_acceleration: Annotated[float, Positive] | None = None
     """Limit of the velocity smoother, also when braking [rad/s²]."""
     collision_monitor: CollisionMonitorParameters | None = None
-    """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
+    """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
