@@ -85,13 +85,15 @@ def amcl_with_file(
 
 
 def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMonitorParameters:
-    """Return the collision monitor: the scenario's, else the file's, else the default one.
+    """Return the collision monitor: the scenario's, else the file's, else the default.
 
     Raises:
         NavigationError: the file is wrong.
     """
-    if config.collision_monitor is not None or config.params_file is None:
-        return config.collision_monitor or CollisionMonitorParameters()
+    if config.collision_monitor is not None:
+        return config.collision_monitor
+    if config.params_file is None:
+        return CollisionMonitorParameters()
     file = Nav2Parameters(Path(config.params_file), namespace)
     monitor = monitor_of(file)
     file.ignored()

@@ -123,20 +123,12 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
         navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
-    )
-
-
-def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
-    return AxisLimits(
-        max_velocity=speed,
-        max_acceleration=min(acceleration, drive or acceleration),
-        max_deceleration=min(deceleration, drive or deceleration),
     )
 
 
@@ -146,6 +138,14 @@ def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
     return replace(
         overridden(defaults, overrides),
         bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
+    )
+
+
+def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
+    return AxisLimits(
+        max_velocity=speed,
+        max_acceleration=min(acceleration, drive or acceleration),
+        max_deceleration=min(deceleration, drive or deceleration),
     )
 
 

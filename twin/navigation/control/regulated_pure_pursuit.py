@@ -278,29 +278,15 @@ class RegulatedPurePursuit:
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
 
-    def _way_to_stop(self, v: float) -> float:
-        """Return how far the robot still drives at least [m]."""
-        config = self.config
-        if config.max_linear_decel <= 0.0:
-            return config.min_distance_to_obstacle
-        way = abs(v) * config.reaction_time + v * v / (2.0 * config.max_linear_decel)
-        return max(way, config.min_distance_to_obstacle)
-
-    def _clearance(self, pose: Pose2, local: Array, costmap: Costmap, way: float) -> float:
-        """Return how near the robot and the next `way` of its path come to an obstacle, from the costs."""
-        points = [(pose.x, pose.y)]
-        if way > 0.0:
-            near = local[np.hypot(local[:, 0], local[:, 1]) < way]
-            points += [tuple(point) for point in pose.apply(near[::2]).tolist()]
-        costs = [costmap.cost_at(x, y) for x, y in points]
-        cost = max((cost for cost in costs if cost not in (NO_INFORMATION, FREE_SPACE)), default=FREE_SPACE)
-        if cost == FREE_SPACE:
-            return math.inf
-        decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
-        return costmap.inscribed_radius - decay / costmap.cost_scaling_factor
-
     def _first_free(
-        self, v: float, w: float, turn: float, pose: Pose2, carrot_dist: float, least: float, costmap: Costmap
+        self,
+        v: float,
+        w: float,
+        turn: float,
+        pose: Pose2,
+        carrot_dist: float,
+        least: float,
+        costmap: Costmap,
     ) -> tuple[float, float]:
         """Return the command, or what may be done instead of it; raises NoValidControl if nothing may."""
         creep = self.config.creep_speed
@@ -322,6 +308,27 @@ class RegulatedPurePursuit:
                     return way
             raise
         return v, w
+
+    def _way_to_stop(self, v: float) -> float:
+        """Return how far the robot still drives at least [m]."""
+        config = self.config
+        if config.max_linear_decel <= 0.0:
+            return config.min_distance_to_obstacle
+        way = abs(v) * config.reaction_time + v * v / (2.0 * config.max_linear_decel)
+        return max(way, config.min_distance_to_obstacle)
+
+    def _clearance(self, pose: Pose2, local: Array, costmap: Costmap, way: float) -> float:
+        """Return how near the robot and the next `way` of its path come to an obstacle, from the costs."""
+        points = [(pose.x, pose.y)]
+        if way > 0.0:
+            near = local[np.hypot(local[:, 0], local[:, 1]) < way]
+            points += [tuple(point) for point in pose.apply(near[::2]).tolist()]
+        costs = [costmap.cost_at(x, y) for x, y in points]
+        cost = max((cost for cost in costs if cost not in (NO_INFORMATION, FREE_SPACE)), default=FREE_SPACE)
+        if cost == FREE_SPACE:
+            return math.inf
+        decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
+        return costmap.inscribed_radius - decay / costmap.cost_scaling_factor
 
     def _check(
         self, pose: Pose2, v: float, w: float, carrot_dist: float, least: float, costmap: Costmap

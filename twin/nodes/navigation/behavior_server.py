@@ -13,6 +13,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Empty, Twist, duration, new, ns
 from twin.bridge.types import ActionType
 from twin.navigation import recovery
+from twin.navigation.warm_up import warm_up_behaviors
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
@@ -55,6 +56,7 @@ class BehaviorServerNode:
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("behavior_server", namespace)
+        warm_up_behaviors()
         self.config = config
         self._robot_pose = robot_pose
         self._costmap = costmap

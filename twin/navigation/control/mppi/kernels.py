@@ -421,8 +421,8 @@ def first_collision(
             continue
         cost = int(costs[int(y), int(x)])
         if cost != 255 and cost >= check[1]:
-            c, s = np.cos(trajectory[t, 2]), np.sin(trajectory[t, 2])
-            if collides(costs, cost, circles, check[2], outline, x, y, c, s):
+            c, s = np.float32(np.cos(trajectory[t, 2])), np.float32(np.sin(trajectory[t, 2]))
+            if collides(costs, cost, circles, check[2], outline, np.float32(x), np.float32(y), c, s):
                 return t
     return -1
 
@@ -433,9 +433,11 @@ def smooth(mean: F32, past: F32, weights: F32) -> None:
     steps, side = mean.shape[1], weights.shape[0] // 2
     padded = np.empty(steps + 2 * side, dtype=np.float32)
     for axis in range(2):
-        padded[:side] = past[axis, past.shape[1] - side :]
-        padded[side : side + steps] = mean[axis]
-        padded[side + steps :] = mean[axis, steps - 1]
+        for t in range(side):
+            padded[t] = past[axis, past.shape[1] - side + t]
+            padded[side + steps + t] = mean[axis, steps - 1]
+        for t in range(steps):
+            padded[side + t] = mean[axis, t]
         for t in range(steps):
             total = np.float32(0.0)
             for i in range(weights.shape[0]):
