@@ -44,7 +44,7 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        self._build_drive(description)
+        self.drive = self._build_drive(description)
         build_odometry_filter(context, self.frames)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
@@ -68,11 +68,11 @@ class RobotStack:
             )
         self._build_arm(description)
 
-    def _build_drive(self, description: RobotDescription) -> None:
+    def _build_drive(self, description: RobotDescription) -> DiffDriveControllerNode | None:
         drive, context = description.drive, self._context
         if drive is None:
-            return
-        DiffDriveControllerNode(
+            return None
+        return DiffDriveControllerNode(
             context.bus,
             self.handle.hardware,
             DiffDriveNodeConfig(

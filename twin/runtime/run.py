@@ -16,9 +16,9 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError, ScenarioError
-from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
+from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
@@ -72,6 +72,7 @@ class Run:
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
+        self._faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
@@ -114,11 +115,12 @@ class Run:
             self.lockstep.step()
 
     def actuate(self) -> None:
-        """3. Actuators take the commands; obstacles come into the way."""
+        """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
         bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
         self._obstacles.update(bases)
+        self._faults.update()
 
     def step(self) -> None:
         """4. Physics."""
@@ -212,7 +214,6 @@ def run(
             ending.callback(simulation.lockstep.close)
         if sink is not None:
             sink.declare(parts.world)
-        warm_up()
         wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if out is not None:

@@ -71,7 +71,7 @@ def make(request: pytest.FixtureRequest) -> Callable[[], Controller]:
     return lambda: shimmed(request.param)
 
 
-def hall(*boxes: tuple[float, float, float, float]) -> Costmap:
+def hall(*boxes: tuple[float, float, float, float], padding: float = 0.0) -> Costmap:
     """8 x 4 m, walled; boxes are x0, y0, x1, y1."""
     data = np.zeros((80, 160), dtype=np.int8)
     data[:2] = data[-2:] = 100
@@ -81,7 +81,9 @@ def hall(*boxes: tuple[float, float, float, float]) -> Costmap:
         data[y0:y1, x0:x1] = 100
     room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
     polygon = tuple((float(x), float(y)) for x, y in FOOTPRINT)
-    config = CostmapConfig(footprint=polygon, inflation_radius=0.8, cost_scaling_factor=4.0)
+    config = CostmapConfig(
+        footprint=polygon, inflation_radius=0.8, cost_scaling_factor=4.0, footprint_padding=0.0
+    )
     return LayeredCostmap(config=config, static_map=room).costmap
 
 

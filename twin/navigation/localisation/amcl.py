@@ -27,6 +27,7 @@ from twin.navigation.localisation.particles import (
     systematic_resample,
 )
 from twin.navigation.localisation.surface_distance import SurfaceDistance
+from twin.navigation.localisation.unmapped import explained_share
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 
 _FIT_SIGMA = 0.1
@@ -195,8 +196,9 @@ class Amcl:
         fit = math.nan
         if len(beams):
             distances = self._surfaces.at(pose.apply(beams.ends))
-            fit = float(np.mean(np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)))
-            self._confidence.update(fit)
+            shares = np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)
+            fit = float(np.mean(shares))
+            self._confidence.update(explained_share(shares, beams, pose, self._surfaces))
             self.hits.learn(distances)
         elif self.estimate is not None:
             # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.

@@ -14,11 +14,13 @@ from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.warm_up import warm_up_costmap, warm_up_ranges
 from twin.nodes.navigation.costmap_filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, polygon_msg
 from twin.nodes.navigation.costmap_services import CostmapServices
 from twin.nodes.navigation.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.scan_input import ScanInput
 
 
 def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
@@ -65,9 +67,13 @@ class CostmapNode:
     ) -> None:
         self.node = node = bus.create_node(config.name, f"{namespace}/{config.name}")
         self.config = config
+        warm_up_costmap()
+        if config.range_topics:
+            warm_up_ranges()
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scan: LaserScan | None = None
+        self._input = ScanInput(robot_pose, node.now_ns)
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
         own = f"{namespace}/{config.name}"
@@ -98,6 +104,12 @@ class CostmapNode:
         """The master grid; None until the map is there."""
         return self._layers.costmap if self._layers else None
 
+    @property
+    def fault(self) -> str:
+        """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
+        tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
+        return self._input.fault(self.node.now_ns, tolerance_ns) if tolerance_ns else ""
+
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
             self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
@@ -105,7 +117,8 @@ class CostmapNode:
             self.node.get_logger().error(f"map refused: {error}")
 
     def _on_scan(self, message: LaserScan) -> None:
-        self._scan = message
+        if self._input.accept(message, self.node.now_ns):
+            self._scan = message
 
     def _update(self) -> None:
         layers = self._layers

@@ -22,6 +22,7 @@ from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
+from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -38,6 +39,8 @@ class PlannerServerConfig:
     compute_alternatives: int = 0
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
+    path_distance: float = 1.0
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
@@ -87,6 +90,7 @@ class PlannerServerNode:
         self._last: tuple[Pose2, Array] | None = None
         """The goal of the last leg, and its path."""
         self._asked: tuple[Pose2, Pose2] | None = None
+        warm_up_planning()
         parameters = PlannerParameters(
             planner_plugins=tuple(self._configs),
             server=server or PlannerServerConfig(),
@@ -212,7 +216,10 @@ class PlannerServerNode:
         path, costmap, robot = path_array(request.path), self._costmap.costmap, self._robot_pose.in_map()
         if not len(path) or costmap is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
-        nearest = int(np.argmin(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)))
+        away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
+        nearest = int(np.argmin(away))
+        if away[nearest] > self._server.path_distance:
+            return new(IsPathValid.Response, is_valid=False)
         columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
         height, width = costmap.costs.shape
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
