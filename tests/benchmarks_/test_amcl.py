@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from typer.testing import CliRunner
 
 from twin.cli.app import app
 
 
+@pytest.mark.slow
 def test_it_tracks_finds_itself_and_notices_a_kidnapping() -> None:
     arguments = ["bench", "amcl", "--distance", "10", "--starts", "2", "--kidnaps", "1", "--json"]
     result = CliRunner().invoke(app, arguments)
