@@ -29,7 +29,7 @@ from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking_server import DockingConfig
+from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.build import build
 from twin.scenario.schema import json_schema, load
@@ -215,7 +215,7 @@ PARAMETERS: Mapping[str, type[Any]] = {
     "/behavior_server": BehaviorConfig,
     "/bt_navigator": BtNavigatorConfig,
     "/waypoint_follower": WaypointFollowerConfig,
-    "/docking_server": DockingConfig,
+    "/docking_server": DockingServerConfig,
     "/docking_server, sights of the dock": DockEstimateConfig,
 }
 

@@ -22,6 +22,7 @@ from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.failures import ControlFailure
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.particles import clusters, regularised, tempered_weights
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, ThetaStarConfig
@@ -82,6 +83,8 @@ def warm_up_localisation() -> None:
     beams = chosen_beams([0.5, 0.6], [0.0, 1.0], Pose2(0.0, 0.0, 0.0), most=2, min_range=0.0, max_range=9.0)
     field = LikelihoodField(SurfaceDistance(_room(), max_dist=2.0), z_hit=0.5, z_rand=0.5)
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
+    regularised(np.ones((2, 3)), clusters(np.ones((2, 3))), np.ones((2, 3)))
+    tempered_weights(np.zeros(2), np.zeros(2), 1.0)
 
 
 def warm_up_controller(controller: Controller) -> None:

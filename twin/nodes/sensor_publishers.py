@@ -26,7 +26,7 @@ class SensorDevice(Protocol):
         """Time between samples [ns]."""
 
     def sample(self, time_ns: int) -> Any:
-        """Return the reading at `time_ns`."""
+        """Return the reading at `time_ns`; None: there is none."""
 
 
 def _laser_scan(spec: LidarSpec, header: Header, reading: Any) -> LaserScan:
@@ -96,7 +96,8 @@ class SensorPublisher:
         self._publisher: Publisher[Any] = self.node.create_publisher(msgtype, sensor.spec.topic, SENSOR_DATA)
 
     def publish(self, time_ns: int) -> None:
-        """Sample at `time_ns` and publish, stamped with it."""
-        spec = self.sensor.spec
-        header = Header(stamp=stamp(time_ns), frame_id=spec.link)
-        self._publisher.publish(self._to_message(spec, header, self.sensor.sample(time_ns)))
+        """Sample at `time_ns` and publish, stamped with it; a sensor that fails may have nothing to say."""
+        spec, reading = self.sensor.spec, self.sensor.sample(time_ns)
+        if reading is not None:
+            header = Header(stamp=stamp(time_ns), frame_id=spec.link)
+            self._publisher.publish(self._to_message(spec, header, reading))

@@ -95,7 +95,7 @@ def build(
                 command_latency=robot.command_latency,
             )
         )
-    scene = _scene(scenario, arena)
+    scene = _scene(scenario, _as_it_is(scenario, arena))
     maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
     world = World.compose(
         scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
@@ -151,6 +151,14 @@ def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:
     if arena is None:
         raise ScenarioError(f"robot '{robot.id}' starts at '{robot.start}', but there is no arena with poses")
     return arena.pose(robot.start)
+
+
+def _as_it_is(scenario: Scenario, arena: Arena | None) -> Arena | None:
+    """Return the arena that is built, which need not be the one that robots and maps know of."""
+    for fault in scenario.faults:
+        if fault.displacement is not None and arena is not None:
+            arena = arena.with_moved(fault.displacement.name, fault.displacement.by.pose)
+    return arena
 
 
 def _scene(scenario: Scenario, arena: Arena | None) -> Scene:

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
-from twin.bridge.action_types import BackUp, DriveOnHeading, NavigateToPose, Spin, Wait
+from twin.bridge.action_types import (
+    BackUp,
+    DockRobot,
+    DriveOnHeading,
+    NavigateToPose,
+    Spin,
+    UndockRobot,
+    Wait,
+)
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Point, duration, new
+from twin.bridge.types import ActionType
 from twin.errors import ScenarioError
 from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps import footprint as footprints
@@ -22,6 +31,7 @@ from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.nodes.random_goals import RandomGoalsConfig, RandomGoalsNode
 from twin.runtime.navigation_config import overridden
 from twin.runtime.robot_stack import RobotStack
+from twin.scenario import missions
 from twin.scenario.missions import (
     Behaviors,
     BehaviorStep,
@@ -33,6 +43,7 @@ from twin.scenario.missions import (
     RandomGoals,
     VelocityProfile,
 )
+from twin.strict_yaml import StrictModel
 from twin.warehouse.arena import Arena
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
 from twin.warehouse.skills import Station
@@ -91,6 +102,7 @@ def build_mission(
                 clearance=mission.clearance,
                 min_goal_distance=mission.min_goal_distance,
                 max_failed=mission.max_failed,
+                retries=mission.retries,
             )
             return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():
@@ -115,36 +127,36 @@ def build_mission(
 
 def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
     """Return the action of one step of a behaviour mission."""
+    action, label, goal = _goal(step.config, stack)
+    return ActionStep(label, action, step.kind, lambda: goal)
+
+
+def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:
+    """Return the action of a step, how it is called in the mission's state, and its goal message."""
     allowance = duration(120_000_000_000)
-    if (drive := step.drive_on_heading) is not None:
-        drive_goal = new(
-            DriveOnHeading.Goal,
-            target=Point(x=drive.distance, y=0.0, z=0.0),
-            speed=drive.speed,
-            time_allowance=allowance,
-        )
-        label = f"drive {drive.distance:g} m"
-        return ActionStep(label, DriveOnHeading, "drive_on_heading", lambda: drive_goal)
-    if (backup := step.backup) is not None:
-        backup_goal = new(
-            BackUp.Goal,
-            target=Point(x=backup.distance, y=0.0, z=0.0),
-            speed=backup.speed,
-            time_allowance=allowance,
-        )
-        return ActionStep(f"back up {backup.distance:g} m", BackUp, "backup", lambda: backup_goal)
-    if (spin := step.spin) is not None:
-        spin_goal = new(Spin.Goal, target_yaw=spin.angle, time_allowance=allowance)
-        return ActionStep(f"spin {math.degrees(spin.angle):.0f}°", Spin, "spin", lambda: spin_goal)
-    if (wait := step.wait) is not None:
-        wait_goal = new(Wait.Goal, time=duration(round(wait.duration * 1e9)))
-        return ActionStep(f"wait {wait.duration:g} s", Wait, "wait", lambda: wait_goal)
-    goal = step.navigate_to_pose
-    assert goal is not None
-    target = pose_stamped(Pose2(goal.x, goal.y, goal.yaw), stack.frames.map, 0)
-    navigate_goal = new(NavigateToPose.Goal, pose=target)
-    label = f"navigate to ({goal.x:g}, {goal.y:g})"
-    return ActionStep(label, NavigateToPose, "navigate_to_pose", lambda: navigate_goal)
+    match step:
+        case missions.DriveOnHeading(distance=distance, speed=speed):
+            target = Point(x=distance, y=0.0, z=0.0)
+            goal = new(DriveOnHeading.Goal, target=target, speed=speed, time_allowance=allowance)
+            return DriveOnHeading, f"drive {distance:g} m", goal
+        case missions.BackUp(distance=distance, speed=speed):
+            target = Point(x=distance, y=0.0, z=0.0)
+            goal = new(BackUp.Goal, target=target, speed=speed, time_allowance=allowance)
+            return BackUp, f"back up {distance:g} m", goal
+        case missions.Spin(angle=angle):
+            goal = new(Spin.Goal, target_yaw=angle, time_allowance=allowance)
+            return Spin, f"spin {math.degrees(angle):.0f}°", goal
+        case missions.Wait(duration=seconds):
+            return Wait, f"wait {seconds:g} s", new(Wait.Goal, time=duration(round(seconds * 1e9)))
+        case missions.NavigateToPose(x=x, y=y, yaw=yaw):
+            pose = pose_stamped(Pose2(x, y, yaw), stack.frames.map, 0)
+            return NavigateToPose, f"navigate to ({x:g}, {y:g})", new(NavigateToPose.Goal, pose=pose)
+        case missions.DockRobot(dock=dock, max_staging_time=limit):
+            goal = new(DockRobot.Goal, use_dock_id=True, dock_id=dock, max_staging_time=limit)
+            return DockRobot, f"dock at {dock}", goal
+        case missions.UndockRobot(dock_type=dock_type):
+            return UndockRobot, "undock", new(UndockRobot.Goal, dock_type=dock_type)
+    raise TypeError(type(step).__name__)
 
 
 def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:

@@ -17,10 +17,13 @@ from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.controller_config import controller_server_config
+from twin.runtime.docking_config import docking_config
 from twin.runtime.overrides import overridden as overridden
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
@@ -29,6 +32,8 @@ C = TypeVar("C")
 
 _GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
 _LOCAL_COSTMAP_PERIOD_NS = 200_000_000
+_MISSED_SCANS = 3.5
+"""After so many scan periods without a scan the robot stops: three in a row are missing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +47,21 @@ class NavigationParameters:
     planner_server: PlannerServerConfig
     commitment: CommitmentConfig
     controller_server: ControllerServerConfig
+    path_smoother: SmootherServerConfig
     behaviors: BehaviorConfig
+    docking: DockingServerConfig
     navigator: BtNavigatorConfig
     waypoints: WaypointFollowerConfig
 
 
 def navigation_parameters(
-    config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames, *, mapping: bool = False
+    config: NavigationConfig,
+    drive: DriveSpec,
+    footprint: Array,
+    frames: Frames,
+    *,
+    mapping: bool = False,
+    scan_rate: float | None = None,
 ) -> NavigationParameters:
     """Return the parameters for a robot.
 
@@ -58,6 +71,7 @@ def navigation_parameters(
         footprint: Corners in the base frame, shape (n, 2) [m].
         frames: The robot's.
         mapping: Whether the map is made on the way: paths may lead through what is unknown.
+        scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
     linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
@@ -70,18 +84,29 @@ def navigation_parameters(
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
-    rolling = replace(layers, rolling_window=True, width=4.0, height=4.0, obstacle_max_range=3.0)
+    rolling = replace(
+        layers,
+        rolling_window=True,
+        width=4.0,
+        height=4.0,
+        obstacle_max_range=3.0,
+        expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
+    )
+    # No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
     smoother = VelocitySmootherConfig(
-        linear=AxisLimits(
-            max_velocity=linear,
-            max_acceleration=config.max_linear_acceleration or 0.8,
-            max_deceleration=config.max_linear_deceleration or 1.2,
+        linear=_limits(
+            linear,
+            config.max_linear_acceleration or 0.8,
+            config.max_linear_deceleration or 1.2,
+            drive.max_linear_acceleration,
         ),
-        angular=AxisLimits(
-            max_velocity=angular,
-            max_acceleration=config.max_angular_acceleration or 2.0,
-            max_deceleration=config.max_angular_acceleration or 3.0,
+        angular=_limits(
+            angular,
+            config.max_angular_acceleration or 2.0,
+            config.max_angular_acceleration or 3.0,
+            drive.max_angular_acceleration,
         ),
+        scale_velocities=True,
     )
     return NavigationParameters(
         smoother=smoother,
@@ -98,8 +123,10 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
+        path_smoother=SmootherServerConfig(),
+        docking=docking_config(config.docking),
         navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
     )
@@ -111,6 +138,14 @@ def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
     return replace(
         overridden(defaults, overrides),
         bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
+    )
+
+
+def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
+    return AxisLimits(
+        max_velocity=speed,
+        max_acceleration=min(acceleration, drive or acceleration),
+        max_deceleration=min(deceleration, drive or deceleration),
     )
 
 

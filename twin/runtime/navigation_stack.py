@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.specs import LidarSpec
+from twin.models.specs import DriveSpec, LidarSpec
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
@@ -16,7 +19,7 @@ from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
-from twin.runtime.nav2_parameters import with_file, with_plugins
+from twin.runtime.nav2_parameters import monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
@@ -39,10 +42,24 @@ def build_navigation(
     localisation = context.config.localisation
     mapping = localisation is not None and localisation.type == "slam"
     config = with_plugins(config, namespace)
-    parameters = navigation_parameters(config, description.drive, footprint, pose.frames, mapping=mapping)
+    lidars = [s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == "scan"]
+    parameters = navigation_parameters(
+        config,
+        description.drive,
+        footprint,
+        pose.frames,
+        mapping=mapping,
+        scan_rate=lidars[0].rate_hz if lidars else None,
+    )
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    build_commands(context, config.collision_monitor, pose, footprint)
+    build_commands(
+        context,
+        monitor_with_file(config, namespace),
+        pose,
+        footprint,
+        _drive_limits(parameters.smoother, description.drive),
+    )
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
@@ -58,7 +75,7 @@ def build_navigation(
         commitment=parameters.commitment,
         namespace=namespace,
     )
-    SmootherServerNode(bus, global_costmap, namespace=namespace)
+    SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)
     server = ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )
@@ -67,10 +84,20 @@ def build_navigation(
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
-    if any(isinstance(sensor, LidarSpec) and sensor.topic == "scan" for sensor in description.sensors):
-        DockingServerNode(bus, pose, namespace=namespace)
+    if lidars:
+        DockingServerNode(bus, pose, parameters.docking, namespace=namespace)
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
     return navigator
+
+
+def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:
+    """Return what people may ask for, too: the smoother's accelerations at the drive's own speeds."""
+    linear, angular = drive.max_linear_velocity, drive.max_angular_velocity
+    return replace(
+        smoother,
+        linear=replace(smoother.linear, max_velocity=linear or smoother.linear.max_velocity),
+        angular=replace(smoother.angular, max_velocity=angular or smoother.angular.max_velocity),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.controllers.drive_config import drive_config
+from twin.controllers.odometry_noise import DIFF_DRIVE, SKID_STEER
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
@@ -43,7 +44,7 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        self._build_drive(description)
+        self.drive = self._build_drive(description)
         build_odometry_filter(context, self.frames)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
@@ -67,11 +68,11 @@ class RobotStack:
             )
         self._build_arm(description)
 
-    def _build_drive(self, description: RobotDescription) -> None:
+    def _build_drive(self, description: RobotDescription) -> DiffDriveControllerNode | None:
         drive, context = description.drive, self._context
         if drive is None:
-            return
-        DiffDriveControllerNode(
+            return None
+        return DiffDriveControllerNode(
             context.bus,
             self.handle.hardware,
             DiffDriveNodeConfig(
@@ -80,6 +81,7 @@ class RobotStack:
                 right_joints=drive.right_joints,
                 odom_frame=self.frames.odom,
                 base_frame=self.frames.base,
+                noise=SKID_STEER if drive.kind == "skid_steer" else DIFF_DRIVE,
                 period_ns=context.control_period_ns,
                 use_imu=getattr(context.config.localisation, "use_imu", False),
                 enable_odom_tf=context.config.odometry.type == "wheels",

@@ -18,6 +18,7 @@ from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError, ScenarioError
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
+from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
@@ -71,6 +72,7 @@ class Run:
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
+        self._faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
@@ -113,11 +115,12 @@ class Run:
             self.lockstep.step()
 
     def actuate(self) -> None:
-        """3. Actuators take the commands; obstacles come into the way."""
+        """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
         bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
         self._obstacles.update(bases)
+        self._faults.update()
 
     def step(self) -> None:
         """4. Physics."""

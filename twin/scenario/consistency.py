@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.scenario.checks.check import CheckConfig
+from twin.scenario.faults import RobotFault
 from twin.scenario.missions import (
     Behaviors,
     Explore,
@@ -19,6 +20,7 @@ from twin.scenario.missions import (
 from twin.strict_yaml import Fault, Loc
 
 if TYPE_CHECKING:
+    from twin.scenario.robots import RobotConfig
     from twin.scenario.schema import Scenario
 
 
@@ -28,6 +30,7 @@ def faults(scenario: Scenario) -> Iterator[Fault]:
     yield from _periods(scenario)
     yield from _arena(scenario)
     yield from _mission(scenario)
+    yield from _faults(scenario)
     yield from _checks(scenario)
 
 
@@ -97,6 +100,9 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         if entry.delivered is not None:
             yield Fault(("checks", i), f"delivered {message}")
+    for i, fault in enumerate(scenario.faults):
+        if fault.displacement is not None:
+            yield Fault(("faults", i), f"displacement {message}")
 
 
 def _mission(scenario: Scenario) -> Iterator[Fault]:
@@ -124,12 +130,35 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
         yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
     if isinstance(mission, RandomGoals) and (robot.localisation is None or robot.localisation.type != "amcl"):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
-    if isinstance(mission, Behaviors) and robot.navigation is None:
-        for i, step in enumerate(mission.steps):
-            if step.navigate_to_pose is not None:
-                yield Fault(
-                    ("mission", "steps", i), f"navigate_to_pose needs a navigation of robot '{robot.id}'"
-                )
+    if isinstance(mission, Behaviors):
+        yield from _behaviors(mission, robot)
+
+
+def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
+    docks = robot.navigation.docking.docks if robot.navigation is not None else {}
+    for i, step in enumerate(mission.steps):
+        at = ("mission", "steps", i)
+        if robot.navigation is None and step.kind in ("navigate_to_pose", "dock_robot", "undock_robot"):
+            yield Fault(at, f"{step.kind} needs a navigation of robot '{robot.id}'")
+        elif step.dock_robot is not None and step.dock_robot.dock not in docks:
+            name = step.dock_robot.dock
+            valid = nearest(name, docks) if docks else "navigation.docking.docks is empty"
+            yield Fault((*at, "dock_robot", "dock"), f"robot '{robot.id}' knows no dock '{name}'; {valid}")
+
+
+def _faults(scenario: Scenario) -> Iterator[Fault]:
+    robots = [robot.id for robot in scenario.robots]
+    for i, entry in enumerate(scenario.faults):
+        config, loc = entry.config, ("faults", i, entry.kind)
+        if not isinstance(config, RobotFault):
+            continue
+        if config.robot is None and len(robots) > 1:
+            names = ", ".join(robots)
+            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        elif config.robot is not None and config.robot not in robots:
+            yield Fault((*loc, "robot"), f"unknown robot '{config.robot}'; {nearest(config.robot, robots)}")
+        if config.at >= scenario.duration:
+            yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
 
 
 def _checks(scenario: Scenario) -> Iterator[Fault]:
@@ -146,7 +175,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
         if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
             names = ", ".join(robots)
             yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
-        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "time_limit"):
+        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
             yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
         tote = subjects.get("tote")
         if entry.kind == "tote_slip" and tote is not None and tote not in totes:

@@ -73,6 +73,22 @@ class NavigateToPose(StrictModel):
     """Goal heading [rad]."""
 
 
+class DockRobot(StrictModel):
+    """Drive to a dock of `robots[].navigation.docking.docks` and dock (Nav2 `dock_robot`)."""
+
+    dock: str
+    """Its name."""
+    max_staging_time: Annotated[Seconds, Positive] = 1000.0
+    """For the way to the pose before it [s]."""
+
+
+class UndockRobot(StrictModel):
+    """Drive straight back from the dock (Nav2 `undock_robot`)."""
+
+    dock_type: str = ""
+    """Type of the dock; absent: that of the dock at which the robot docked."""
+
+
 class BehaviorStep(OneOf):
     """One step: exactly one of these keys."""
 
@@ -86,6 +102,10 @@ class BehaviorStep(OneOf):
     """Stand still."""
     navigate_to_pose: NavigateToPose | None = None
     """Drive to a pose."""
+    dock_robot: DockRobot | None = None
+    """Drive to a dock and dock."""
+    undock_robot: UndockRobot | None = None
+    """Leave the dock."""
 
 
 class Behaviors(StrictModel):
@@ -115,7 +135,9 @@ class RandomGoals(StrictModel):
     min_goal_distance: Annotated[Metres, NotNegative] = 3.0
     """Distance of a goal from the robot, as the crow flies [m]."""
     max_failed: Annotated[int, NotNegative] = 0
-    """How many goals the navigator may give up; one more ends the mission."""
+    """How many goals may be given up; one more ends the mission."""
+    retries: Annotated[int, NotNegative] = 3
+    """How often a goal that the navigator gives up is sent again, 5 s later: somebody may stand on it."""
 
 
 class VelocityStep(StrictModel):

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from pydantic import Field
+
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.controllers import ControllerParameters
+from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
+from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, StrictModel
+from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
 
 
 class CostmapParameters(ParameterGroup):
@@ -36,6 +39,8 @@ class CostmapParameters(ParameterGroup):
     """Range from which a beam marks obstacles [m]."""
     obstacle_max_range: Annotated[Metres, Positive] | None = None
     """Range within which a beam marks obstacles [m]."""
+    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
+    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
     raytrace_min_range: Annotated[Metres, NotNegative] | None = None
     """Range from which a beam clears cells [m]."""
     raytrace_max_range: Annotated[Metres, Positive] | None = None
@@ -79,7 +84,7 @@ class NavigationConfig(StrictModel):
     max_angular_acceleration: Annotated[float, Positive] | None = None
     """Limit of the velocity smoother, also when braking [rad/s²]."""
     collision_monitor: CollisionMonitorParameters | None = None
-    """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
+    """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
@@ -92,7 +97,11 @@ class NavigationConfig(StrictModel):
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()
     """Overrides of the path follower."""
+    controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)
+    """More of them, for goals and behaviour trees that name a controller or a goal checker."""
     global_costmap: CostmapParameters = CostmapParameters()
     """Overrides of the costmap that plans are made on."""
     local_costmap: CostmapParameters = CostmapParameters()
     """Overrides of the rolling costmap around the robot."""
+    docking: DockingParameters = DockingParameters()
+    """Docks, and overrides of the docking server."""

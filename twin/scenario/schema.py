@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from twin.errors import ScenarioError
 from twin.scenario import consistency
 from twin.scenario.checks import Check, CheckEntry
+from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import NotNegative, Positive, RosName
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
@@ -40,6 +41,8 @@ class Scenario(StrictModel):
     """The robots."""
     mission: Mission = Idle(type="idle")
     """What they are to do."""
+    faults: tuple[FaultEntry, ...] = ()
+    """What goes wrong, and when."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
     recording: RecordingConfig = RecordingConfig()
@@ -51,6 +54,24 @@ class Scenario(StrictModel):
         if faults:
             raise Faults(faults)
         return self
+
+    def with_params_file(self, path: Path) -> Scenario:
+        """Return the scenario with one Nav2 parameter file for every robot that navigates.
+
+        Raises:
+            ScenarioError: no robot does.
+        """
+        robots = tuple(
+            robot
+            if robot.navigation is None
+            else robot.model_copy(
+                update={"navigation": robot.navigation.model_copy(update={"params_file": str(path)})}
+            )
+            for robot in self.robots
+        )
+        if all(robot.navigation is None for robot in robots):
+            raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
+        return self.model_copy(update={"robots": robots})
 
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
         """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""

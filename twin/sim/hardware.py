@@ -80,6 +80,7 @@ class Hardware:
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
         wheels = {wheel.joint.name for wheel in commanded_wheels(description)}
         self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
+        self._miscounted = np.zeros(len(joints))
         self._counts = self._count()
         self._step = 0
         n = len(self.joint_names)
@@ -151,6 +152,23 @@ class Hardware:
             self._data.ctrl[self._actuators] = self._commands
         self._servos.apply()
 
+    def miscount(self, joint: str, angle: float) -> None:
+        """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
+
+        Args:
+            joint: One of `joint_names` that has an encoder.
+            angle: By which it is wrong from now on [rad].
+
+        Raises:
+            SimulationError: No encoder measures this joint.
+        """
+        encoders = [
+            name for name, is_encoder in zip(self.joint_names, self._encoder, strict=True) if is_encoder
+        ]
+        if joint not in encoders:
+            raise SimulationError(f"no encoder measures joint '{joint}'; {nearest(joint, encoders)}")
+        self._miscounted[self.joint_names.index(joint)] += round(angle / self._tick)
+
     def _arrived(self) -> Array:
         """Send the present commands on their way; return the newest ones that have arrived."""
         now = round(self._data.time / self._timestep)
@@ -164,7 +182,7 @@ class Hardware:
         self._servos.reset()
 
     def _count(self) -> Array:
-        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick)
+        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick) + self._miscounted
 
 
 class _WheelServos:

@@ -48,6 +48,7 @@ class RobotHandle:
         sensors: tuple[Sensor, ...],
         data: mujoco.MjData,
         mocap_id: int,
+        free_joint: tuple[int, int] | None,
     ) -> None:
         self.name = name
         self.description = description
@@ -57,10 +58,29 @@ class RobotHandle:
         """Name of the root link's body."""
         self._data = data
         self._mocap_id = mocap_id
+        self._free_joint = free_joint
 
     def body(self, link: str) -> str:
         """Return the name of a link's body."""
         return f"{self.name}/{link}"
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the base moves as physics has it: neither fixed nor kinematic."""
+        return self._free_joint is not None
+
+    def carry(self, T_world_root: Pose3) -> None:
+        """Lift the robot and put it down at rest elsewhere, its joints as they are, with the next step.
+
+        Raises:
+            ValueError: Its base is not free.
+        """
+        if self._free_joint is None:
+            raise ValueError(f"robot '{self.name}' has no free base")
+        qpos, dof = self._free_joint
+        self._data.qpos[qpos : qpos + 7] = [*T_world_root.xyz, *T_world_root.quat_wxyz]
+        self._data.qvel[dof : dof + 6] = 0.0
+        self.hardware.reset()
 
     def set_kinematic_pose(self, T_world_root: Pose3) -> None:
         """Put a robot with a kinematic base somewhere; takes effect with the next step.

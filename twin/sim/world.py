@@ -243,4 +243,12 @@ class World:
             sensors=sensors,
             data=self.data,
             mocap_id=int(root.mocapid[0]),
+            free_joint=self._free_joint(root.id),
         )
+
+    def _free_joint(self, body: int) -> tuple[int, int] | None:
+        """Return where the free joint of a body is in qpos and in qvel; None: it has none."""
+        joint = int(self.model.body_jntadr[body])
+        if joint < 0 or self.model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+            return None
+        return int(self.model.jnt_qposadr[joint]), int(self.model.jnt_dofadr[joint])

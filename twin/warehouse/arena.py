@@ -71,6 +71,25 @@ class Arena:
         self.zones: Mapping[str, Zone] = MappingProxyType({name: self._zone(name) for name in file.zones})
         self.poses: Mapping[str, Pose2] = MappingProxyType({n: Pose2(*p) for n, p in file.poses.items()})
 
+    def with_moved(self, name: str, by: Pose2) -> Arena:
+        """Return the arena with one of its parts elsewhere, and with it what stands on that.
+
+        Args:
+            name: Of a rack, pallet, pillar or obstacle.
+            by: How far it is moved along the axes of `map`, and turned about its own origin.
+
+        Raises:
+            ScenarioError: No such part.
+        """
+        groups = ("racks", "pallets", "pillars", "obstacles")
+        parts = {part: group for group in groups for part in getattr(self.file, group)}
+        if name not in parts:
+            raise ScenarioError(f"arena '{self.name}' has no part '{name}'; {nearest(name, parts)}")
+        group = getattr(self.file, parts[name])
+        x, y, yaw = group[name].pose
+        entry = group[name].model_copy(update={"pose": (x + by.x, y + by.y, yaw + by.yaw)})
+        return Arena(self.file.model_copy(update={parts[name]: {**group, name: entry}}))
+
     @property
     def hall(self) -> Rectangle:
         """The floor between the outer walls."""

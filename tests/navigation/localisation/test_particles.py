@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twin.geometry import Pose2
+from twin.navigation.localisation.motion_models import sample_motion
 from twin.navigation.localisation.particles import (
     clusters,
     heaviest,
     kld_sample_size,
     mean_and_covariance,
-    sample_motion,
     systematic_resample,
     tempered_weights,
 )

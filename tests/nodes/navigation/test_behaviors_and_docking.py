@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,23 +16,38 @@ from twin.bridge.action_types import (
     BackUp,
     DockRobot,
     DriveOnHeading,
+    NavigateToPose,
     Spin,
     UndockRobot,
     Wait,
 )
-from twin.bridge.actions import ActionClient
+from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.conversions import pose2_from_pose, pose_from_pose2, twist_from_planar
-from twin.bridge.msgs import Empty, GoalStatus, LaserScan, Point, PoseArray, Twist, duration, header, new
+from twin.bridge.msgs import (
+    BatteryState,
+    Empty,
+    GoalStatus,
+    LaserScan,
+    Point,
+    PoseArray,
+    PoseStamped,
+    Twist,
+    duration,
+    header,
+    new,
+)
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
 from twin.bridge.types import ActionType
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.docking.docks import Dock as DockEntry
+from twin.navigation.docking.docks import DockDatabase, DockType
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
-from twin.nodes.navigation.docking_server import DockingServerNode
+from twin.nodes.navigation.docking_server import DockingServerConfig, DockingServerNode
 from twin.nodes.tote_detector import ToteDetectorNode
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
@@ -208,21 +225,30 @@ class Dock:
 
     FACE = Pose2(2.0, 0.0, 0.0)
 
-    def __init__(self, bench: Bench, *, start: Pose2, shelf: bool = True) -> None:
+    def __init__(
+        self, bench: Bench, *, start: Pose2, shelf: bool = True, config: DockingServerConfig | None = None
+    ) -> None:
         self.bench = bench
         room = Room(box(-4.0, -4.0, 4.0, 4.0))
         if shelf:
             room.add_box(2.0, -1.5, 2.6, 1.5)
         self.robot = Robot(bench, room, cmd_vel="cmd_vel_docking", start=start)
-        DockingServerNode(bench.bus, self.robot.pose_lookup)
+        DockingServerNode(bench.bus, self.robot.pose_lookup, config)
+        self.told: list[Any] = []
         self.dock_client = ActionClient(bench.node, DockRobot, "dock_robot")
         self.undock_client = ActionClient(bench.node, UndockRobot, "undock_robot")
         self._totes = bench.node.create_publisher(PoseArray, "tote_poses", 1)
         bench.run(0.5)
 
+    def send(self, kind: str = "table", believed: Pose2 | None = None, **fields: Any) -> Any:
+        docked = (believed or self.FACE) @ Pose2(-0.55, 0.0, 0.0)
+        wanted = {"use_dock_id": False, "navigate_to_staging_pose": False, "dock_type": kind} | fields
+        return self.dock_client.send_goal(
+            new(DockRobot.Goal, dock_pose=pose_stamped(docked, "map", 0), **wanted), self.told.append
+        )
+
     def dock(self, kind: str = "table", believed: Pose2 | None = None) -> Any:
-        face = pose_stamped(believed or self.FACE, "map", 0)
-        goal = self.dock_client.send_goal(new(DockRobot.Goal, dock_pose=face, dock_type=kind))
+        goal = self.send(kind, believed)
         self.bench.until(lambda: goal.done, 120.0)
         self.bench.run(0.5)
         return goal
@@ -244,7 +270,7 @@ class Dock:
     def undock(self) -> float:
         """Undock; return how far the robot drove back."""
         before = self.robot.pose
-        goal = self.undock_client.send_goal(new(UndockRobot.Goal))
+        goal = self.undock_client.send_goal(new(UndockRobot.Goal, dock_type="table"))
         self.bench.until(lambda: goal.done)
         assert goal.result.success
         self.bench.run(0.5)
@@ -271,9 +297,7 @@ def test_docking_at_a_tote_lines_up_with_it(bench: Bench) -> None:
 
 def test_a_wrong_first_sight_of_the_tote_is_corrected_on_the_way(bench: Bench) -> None:
     dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
-    goal = dock.dock_client.send_goal(
-        new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0), dock_type="tote")
-    )
+    goal = dock.send("tote")
     bench.run(0.1)
     dock.show_totes(0.0, first=0.12)
     bench.until(lambda: goal.done, 60.0)
@@ -302,9 +326,7 @@ def test_a_dock_that_was_missed_is_approached_again_from_the_staging_distance(be
     """At the end the tote turns out to stand further aside: there is no way left to correct that."""
     dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
     dock.show_totes(0.0)
-    goal = dock.dock_client.send_goal(
-        new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0), dock_type="tote")
-    )
+    goal = dock.send("tote")
     bench.until(lambda: dock.robot.pose.x > 1.4, 60.0)
     bench.each_tick.pop()
     dock.show_totes(0.06)
@@ -341,7 +363,7 @@ def test_undocking_after_no_docking_does_not_back_into_what_is_behind(bench: Ben
 
 def test_a_cancelled_docking_stops(bench: Bench) -> None:
     dock = Dock(bench, start=Pose2(0.5, 0.0, 0.0))
-    goal = dock.dock_client.send_goal(new(DockRobot.Goal, dock_pose=pose_stamped(Dock.FACE, "map", 0)))
+    goal = dock.send()
     bench.run(1.5)
     assert dock.robot.joints.velocity.any()
     goal.cancel()
@@ -349,6 +371,136 @@ def test_a_cancelled_docking_stops(bench: Bench) -> None:
     assert goal.status == GoalStatus.STATUS_CANCELED
     bench.run(0.5)
     assert not dock.robot.joints.velocity.any()
+
+
+# the database of docks, staging, chargers
+
+
+CHARGER = DockType(is_charger=True, face_width=0.6)
+
+
+class Charger(Dock):
+    """A charger, 0.6 m wide, whose middle is 0.05 m aside of where the database has it."""
+
+    def __init__(
+        self, bench: Bench, type_: DockType = CHARGER, *, x: float = 0.7, accept: bool = True
+    ) -> None:
+        docks = {"home": dock_entry("charger"), "odd": dock_entry("no_such_type")}
+        database = DockDatabase(types={"charger": type_}, docks=docks)
+        config = DockingServerConfig(database=database, max_retries=1)
+        super().__init__(bench, start=Pose2(x, 0.0, 0.0), shelf=False, config=config)
+        self.robot.room.add_box(2.0, -0.25, 2.3, 0.35)
+        self.staged: list[Pose2] = []
+        self.accept, self.arrives = accept, True
+        ActionServer(bench.node, NavigateToPose, "navigate_to_pose", self._navigate)
+        self.battery = bench.node.create_publisher(BatteryState, "battery_state", 1)
+        self.detector = bench.node.create_publisher(PoseStamped, "detected_dock_pose", 1)
+        bench.run(0.5)
+
+    def _navigate(self, handle: GoalHandle) -> Generator[None, None, Any]:
+        self.staged.append(pose2_from_pose(handle.request.pose.pose))
+        while not self.arrives:
+            if handle.is_cancel_requested:
+                handle.canceled()
+                self.staged.append(Pose2(0.0, 0.0, 0.0))
+                return new(NavigateToPose.Result)
+            yield
+        if self.accept:
+            self.robot.start = self.staged[-1] @ self.robot.drive.odometry.pose.inverse()
+            return new(NavigateToPose.Result)
+        handle.abort()
+        return new(NavigateToPose.Result, error_code=208, error_msg="no way")
+
+    def dock_by_id(self, name: str = "home", **fields: Any) -> Any:
+        goal = self.dock_client.send_goal(
+            new(DockRobot.Goal, use_dock_id=True, dock_id=name, **fields), self.told.append
+        )
+        self.bench.until(lambda: goal.done, 120.0)
+        self.bench.run(0.3)
+        return goal
+
+
+def dock_entry(type_: str) -> DockEntry:
+    return DockEntry(type=type_, pose=Pose2(1.45, 0.0, 0.0))
+
+
+def test_a_dock_of_the_database_is_staged_docked_at_and_left(bench: Bench) -> None:
+    charger = Charger(bench, x=-1.0)
+    goal = charger.dock_by_id()
+    assert goal.result.success, goal.result.error_msg
+    assert charger.staged == [pytest.approx((0.7, 0.0, 0.0))]
+    assert charger.robot.pose == pytest.approx((1.45, 0.05, 0.0), abs=0.015), "its middle is the scan's"
+    states = [message.state for message in charger.told]
+    assert sorted(set(states), key=states.index) == [1, 2, 3]
+    undocked = charger.undock_client.send_goal(new(UndockRobot.Goal))
+    bench.until(lambda: undocked.done)
+    assert undocked.succeeded, "of what type it is, the server knows"
+    assert charger.robot.pose.x == pytest.approx(0.7, abs=0.02)
+
+
+def test_near_the_staging_pose_nothing_is_navigated(bench: Bench) -> None:
+    charger = Charger(bench, x=0.65)
+    assert charger.dock_by_id().result.success
+    assert charger.staged == []
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "reason"),
+    [("hom", 901, "did you mean 'home'"), ("odd", 902, "there is no dock type 'no_such_type'")],
+)
+def test_a_dock_that_is_unknown_is_not_looked_for(bench: Bench, name: str, code: int, reason: str) -> None:
+    goal = Charger(bench).dock_by_id(name)
+    assert goal.status == GoalStatus.STATUS_ABORTED
+    assert goal.result.error_code == code
+    assert reason in goal.result.error_msg
+
+
+def test_a_staging_pose_that_cannot_be_reached_ends_it(bench: Bench) -> None:
+    charger = Charger(bench, x=-1.0, accept=False)
+    goal = charger.dock_by_id()
+    assert (goal.result.error_code, goal.result.error_msg) == (
+        903,
+        "cannot drive to the staging pose: no way",
+    )
+
+
+def test_staging_has_its_time(bench: Bench) -> None:
+    charger = Charger(bench, x=-1.0)
+    charger.arrives = False
+    goal = charger.dock_by_id(max_staging_time=1.0)
+    assert (goal.result.error_code, goal.result.error_msg) == (903, "not at the staging pose after 1 s")
+    assert len(charger.staged) == 2, "the navigation was cancelled"
+
+
+def test_a_charger_that_does_not_charge_is_tried_again_and_given_up(bench: Bench) -> None:
+    charger = Charger(bench, replace(CHARGER, use_battery_status=True))
+    goal = charger.dock_by_id()
+    assert (goal.result.error_code, goal.result.num_retries) == (906, 1)
+    assert {message.state for message in charger.told} == {2, 3, 4, 5}
+
+
+def test_a_battery_that_is_charged_tells_that_it_docked(bench: Bench) -> None:
+    charger = Charger(bench, replace(CHARGER, use_battery_status=True))
+    bench.each_tick.append(lambda: charger.battery.publish(new(BatteryState, current=2.0)))
+    assert charger.dock_by_id().result.success
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_detector_of_somebody_else_tells_where_the_dock_is(bench: Bench, lost: bool) -> None:
+    charger = Charger(bench, DockType(use_external_detection_pose=True))
+    at = Pose2(2.0, 0.03, 0.0)
+
+    def detect() -> None:
+        if not (lost and charger.robot.pose.x > 1.0):
+            charger.detector.publish(pose_stamped(at, "map", bench.clock.now_ns - TICK_NS))
+
+    bench.each_tick.append(detect)
+    goal = charger.dock_by_id()
+    assert goal.result.success is not lost
+    if lost:
+        assert (goal.result.error_code, goal.result.num_retries) == (904, 1)
+    else:
+        assert charger.robot.pose == pytest.approx((1.45, 0.03, 0.0), abs=0.015)
 
 
 # tote_detector

@@ -93,11 +93,25 @@ class PathHandler:
         """Length of the path from the nearest pose to its end [m]."""
         return float(self._along[-1] - self._along[self._nearest])
 
+    def lead(self, way: Array, target: int) -> None:
+        """Lead along another way to the pose that is `target` poses past the nearest one, and on from there.
+
+        Args:
+            way: x, y of the way there, shape (n, 2); the first is where the robot is now.
+            target: Not past the end of the local path.
+        """
+        at = self._nearest + target
+        poses, _ = dense(_headed(way, self._poses[at]), SPACING)
+        self._poses = np.concatenate([poses[:-1], self._poses[at:]])
+        self._along = _arc_length(self._poses)
+        self._segments = [(last + len(poses) - 1 - at, reversing) for last, reversing in self._segments]
+        self._nearest = 0
+
     def local(self, pose: Pose2) -> LocalPath:
         """Return what lies ahead of the robot at `pose`; moves on along the path."""
         last, reversing = self._segments[0]
         self._advance(pose, last)
-        if len(self._segments) > 1 and self._reached(pose, last):
+        while len(self._segments) > 1 and self._reached(pose, last, reversing):
             self._segments.pop(0)
             self._nearest = last
             last, reversing = self._segments[0]
@@ -119,12 +133,15 @@ class PathHandler:
         near = self._poses[self._nearest : end + 1]
         self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
 
-    def _reached(self, pose: Pose2, index: int) -> bool:
+    def _reached(self, pose: Pose2, index: int, reversing: bool) -> bool:
+        """Whether the robot is at a cusp: near to it, and turned as the path is there, or past it."""
         x, y, yaw = self._poses[index].tolist()
-        return (
-            math.hypot(pose.x - x, pose.y - y) <= self.config.inversion_xy_tolerance
-            and abs(wrap_angle(pose.yaw - yaw)) <= self.config.inversion_yaw_tolerance
-        )
+        dx, dy = x - pose.x, y - pose.y
+        if math.hypot(dx, dy) > self.config.inversion_xy_tolerance:
+            return False
+        ahead = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw)
+        past = ahead >= 0.0 if reversing else ahead <= 0.0
+        return past or abs(wrap_angle(pose.yaw - yaw)) <= self.config.inversion_yaw_tolerance
 
 
 def dense(path: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
@@ -151,6 +168,13 @@ def cusps(poses: Array) -> list[int]:
 
 def _arc_length(poses: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+
+
+def _headed(way: Array, end: Array) -> Array:
+    """Return x, y of a way, shape (n, 2), as poses, shape (n, 3), the last of which is `end`."""
+    points = np.concatenate([way[:-1], end[None, :2]])
+    step = np.diff(points, axis=0)
+    return np.column_stack([points, np.append(np.arctan2(step[:, 1], step[:, 0]), end[2])])
 
 
 def _reversing(poses: Array) -> bool:

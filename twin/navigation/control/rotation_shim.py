@@ -42,7 +42,7 @@ class RotationShimConfig:
     rotate_to_goal_heading: bool = False
     """Whether the robot turns in place at the goal, too."""
     rotate_to_heading_once: bool = False
-    """Whether only the beginning of a path is turned to."""
+    """Whether a path to the same goal as the last one is not turned to."""
     closed_loop: bool = True
     """Whether the measured turn rate counts, not the last commanded one."""
     use_path_orientations: bool = False
@@ -59,12 +59,20 @@ class RotationShim:
     """Shape (n, 2) [m]."""
     carrot: tuple[float, float] | None = field(init=False, default=None)
     """The point of the path that the robot turns to, or that the primary controller steers for."""
-    trajectory: Array | None = field(init=False, default=None)
-    """That of the primary controller."""
 
     def __post_init__(self) -> None:
         self._tolerance = 0.0
         self._begin()
+
+    @property
+    def trajectory(self) -> Array | None:
+        """That of the primary controller, while it drives."""
+        return self.primary.trajectory if self._driving else None
+
+    @property
+    def candidates(self) -> Array | None:
+        """Those of the primary controller, while it drives."""
+        return self.primary.candidates if self._driving else None
 
     @property
     def reverses(self) -> bool:
@@ -97,7 +105,7 @@ class RotationShim:
         self._aligned = False
         self._at_goal = False
         self._last_w: float | None = None
-        self.carrot, self.trajectory = None, None
+        self.carrot, self._driving = None, False
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Pass the limit [m/s] on."""
@@ -128,8 +136,11 @@ class RotationShim:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
             NoValidControl: the primary controller finds no command.
         """
+        before = self._handler.path
         if self._handler.accept(path):
-            self._turning = self._aligned = self._at_goal = False
+            same = before is not None and len(before) > 0 and np.array_equal(before[-1], path[-1])
+            self._aligned &= same and self.config.rotate_to_heading_once
+            self._turning = self._at_goal = False
         angle = self._angle(pose, path)
         w = 0.0 if angle is None else self._turn_rate(angle, velocity[1], dt)
         # Where there is no room to turn the primary controller may know a way, as in Nav2.
@@ -138,9 +149,9 @@ class RotationShim:
             command = self.primary.compute_velocity(
                 pose, velocity, path, costmap, dt, costmap_pose=costmap_pose
             )
-            self.carrot, self.trajectory = self.primary.carrot, self.primary.trajectory
+            self.carrot, self._driving = self.primary.carrot, True
         else:
-            command, self.trajectory = (0.0, w), None
+            command, self._driving = (0.0, w), False
         self._last_w = command[1]
         return command
 
@@ -153,7 +164,7 @@ class RotationShim:
             if self._at_goal:
                 self.carrot = goal[:2]
                 return wrap_angle(goal.yaw - pose.yaw)
-        if config.rotate_to_heading_once and self._aligned:
+        if self._aligned:
             return None
         far = np.hypot(*(local.poses[:, :2] - local.poses[0, :2]).T) >= config.forward_sampling_distance
         if not far.any() and pose.distance(goal) <= self._tolerance:

@@ -45,6 +45,9 @@ class CostmapConfig:
     """[m]"""
     obstacle_max_range: float = 2.5
     """Points farther away do not mark [m]."""
+    expected_update_rate: float = 0.0
+    """Longest time between two scans of use; later the costmap is not current, and nobody drives by it [s].
+    0: none need come."""
     raytrace_min_range: float = 0.0
     """Rays clear from here [m]."""
     raytrace_max_range: float = 3.0

@@ -34,6 +34,8 @@ class DockEstimateConfig:
     """A tote further aside of the expected point is another one; less than half of totes' spacing [m]."""
     tote_depth: float = 0.2
     """So is one further behind the face than this, or before it [m]."""
+    width_tolerance: float = 0.08
+    """A face of known width that differs by more is not all in sight; two beams' distance or more [m]."""
     min_sights: int = 3
     """Fewer are not believed."""
     max_sights: int = 9
@@ -43,19 +45,24 @@ class DockEstimateConfig:
 class DockEstimate:
     """The face of one dock, in the odom frame."""
 
-    def __init__(self, expected: Pose2, config: DockEstimateConfig, *, wants_tote: bool) -> None:
+    def __init__(
+        self, expected: Pose2, config: DockEstimateConfig, *, wants_tote: bool, face_width: float = 0.0
+    ) -> None:
         """Begin with what the plan says.
 
         Args:
             expected: Point on the face, x into the dock, in the odom frame.
             config: What is believed.
             wants_tote: Whether to line up with the tote there, or with the expected point.
+            face_width: Of a face whose middle is to be lined up with [m]; 0: the expected point is.
         """
         self.config = config
         self.wants_tote = wants_tote
+        self.face_width = face_width
         self._expected = expected
         self._walls: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
-        self._totes: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
+        self._middles: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
+        """What to line up with: totes, or middles of the face, in the expected dock's frame."""
 
     @property
     def seen_face(self) -> bool:
@@ -65,16 +72,17 @@ class DockEstimate:
     @property
     def seen(self) -> bool:
         """Whether all that is looked for was seen often enough."""
-        return self.seen_face and (not self.wants_tote or len(self._totes) >= self.config.min_sights)
+        knows_middle = not self.wants_tote and not self.face_width
+        return self.seen_face and (knows_middle or len(self._middles) >= self.config.min_sights)
 
     @property
     def face(self) -> Pose2:
         """The point to dock at, x into the dock, in the odom frame."""
         edge = self._edge()
-        if not self._totes:
+        if not self._middles:
             return self._expected @ edge
         # The tote stands behind the edge: its foot on the face is what the robot lines up with.
-        x, y = np.median(self._totes, axis=0).tolist()
+        x, y = np.median(self._middles, axis=0).tolist()
         return self._expected @ edge @ Pose2(0.0, (edge.inverse() @ Pose2(x, y, 0.0)).y, 0.0)
 
     def _edge(self) -> Pose2:
@@ -99,7 +107,21 @@ class DockEstimate:
         yaw = wrap_angle(wall.yaw + T_expected_base.yaw)
         offset = wall.distance + math.cos(yaw) * T_expected_base.x + math.sin(yaw) * T_expected_base.y
         self._walls.append((offset / math.cos(yaw), yaw))
+        if self.face_width:
+            self._take_middle(points[near][wall.inliers], wall.yaw, T_expected_base)
         return True
+
+    def _take_middle(self, face: Array, yaw: float, T_expected_base: Pose2) -> None:
+        """Note the middle of the face's points, shape (n, 2), in the base frame, if all of it is in sight."""
+        aside = face @ np.array([-math.sin(yaw), math.cos(yaw)])
+        # The edges lie, on average, half a beam outside the first and last point.
+        width = float(np.ptp(aside)) * len(face) / (len(face) - 1)
+        if abs(width - self.face_width) > self.config.width_tolerance:
+            return
+        ends = face[[int(np.argmin(aside)), int(np.argmax(aside))]]
+        x, y = T_expected_base.apply(ends).mean(axis=0).tolist()
+        if abs(y) <= self.config.tote_reach:
+            self._middles.append((x, y))
 
     def take_totes(self, totes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
         """Look for the tote among faces seen, in the base frame; return whether it is one of them."""
@@ -112,5 +134,5 @@ class DockEstimate:
         if not there:
             return False
         nearest = min(there, key=lambda tote: abs(tote.y))
-        self._totes.append((nearest.x, nearest.y))
+        self._middles.append((nearest.x, nearest.y))
         return True

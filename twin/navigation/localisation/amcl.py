@@ -16,6 +16,7 @@ from twin.navigation.localisation.confidence import Confidence
 from twin.navigation.localisation.hit_calibration import HitCalibration
 from twin.navigation.localisation.laser_models import is_converged, laser_model, without_strangers
 from twin.navigation.localisation.laser_scan import Beams, chosen_beams
+from twin.navigation.localisation.motion_models import sample_motion, sample_omni_motion
 from twin.navigation.localisation.particles import (
     bin_keys,
     clusters,
@@ -23,11 +24,10 @@ from twin.navigation.localisation.particles import (
     kld_sample_size,
     mean_and_covariance,
     regularised,
-    sample_motion,
-    sample_omni_motion,
     systematic_resample,
 )
 from twin.navigation.localisation.surface_distance import SurfaceDistance
+from twin.navigation.localisation.unmapped import explained_share
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 
 _FIT_SIGMA = 0.1
@@ -183,13 +183,18 @@ class Amcl:
 
     def _estimated(self, odom: Pose2, beams: Beams) -> Estimate:
         """Return the heaviest cluster's pose; learn from how the scan fits there."""
-        members = heaviest(clusters(self.particles), self.weights)
-        pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
+        cluster = clusters(self.particles)
+        if cluster.any():
+            members = heaviest(cluster, self.weights)
+            pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
+        else:
+            pose, covariance = mean_and_covariance(self.particles, self.weights)
         fit = math.nan
         if len(beams):
             distances = self._surfaces.at(pose.apply(beams.ends))
-            fit = float(np.mean(np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)))
-            self._confidence.update(fit)
+            shares = np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)
+            fit = float(np.mean(shares))
+            self._confidence.update(explained_share(shares, beams, pose, self._surfaces))
             self.hits.learn(distances)
         elif self.estimate is not None:
             # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.
@@ -207,12 +212,11 @@ class Amcl:
     def _resample(self, beams: Beams, lost: float) -> None:
         """Draw as many particles as the spread of the belief asks for (KLD sampling)."""
         config = self.config
-        offset, again = self._random.random(2)
-        drawn = systematic_resample(self.weights, config.max_particles, offset)
-        bins = len(np.unique(bin_keys(self.particles[drawn])))
+        likely = self.weights * config.max_particles > 0.5  # would be drawn into the largest sample
+        bins = len(np.unique(bin_keys(self.particles[likely])))
         wanted = kld_sample_size(bins, config.pf_err, config.pf_z)
         count = min(max(wanted, config.min_particles), config.max_particles)
-        kept = self.particles[systematic_resample(self.weights, count, again)]
+        kept = self.particles[systematic_resample(self.weights, count, float(self._random.random()))]
         noise = self._random.standard_normal((count, 3))
         self.particles = regularised(kept, clusters(kept), noise)
         self.weights = np.full(count, 1.0 / count)

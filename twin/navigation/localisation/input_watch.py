@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Pose2, wrap_angle
+from twin.navigation.scan_watch import RepeatedScan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,10 +31,8 @@ class InputWatch:
     """Compares each scan, and the odometry at its stamp, with those before."""
 
     def __init__(self, config: InputWatchConfig | None = None) -> None:
-        self._config = config or InputWatchConfig()
-        self._ranges: Array | None = None
-        self._repeats = 0
-        self._since: Pose2 | None = None
+        self._config = config = config or InputWatchConfig()
+        self._repeated = RepeatedScan(config.frozen_after, config.frozen_distance)
         self._odom: tuple[int, Pose2] | None = None
 
     def has_jumped(self, odom: Pose2, time_ns: int) -> bool:
@@ -54,15 +53,9 @@ class InputWatch:
             odom: Pose of the base in the odom frame when the scan was taken.
         """
         values = np.asarray(ranges, dtype=np.float64)
-        if self._ranges is not None and np.array_equal(values, self._ranges, equal_nan=True):
-            self._repeats += 1
-        else:
-            self._ranges, self._repeats, self._since = values, 0, odom
+        frozen = self._repeated.is_frozen(values, odom)
         if np.count_nonzero(np.isfinite(values)) < self._config.least_share * len(values):
             return "the scan is blind: hardly a reading hit anything"
-        assert self._since is not None
-        moved = self._since.distance(odom) >= self._config.frozen_distance
-        turned = abs(wrap_angle(self._since.yaw - odom.yaw)) >= self._config.frozen_distance
-        if self._repeats >= self._config.frozen_after and (moved or turned):
+        if frozen:
             return "the scan is frozen: it stays the same while the robot moves"
         return ""

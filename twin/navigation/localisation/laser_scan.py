@@ -52,13 +52,17 @@ def chosen_beams(
         max_range: [m]
     """
     r, a = np.asarray(ranges, dtype=np.float64), np.asarray(angles, dtype=np.float64)
-    picked = np.linspace(0, len(r) - 1, min(most, len(r))).round().astype(np.int64)
+    count = min(most, len(r))
+    picked = (np.arange(count) * (len(r) - 1) + (count - 1) // 2) // max(count - 1, 1)
     r, a = r[picked], a[picked]
     valid = r > max(min_range, 0.0)  # False for what is not a number
     hit, missed = valid & (r < max_range), valid & (r >= max_range)
-    points = np.column_stack([r[hit] * np.cos(a[hit]), r[hit] * np.sin(a[hit])])
+    yaw = a[hit] + T_base_lidar.yaw
+    ends = np.empty((len(yaw), 2))
+    ends[:, 0] = T_base_lidar.x + r[hit] * np.cos(yaw)
+    ends[:, 1] = T_base_lidar.y + r[hit] * np.sin(yaw)
     return Beams(
-        ends=T_base_lidar.apply(points),
+        ends=ends,
         origin=T_base_lidar,
         missed=a[missed] + T_base_lidar.yaw,
         max_range=max_range if math.isfinite(max_range) else 100.0,

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
-from twin.navigation._jit import jit
+from twin.navigation._jit import fast_jit
 from twin.navigation.localisation.laser_scan import Beams
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 
 TABLE_STEP = 0.002
 """Spacing of the tabulated log-likelihood over distance [m]; far below any sigma_hit."""
+_PER_METRE = 1.0 / TABLE_STEP
 _SIGMA, _SIGMA_STEP = 0.1, 0.05
 
 
@@ -72,7 +73,7 @@ class LikelihoodField:
         return table
 
 
-@jit
+@fast_jit
 def _sum_over_beams(
     particles: Array,
     beam_ends: Array,
@@ -87,7 +88,9 @@ def _sum_over_beams(
 ) -> Array:
     """Return sum over beams of table[interpolated distance at the beam's end], for every particle."""
     height, width = signed.shape
-    off_map = table[int(max_dist / TABLE_STEP)]
+    flat, stride = signed.ravel(), np.int32(width)
+    bx, by = beam_ends[:, 0].copy(), beam_ends[:, 1].copy()
+    off_map = table[int(max_dist * _PER_METRE)]
     oc, os = math.cos(origin_yaw), math.sin(origin_yaw)
     result = np.empty(particles.shape[0])
     for i in range(particles.shape[0]):
@@ -97,18 +100,19 @@ def _sum_over_beams(
         x = (oc * dx + os * dy) / resolution - 0.5  # in cells, 0 at the centre of the first one
         y = (oc * dy - os * dx) / resolution - 0.5
         total = 0.0
-        for k in range(beam_ends.shape[0]):
-            u = x + c * beam_ends[k, 0] - s * beam_ends[k, 1]
-            v = y + s * beam_ends[k, 0] + c * beam_ends[k, 1]
-            # Written so that what is not a number is off the map too.
-            if not (u >= 0.0 and v >= 0.0 and u < width - 1 and v < height - 1):
-                total += off_map
-                continue
-            iu, iv = int(u), int(v)
+        for k in range(bx.shape[0]):
+            u = x + c * bx[k] - s * by[k]
+            v = y + s * bx[k] + c * by[k]
+            # Without branches, and written so that what is not a number is off the map too.
+            on_map = (u >= 0.0) & (v >= 0.0) & (u < width - 1.0) & (v < height - 1.0)
+            u, v = (u if on_map else 0.0), (v if on_map else 0.0)
+            iu, iv = np.int32(u), np.int32(v)
             fu, fv = u - iu, v - iv
-            low = (1.0 - fu) * signed[iv, iu] + fu * signed[iv, iu + 1]
-            high = (1.0 - fu) * signed[iv + 1, iu] + fu * signed[iv + 1, iu + 1]
-            distance = abs((1.0 - fv) * low + fv * high + depth)
-            total += table[int(min(distance, max_dist) / TABLE_STEP)]
+            at = iv * stride + iu
+            low = flat[at] + fu * (flat[at + 1] - flat[at])
+            high = flat[at + stride] + fu * (flat[at + stride + 1] - flat[at + stride])
+            distance = abs(low + fv * (high - low) + depth)
+            fit = table[np.int32(min(distance, max_dist) * _PER_METRE)]
+            total += fit if on_map else off_map
         result[i] = total
     return result

@@ -1,4 +1,4 @@
-"""What particle filters need: motion noise, histograms, adaptive sample size, resampling, clusters."""
+"""What particle filters need: histograms, adaptive sample size, resampling, clusters."""
 
 from __future__ import annotations
 
@@ -9,80 +9,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Array, Pose2
+from twin.navigation._jit import jit
 
 BIN_XY = 0.5
 """Edge of a histogram bin [m] (nav2_amcl's pf_kdtree)."""
 YAW_BINS = 36
 """Bins of a full turn: 10 degrees (nav2_amcl's pf_kdtree)."""
 _ROW = 1 << 22
-
-
-def sample_motion(
-    particles: Array, before: Pose2, now: Pose2, alphas: tuple[float, float, float, float], noise: Array
-) -> Array:
-    """Return the particles, shape (n, 3), moved as odometry moved from `before` to `now`, with noise.
-
-    Source: Thrun et al., sample_motion_model_odometry, in nav2_amcl's differential form: turning noise is the
-    same forwards and backwards, and the first turn is 0 for steps below 1 cm.
-
-    Args:
-        particles: Shape (n, 3).
-        before: Odometry pose.
-        now: Odometry pose.
-        alphas: alpha1..alpha4.
-        noise: Standard normal, shape (3, n).
-    """
-    dx, dy = now.x - before.x, now.y - before.y
-    trans = math.hypot(dx, dy)
-    rot1 = wrap_angle(math.atan2(dy, dx) - before.yaw) if trans >= 0.01 else 0.0
-    rot2 = wrap_angle(now.yaw - before.yaw - rot1)
-    turn1 = min(abs(rot1), abs(wrap_angle(rot1 - math.pi)))
-    turn2 = min(abs(rot2), abs(wrap_angle(rot2 - math.pi)))
-    a1, a2, a3, a4 = alphas
-    sigma1 = math.sqrt(a1 * turn1**2 + a2 * trans**2)
-    sigma_trans = math.sqrt(a3 * trans**2 + a4 * (turn1**2 + turn2**2))
-    sigma2 = math.sqrt(a1 * turn2**2 + a2 * trans**2)
-    heading = particles[:, 2] + rot1 + sigma1 * noise[0]
-    step = trans + sigma_trans * noise[1]
-    moved = np.empty_like(particles)
-    moved[:, 0] = particles[:, 0] + step * np.cos(heading)
-    moved[:, 1] = particles[:, 1] + step * np.sin(heading)
-    moved[:, 2] = heading + rot2 + sigma2 * noise[2]
-    moved[:, 2] = _wrapped(moved[:, 2])
-    return moved
-
-
-def sample_omni_motion(
-    particles: Array,
-    before: Pose2,
-    now: Pose2,
-    alphas: tuple[float, float, float, float, float],
-    noise: Array,
-) -> Array:
-    """Return the particles, shape (n, 3), moved as `sample_motion`, by a drive that can go sideways.
-
-    Source: nav2_amcl's OmniMotionModel: noise along the motion, across it, and of the turn.
-
-    Args:
-        particles: Shape (n, 3).
-        before: Odometry pose.
-        now: Odometry pose.
-        alphas: alpha1..alpha5.
-        noise: Standard normal, shape (3, n).
-    """
-    step = before.inverse() @ now
-    trans, turn = math.hypot(step.x, step.y), wrap_angle(step.yaw)
-    a1, a2, a3, a4, a5 = alphas
-    along = trans + math.sqrt(a3 * trans**2 + a4 * turn**2) * noise[0]
-    across = math.sqrt(a4 * turn**2 + a5 * trans**2) * noise[1]
-    bearing = particles[:, 2] + math.atan2(step.y, step.x)
-    c, s = np.cos(bearing), np.sin(bearing)
-    moved = np.empty_like(particles)
-    moved[:, 0] = particles[:, 0] + along * c - across * s
-    moved[:, 1] = particles[:, 1] + along * s + across * c
-    moved[:, 2] = _wrapped(particles[:, 2] + turn + math.sqrt(a1 * turn**2 + a2 * trans**2) * noise[2])
-    return moved
 
 
 def bin_keys(particles: Array) -> NDArray[np.int64]:
@@ -117,9 +51,9 @@ def systematic_resample(weights: Array, count: int, offset: float) -> NDArray[np
 
 def clusters(particles: Array) -> NDArray[np.int64]:
     """Return the number, shape (n,), of each particle's cluster: those in bins that touch each other."""
-    keys, bin_of = np.unique(bin_keys(particles), return_inverse=True)
-    if len(keys) == 1:
+    if _fit_in_a_bin(particles):  # then they are in bins that all touch each other
         return np.zeros(len(particles), dtype=np.int64)
+    keys, bin_of = np.unique(bin_keys(particles), return_inverse=True)
     turn, cell = keys % YAW_BINS, keys // YAW_BINS
     links = []
     for step in (0, 1, _ROW - 1, _ROW, _ROW + 1):
@@ -133,6 +67,21 @@ def clusters(particles: Array) -> NDArray[np.int64]:
     graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(keys), len(keys)))
     _, cluster_of_bin = connected_components(graph, directed=False)
     return np.asarray(cluster_of_bin[bin_of], dtype=np.int64)
+
+
+@jit
+def _fit_in_a_bin(particles: Array) -> bool:
+    """Return whether particles, shape (n, 3), are as near to each other as those in one bin."""
+    x0 = x1 = particles[0, 0]
+    y0 = y1 = particles[0, 1]
+    yaw, low, high = particles[0, 2], 0.0, 0.0
+    for i in range(particles.shape[0]):
+        x0, x1 = min(x0, particles[i, 0]), max(x1, particles[i, 0])
+        y0, y1 = min(y0, particles[i, 1]), max(y1, particles[i, 1])
+        turn = particles[i, 2] - yaw
+        turn -= 2.0 * math.pi * round(turn / (2.0 * math.pi))
+        low, high = min(low, turn), max(high, turn)
+    return max(x1 - x0, y1 - y0) < BIN_XY and high - low < 2.0 * math.pi / YAW_BINS
 
 
 def heaviest(cluster: NDArray[np.int64], weights: Array) -> NDArray[np.bool_]:
@@ -153,36 +102,80 @@ def regularised(particles: Array, cluster: NDArray[np.int64], noise: Array) -> A
         cluster: The number of each one's cluster, shape (n,).
         noise: Standard normal, shape (n, 3).
     """
+    last = int(cluster.max())
+    if last == 0:
+        return _blurred(particles, noise)
     moved = particles.copy()
-    for number in range(int(cluster.max()) + 1):
+    for number in range(last + 1):
         members = np.flatnonzero(cluster == number)
-        count = len(members)
-        if count < 2:
-            continue
-        own = particles[members]
-        mean, covariance = mean_and_covariance(own, np.full(count, 1.0 / count))
-        width = min(0.5, (0.8 * count) ** (-1.0 / 7.0))
-        values, vectors = np.linalg.eigh(covariance)
-        blur = width * (noise[members] * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        offset = own - mean
-        offset[:, 2] = _wrapped(offset[:, 2])
-        moved[members] = mean + math.sqrt(1.0 - width**2) * offset + blur
-    moved[:, 2] = _wrapped(moved[:, 2])
+        moved[members] = _blurred(particles[members], noise[members])
     return moved
 
 
-def _wrapped(yaw: Array) -> Array:
-    return yaw - 2.0 * math.pi * np.round(yaw / (2.0 * math.pi))
+def _blurred(particles: Array, noise: Array) -> Array:
+    count = len(particles)
+    if count < 2:
+        return particles
+    mean, covariance = mean_and_covariance(particles, np.full(count, 1.0 / count))
+    return _shrunk_and_blurred(
+        particles, noise, np.array(mean), covariance, min(0.5, (0.8 * count) ** (-1.0 / 7.0))
+    )
+
+
+@jit
+def _shrunk_and_blurred(
+    particles: Array, noise: Array, mean: Array, covariance: Array, width: float
+) -> Array:
+    root = np.zeros((3, 3))  # Cholesky's; zero along what does not vary
+    for j in range(3):
+        for i in range(j, 3):
+            value = covariance[i, j]
+            for k in range(j):
+                value -= root[i, k] * root[j, k]
+            if i == j:
+                root[j, j] = math.sqrt(max(value, 0.0))
+            elif root[j, j] > 0.0:
+                root[i, j] = value / root[j, j]
+    left = math.sqrt(1.0 - width**2)
+    moved = np.empty_like(particles)
+    for n in range(particles.shape[0]):
+        for i in range(3):
+            offset = particles[n, i] - mean[i]
+            if i == 2:
+                offset -= 2.0 * math.pi * round(offset / (2.0 * math.pi))
+            value = mean[i] + left * offset
+            for k in range(i + 1):
+                value += width * root[i, k] * noise[n, k]
+            moved[n, i] = value
+        moved[n, 2] -= 2.0 * math.pi * round(moved[n, 2] / (2.0 * math.pi))
+    return moved
 
 
 def mean_and_covariance(particles: Array, weights: Array) -> tuple[Pose2, Array]:
     """Return the weighted mean pose and the covariance, shape (3, 3), of x, y, yaw."""
-    weights = weights / weights.sum()
-    x, y = (float(weights @ particles[:, i]) for i in (0, 1))
-    yaw = math.atan2(float(weights @ np.sin(particles[:, 2])), float(weights @ np.cos(particles[:, 2])))
-    error = particles - (x, y, yaw)
-    error[:, 2] = _wrapped(error[:, 2])
-    return Pose2(x, y, yaw), (error * weights[:, None]).T @ error
+    x, y, yaw, covariance = _moments(particles, weights)
+    return Pose2(x, y, yaw), covariance
+
+
+@jit
+def _moments(particles: Array, weights: Array) -> tuple[float, float, float, Array]:
+    total = x = y = s = c = 0.0
+    for i in range(particles.shape[0]):
+        total += weights[i]
+        x += weights[i] * particles[i, 0]
+        y += weights[i] * particles[i, 1]
+        s += weights[i] * math.sin(particles[i, 2])
+        c += weights[i] * math.cos(particles[i, 2])
+    x, y, yaw = x / total, y / total, math.atan2(s, c)
+    covariance, error = np.zeros((3, 3)), np.zeros(3)
+    for i in range(particles.shape[0]):
+        error[0], error[1] = particles[i, 0] - x, particles[i, 1] - y
+        turn = particles[i, 2] - yaw
+        error[2] = turn - 2.0 * math.pi * round(turn / (2.0 * math.pi))
+        for j in range(3):
+            for k in range(3):
+                covariance[j, k] += weights[i] / total * error[j] * error[k]
+    return x, y, yaw, covariance
 
 
 def tempered_weights(
@@ -200,21 +193,40 @@ def tempered_weights(
         least_effective: Effective sample size.
         most: Largest exponent.
     """
+    return _tempered_weights(log_prior, log_likelihood, least_effective, most)
 
-    def tempered(exponent: float) -> Array:
-        logs = log_prior + exponent * log_likelihood
-        weights = np.exp(logs - logs.max())
-        return np.asarray(weights / weights.sum())
 
-    weights = tempered(most)
-    if 1.0 / float(weights @ weights) >= least_effective:
-        return weights, most
-    low, high = 0.0, most
-    for _ in range(12):
-        middle = 0.5 * (low + high)
-        weights = tempered(middle)
-        if 1.0 / float(weights @ weights) >= least_effective:
-            low = middle
+@jit
+def _tempered_weights(
+    log_prior: Array, log_likelihood: Array, least_effective: float, most: float
+) -> tuple[Array, float]:
+    weights = np.empty(log_prior.shape[0])
+    low, high, exponent = 0.0, most, most
+    for _ in range(13):
+        if _temper(weights, log_prior, log_likelihood, exponent) >= least_effective:
+            low = exponent
+            if exponent == most:
+                break
         else:
-            high = middle
-    return tempered(low), low
+            high = exponent
+        exponent = 0.5 * (low + high)
+    if low != most:
+        _temper(weights, log_prior, log_likelihood, low)
+    return weights, low
+
+
+@jit
+def _temper(weights: Array, log_prior: Array, log_likelihood: Array, exponent: float) -> float:
+    """Write normalised weights; return their effective sample size."""
+    highest = -np.inf
+    for i in range(weights.shape[0]):
+        weights[i] = log_prior[i] + exponent * log_likelihood[i]
+        highest = max(highest, weights[i])
+    total = squares = 0.0
+    for i in range(weights.shape[0]):
+        weights[i] = math.exp(weights[i] - highest)
+        total += weights[i]
+    for i in range(weights.shape[0]):
+        weights[i] /= total
+        squares += weights[i] ** 2
+    return 1.0 / squares

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,7 +89,7 @@ class AmclNodeConfig:
     map_topic: str = "map"
     particles_period_ns: int = 1_000_000_000
     """Time between two particle clouds [ns]."""
-    particles_published: int = 150
+    particles_published: int = 100
     """At most so many particles are shown."""
     diagnostics_period_ns: int = 1_000_000_000
     """Time between two reports on `/diagnostics`; a scan must have come meanwhile [ns]."""
@@ -196,7 +197,7 @@ class AmclNode:
         T_base_lidar = self._robot_pose.relative(frames.base, message.header.frame_id, stamp_ns)
         if self._filter is None or odom is None or T_base_lidar is None:
             return
-        if not np.all(np.isfinite(odom)):
+        if not all(map(math.isfinite, odom)):
             self._report("odometry is not finite")
             return
         self._scanned_ns = self.node.now_ns
@@ -264,7 +265,7 @@ class AmclNode:
         if self._scanned_ns is not None and now - self._scanned_ns > self.config.diagnostics_period_ns:
             self._report("no scan came")
             odom = self._robot_pose.relative(frames.odom, frames.base)
-            if odom is not None and np.all(np.isfinite(odom)):
+            if odom is not None and all(map(math.isfinite, odom)):
                 self._localise(odom, np.zeros(0), np.zeros(0), Pose2(0.0, 0.0, 0.0), now)
         status = amcl_status(f"{self.node.fully_qualified_name}: localisation", self._filter, self._fault)
         self._diagnostics.publish(DiagnosticArray(header=header(now, ""), status=[status]))
@@ -287,6 +288,8 @@ class AmclNode:
 
     def _publish_particles(self, stamp_ns: int) -> None:
         assert self._filter is not None
+        if not (self.node.bus.taps or self._cloud_publisher.has_subscribers):
+            return
         particles = self._filter.particles
         step = -(-len(particles) // self.config.particles_published)
         poses: list[Pose] = [pose_from_pose2(Pose2(*particle)) for particle in particles[::step].tolist()]

@@ -21,7 +21,7 @@ Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.As
 
 _POSE_TIMEOUT_NS = 1_000_000_000
 """How long odometry is waited for."""
-_TF_ERROR, _INVALID_INPUT = "tf_error", "invalid_input"
+_TF_ERROR, _INVALID_INPUT, _UNKNOWN = "tf_error", "invalid_input", "unknown"
 
 
 class _Served(NamedTuple):
@@ -70,10 +70,10 @@ class BehaviorServerNode:
 
     def _behaviors(self) -> dict[str, _Served]:
         timeout, tf, collision = recovery.TIMEOUT, _TF_ERROR, recovery.COLLISION_AHEAD
-        spin = {timeout: 701, tf: 702, collision: 703}
-        backup = {timeout: 711, tf: 712, _INVALID_INPUT: 713, collision: 714}
-        drive = {timeout: 721, tf: 722, collision: 723, _INVALID_INPUT: 724}
-        teleop, wait = {timeout: 731, tf: 732}, {timeout: 741, tf: 740}
+        spin = {_UNKNOWN: 700, timeout: 701, tf: 702, collision: 703}
+        backup = {_UNKNOWN: 710, timeout: 711, tf: 712, _INVALID_INPUT: 713, collision: 714}
+        drive = {_UNKNOWN: 720, timeout: 721, tf: 722, collision: 723, _INVALID_INPUT: 724}
+        teleop, wait = {_UNKNOWN: 730, timeout: 731, tf: 732}, {timeout: 741, tf: 740}
         distance, turned = "distance_traveled", "angular_distance_traveled"
         return {
             "spin": _Served(Spin, self._spin, spin, turned),
@@ -132,9 +132,9 @@ class BehaviorServerNode:
             self._teleop.is_over = True
 
     def _execution(self, name: str, served: _Served) -> Callable[[GoalHandle], Generator[None, None, Any]]:
-        def failed(handle: GoalHandle, reason: str) -> Any:
+        def failed(handle: GoalHandle, reason: str, detail: str = "") -> Any:
             handle.abort()
-            text = f"{name}: {reason.replace('_', ' ')}"
+            text = f"{name}: {detail or reason.replace('_', ' ')}"
             return new(served.action.Result, error_code=served.codes[reason], error_msg=text)
 
         def execute(handle: GoalHandle) -> Generator[None, None, Any]:
@@ -157,6 +157,9 @@ class BehaviorServerNode:
                         yield
                         continue
                     due = max(due, self.node.now_ns - self._period_ns) + self._period_ns
+                    if self._costmap and self._costmap.fault and served.action is not Wait:
+                        text = f"the local costmap is not current: {self._costmap.fault}"
+                        return failed(handle, _UNKNOWN, text)
                     costmap = self._costmap.costmap if self._costmap else None
                     step = behavior.update(pose, self._period_ns * 1e-9, costmap)
                     if step.done:

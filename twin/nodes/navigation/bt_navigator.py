@@ -12,7 +12,7 @@ from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import PoseStamped, new
-from twin.nodes.navigation.behavior_trees.context import NavigatorContext, Odometer
+from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 from twin.nodes.navigation.behavior_trees.log import TreeLog
 from twin.nodes.navigation.behavior_trees.navigator import Navigator, NavigatorSetup
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -64,7 +64,8 @@ class BtNavigatorNode:
         self._context = context = NavigatorContext(
             node,
             robot_pose,
-            Odometer(node, config.odom_topic, round(config.filter_duration * 1e9)),
+            odom_topic=config.odom_topic,
+            filter_duration_ns=round(config.filter_duration * 1e9),
             server_timeout_ns=config.default_server_timeout * _MS,
             goal_reached_tol=config.goal_reached_tol,
         )

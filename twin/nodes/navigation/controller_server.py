@@ -12,7 +12,7 @@ from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
+from twin.bridge.msgs import MarkerArray, Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker, GoalCheckerConfig, PositionGoalCheckerConfig
@@ -29,12 +29,13 @@ from twin.navigation.failures import ControlFailure, NoValidControl
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.trajectory_markers import trajectory_markers
 from twin.nodes.node_parameters import declare_config
 
 P = TypeVar("P")
 
 _INVALID_CONTROLLER, _TF_ERROR, _INVALID_PATH = 101, 102, 103
-_PATIENCE_EXCEEDED, _FAILED_TO_MAKE_PROGRESS = 104, 105
+_PATIENCE_EXCEEDED, _FAILED_TO_MAKE_PROGRESS, _CONTROLLER_TIMED_OUT = 104, 105, 107
 
 _PARAMETER_NAMES = {
     "controllers": "",
@@ -60,6 +61,8 @@ class ControllerServerConfig:
     controller_period_ns: int = 60_000_000
     failure_tolerance_ns: int = 300_000_000
     """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
+    costmap_update_timeout_ns: int = 5_000_000_000
+    """How long the robot stands and waits for a local costmap that is not current; Nav2: 0.3 s [ns]."""
     min_x_velocity_threshold: float = 0.0001
     """Measured speeds below this count as none [m/s]."""
     min_theta_velocity_threshold: float = 0.0001
@@ -78,6 +81,10 @@ class _Task:
     progress_checker: ProgressChecker
     handler: PathHandler
     last_valid_ns: int
+    current_ns: int
+    """When the costmap was current last."""
+    waiting: bool = False
+    """Whether the robot stands because it is not."""
 
 
 class _Abort(Exception):
@@ -114,11 +121,12 @@ class ControllerServerNode:
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
         self._preempted: _Task | None = None
-        """What the next goal goes on from, if it comes before this one is over."""
+        """What was followed until another path came, which is no new chance: its patience is used up, too."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
         self._optimal = node.create_publisher(Path, "optimal_path", 1)
+        self._trajectories = node.create_publisher(MarkerArray, "trajectories", 1)
         node.create_subscription(Odometry, "odom", self._on_odom, 1)
         node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
         ActionServer(node, FollowPath, "follow_path", self._execute)
@@ -153,12 +161,6 @@ class ControllerServerNode:
         finished = stop = False
         try:
             task = self._task(handle.request)
-            if self._preempted is not None:
-                # A path that is planned anew all the time is no news about progress, nor about valid control.
-                task.last_valid_ns = self._preempted.last_valid_ns
-                if task.progress_checker == self._preempted.progress_checker:  # of the same parameters
-                    task.progress_checker = self._preempted.progress_checker
-            self._preempted = task
             due = self.node.now_ns
             while True:
                 if handle.is_cancel_requested and task.controller.cancel():
@@ -194,14 +196,17 @@ class ControllerServerNode:
         handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
         handler.accept(path)
         controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
-        return _Task(
+        before = self._preempted
+        self._preempted = task = _Task(
             path=path,
             controller=controller,
             goal_checker=create_goal_checker(goal_checker),
-            progress_checker=create_progress_checker(progress),
+            progress_checker=before.progress_checker if before else create_progress_checker(progress),
             handler=handler,
-            last_valid_ns=self.node.now_ns,
+            last_valid_ns=before.last_valid_ns if before else self.node.now_ns,
+            current_ns=self.node.now_ns,
         )
+        return task
 
     def _control(self, task: _Task, handle: GoalHandle) -> bool:
         """Command the base once; return whether the goal is reached."""
@@ -212,6 +217,9 @@ class ControllerServerNode:
         goal = Pose2(*task.path[-1].tolist())
         if task.goal_checker.is_goal_reached(in_map, goal, self._velocity, task.handler.remaining):
             return True
+        if not self._is_costmap_current(task):
+            self._publisher.publish(twist_from_planar(0.0, 0.0))
+            return False
         if not task.progress_checker.check(in_map, self.node.now_ns):
             raise _Abort(_FAILED_TO_MAKE_PROGRESS, "failed to make progress")
         dt = self.config.controller_period_ns * 1e-9
@@ -232,6 +240,18 @@ class ControllerServerNode:
         )
         return False
 
+    def _is_costmap_current(self, task: _Task) -> bool:
+        """Return whether to drive on by the costmap; raises _Abort if it has been out of date for long."""
+        now, fault = self.node.now_ns, self._costmap.fault
+        if not fault:
+            task.current_ns, task.waiting = now, False
+        elif now - task.current_ns > self.config.costmap_update_timeout_ns:
+            raise _Abort(_CONTROLLER_TIMED_OUT, f"the local costmap is not current: {fault}")
+        elif not task.waiting:
+            task.waiting = True
+            self.node.get_logger().warn(f"waiting: the local costmap is not current: {fault}")
+        return not fault
+
     def _be_patient(self, task: _Task, failure: NoValidControl) -> None:
         """Wait for a valid control for as long as the tolerance says; raises _Abort."""
         tolerance = self.config.failure_tolerance_ns
@@ -248,8 +268,10 @@ class ControllerServerNode:
             self._lookahead.publish(PointStamped(header=header(now, frame), point=Point(x=x, y=y, z=0.0)))
         if self._plan.has_subscribers:
             self._plan.publish(path_msg(ahead, frame, now))
-        if controller.trajectory is not None and self._optimal.has_subscribers:
-            self._optimal.publish(path_msg(controller.trajectory, frame, now))
+        if self._optimal.has_subscribers and (trajectory := controller.trajectory) is not None:
+            self._optimal.publish(path_msg(trajectory, frame, now))
+        if self._trajectories.has_subscribers and (candidates := controller.candidates) is not None:
+            self._trajectories.publish(trajectory_markers(candidates, controller.trajectory, frame, now))
 
 
 def _chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:

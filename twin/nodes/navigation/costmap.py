@@ -20,6 +20,7 @@ from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, 
 from twin.nodes.navigation.costmap_services import CostmapServices
 from twin.nodes.navigation.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.scan_input import ScanInput
 
 
 def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
@@ -72,6 +73,7 @@ class CostmapNode:
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scan: LaserScan | None = None
+        self._input = ScanInput(robot_pose, node.now_ns)
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
         own = f"{namespace}/{config.name}"
@@ -102,6 +104,12 @@ class CostmapNode:
         """The master grid; None until the map is there."""
         return self._layers.costmap if self._layers else None
 
+    @property
+    def fault(self) -> str:
+        """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
+        tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
+        return self._input.fault(self.node.now_ns, tolerance_ns) if tolerance_ns else ""
+
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
             self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
@@ -109,7 +117,8 @@ class CostmapNode:
             self.node.get_logger().error(f"map refused: {error}")
 
     def _on_scan(self, message: LaserScan) -> None:
-        self._scan = message
+        if self._input.accept(message, self.node.now_ns):
+            self._scan = message
 
     def _update(self) -> None:
         layers = self._layers

@@ -1,44 +1,54 @@
 """`/docking_server`: the actions `dock_robot` and `undock_robot`, as in Nav2's opennav_docking.
 
-A dock is a vertical face: its pose in `map` lies on the face, x into it, as a docked robot looks. The map
-tells where to expect it; scans tell where it is: distance and heading from a line fitted to the face, and for
-docks of type `tote` the lateral position from the tote that is to be grasped.
+The map tells where to expect a dock; scans, totes or a detector tell where it is. What lies behind a dock's
+face is its own business: a charger, a shelf, a table.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from twin.bridge.action_types import DockRobot, UndockRobot
-from twin.bridge.actions import ActionServer, GoalHandle
+from twin.bridge.action_types import DockRobot, NavigateToPose, UndockRobot
+from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import pose2_from_pose, twist_from_planar
-from twin.bridge.msgs import LaserScan, PoseArray, Twist, new
-from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.msgs import BatteryState, Twist, duration, new
 from twin.geometry import Pose2
-from twin.navigation.docking.dock_estimate import DockEstimate, DockEstimateConfig
+from twin.navigation.docking.dock_estimate import DockEstimateConfig
+from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
 from twin.navigation.docking.line_approach import LineApproach, LineApproachConfig
-from twin.nodes.navigation.costmap import scan_points
+from twin.nodes.messages import pose_stamped
+from twin.nodes.navigation.dock_detection import DockDetection
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.node_parameters import declare_config
 
-_FAILED_TO_DETECT_DOCK, _FAILED_TO_CONTROL = 904, 905
+Work = Generator[None, None, Any]
+
+_FAILED_TO_STAGE, _FAILED_TO_DETECT_DOCK, _FAILED_TO_CONTROL, _FAILED_TO_CHARGE = 903, 904, 905, 906
+_STAGING, _PERCEPTION, _CONTROLLING, _WAITING, _RETRY = 1, 2, 3, 4, 5
+"""States in the feedback."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class DockingConfig:
-    """Distances, and how scans are used."""
+class DockingServerConfig:
+    """Parameters; names are those of opennav_docking, defaults too unless said otherwise."""
 
-    docked_distance: float = 0.55
-    """From the base's origin to the face when docked [m]."""
-    staging_distance: float = 1.3
-    """From the face to the base's origin before docking, and after undocking [m]."""
-    detection_timeout_ns: int = 5_000_000_000
+    controller_period_ns: int = 60_000_000
+    """Nav2: 50 Hz."""
+    initial_perception_timeout_ns: int = 5_000_000_000
     """For the first sight of the dock [ns]."""
+    wait_charge_timeout_ns: int = 5_000_000_000
+    """For charging to begin [ns]."""
+    dock_approach_timeout: float = 30.0
+    """For one approach [s]."""
     max_retries: int = 3
     """Approaches after the first one."""
+    dock_prestaging_tolerance: float = 0.15
+    """A robot so near to the staging pose is not driven there first [m]; Nav2: 0.5."""
+    database: DockDatabase = field(default_factory=DockDatabase)
     estimate: DockEstimateConfig = field(default_factory=DockEstimateConfig)
     dock: LineApproachConfig = field(default_factory=LineApproachConfig)
     undock: LineApproachConfig = field(
@@ -46,143 +56,261 @@ class DockingConfig:
             lateral_tolerance=0.2, yaw_tolerance=0.3, turn_first_above=0.3
         )
     )
-    period_ns: int = 60_000_000
+
+
+NAMES = {"database": "", "types": "", "docks": ""}
+"""Levels of the config that are none of the parameters' names."""
+
+
+class _Cancelled(Exception):
+    """A client wants the goal to end."""
 
 
 class DockingServerNode:
-    """Takes `scan` and `tote_poses`; publishes `cmd_vel_docking`."""
+    """Takes what `DockDetection` does, and `battery_state`; publishes `cmd_vel_docking`."""
 
     def __init__(
         self,
         bus: Bus,
         robot_pose: RobotPose,
-        config: DockingConfig | None = None,
+        config: DockingServerConfig | None = None,
         *,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("docking_server", namespace)
-        self.config = config or DockingConfig()
+        self.config = config or DockingServerConfig()
+        declare_config(self.node, self.config, names=NAMES)
         self._robot_pose = robot_pose
-        self._estimate: DockEstimate | None = None
-        """Of the dock that the robot is driving to."""
+        self._detection = DockDetection(self.node, robot_pose, self.config.estimate)
+        self._current = 0.0
+        """Into the battery [A]."""
         self._left_for: Pose2 | None = None
-        """Face of the dock last driven to, in `odom`: where to undock from; None after undocking."""
+        """Docked pose of the dock last driven to, in `odom`: where to undock from; None after undocking."""
+        self._docked_type = ""
+        """Of the dock at which the robot stands; '' if it does not."""
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_docking", 1)
-        self.node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA)
-        self.node.create_subscription(PoseArray, "tote_poses", self._on_tote_poses, 10)
+        self._navigator = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
+        self.node.create_subscription(BatteryState, "battery_state", self._on_battery_state, 1)
         ActionServer(self.node, DockRobot, "dock_robot", self._dock_robot)
         ActionServer(self.node, UndockRobot, "undock_robot", self._undock_robot)
 
-    # What the sensors say of the dock
+    def _on_battery_state(self, message: BatteryState) -> None:
+        self._current = message.current
 
-    def _on_scan(self, message: LaserScan) -> None:
-        if self._estimate is None:
-            return
-        frames = self._robot_pose.frames
-        T_base_lidar = self._robot_pose.at_stamp(frames.base, message.header)
-        T_odom_lidar = self._robot_pose.at_stamp(frames.odom, message.header)
-        if T_base_lidar is None or T_odom_lidar is None:
-            return
-        points = T_base_lidar.apply(scan_points(message, math.nan))
-        self._estimate.take_scan(points, T_odom_lidar @ T_base_lidar.inverse())
+    # Docking
 
-    def _on_tote_poses(self, message: PoseArray) -> None:
-        if self._estimate is None:
-            return
-        T_odom_base = self._robot_pose.at_stamp(self._robot_pose.frames.odom, message.header)
-        if T_odom_base is not None:
-            self._estimate.take_totes([pose2_from_pose(pose) for pose in message.poses], T_odom_base)
-
-    # The actions
-
-    def _dock_robot(self, handle: GoalHandle) -> Generator[None, None, Any]:
-        in_map, in_odom = self._robot_pose.in_map(), self._robot_pose.in_odom()
-        if in_map is None or in_odom is None:
-            handle.abort()
-            return self._failed(_FAILED_TO_DETECT_DOCK, "the robot is not localised", 0)
-        face = in_odom @ in_map.inverse() @ pose2_from_pose(handle.request.dock_pose.pose)
-        wants_tote = handle.request.dock_type == "tote"
-        self._estimate = estimate = DockEstimate(face, self.config.estimate, wants_tote=wants_tote)
+    def _dock_robot(self, handle: GoalHandle) -> Work:
+        attempt = _Attempt(handle, self.node.now_ns)
         try:
-            deadline = self.node.now_ns + self.config.detection_timeout_ns
-            while not estimate.seen:
-                if self.node.now_ns > deadline:
-                    handle.abort()
-                    what = "tote" if estimate.seen_face else "face of the dock"
-                    return self._failed(_FAILED_TO_DETECT_DOCK, f"no {what} in sight", 0)
-                yield
-            return (yield from self._dock_at(handle, estimate))
+            dock = self._requested(handle.request)
+            type_ = self.config.database.type_of(dock.type)
+            yield from self._stage(attempt, dock, type_)
+            yield from self._dock_at(attempt, self._in_odom(dock), type_)
+            self._docked_type = dock.type
+            return new(DockRobot.Result, success=True, num_retries=attempt.retries)
+        except _Cancelled:
+            handle.canceled()
+            return attempt.failed(_FAILED_TO_CONTROL, "canceled")
+        except DockError as error:
+            handle.abort()
+            return attempt.failed(error.code, str(error))
         finally:
-            self._left_for, self._estimate = estimate.face, None
-            self._publisher.publish(twist_from_planar(0.0, 0.0))
+            self._stop()
 
-    def _dock_at(self, handle: GoalHandle, estimate: DockEstimate) -> Generator[None, None, Any]:
-        """Approach the dock; after a miss drive back to the staging distance and approach again."""
-        config = self.config
+    def _requested(self, goal: Any) -> Dock:
+        if goal.use_dock_id:
+            return self.config.database.find(goal.dock_id)
+        pose = goal.dock_pose
+        frame = pose.header.frame_id or self._robot_pose.frames.map
+        return Dock(type=goal.dock_type, frame=frame, pose=pose2_from_pose(pose.pose))
 
-        def before(distance: float) -> Callable[[], Pose2]:
-            return lambda: estimate.face @ Pose2(-distance, 0.0, 0.0)
+    def _in_odom(self, dock: Dock) -> Pose2:
+        """Return the docked pose in the odom frame, as the map has it."""
+        frame = self._robot_pose.relative(self._robot_pose.frames.odom, dock.frame)
+        if frame is None or self._robot_pose.in_odom() is None:
+            raise DockError(_FAILED_TO_DETECT_DOCK, "the robot is not localised")
+        return frame @ dock.pose
 
-        for attempt in range(1 + config.max_retries):
-            reason = yield from self._drive(handle, before(config.docked_distance), config.dock)
-            if reason is None:
-                return new(DockRobot.Result, success=True, num_retries=attempt)
-            if handle.is_cancel_requested:
-                handle.canceled()
-                return self._failed(_FAILED_TO_CONTROL, "canceled", attempt)
-            self.node.get_logger().warn(f"docking attempt {attempt + 1}: {reason}; trying again")
-            yield from self._drive(handle, before(config.staging_distance), config.undock, backward=True)
-        handle.abort()
-        return self._failed(_FAILED_TO_CONTROL, f"docking failed: {reason}", config.max_retries)
+    def _stage(self, attempt: _Attempt, dock: Dock, type_: DockType) -> Work:
+        """Navigate to the staging pose, if that is wanted and the robot is not there."""
+        goal, staging = attempt.handle.request, type_.staging_pose(dock.pose)
+        pose = self._robot_pose.relative(dock.frame, self._robot_pose.frames.base)
+        near = pose is not None and pose.distance(staging) < self.config.dock_prestaging_tolerance
+        if near or not goal.navigate_to_staging_pose:
+            return
+        deadline = self.node.now_ns + round(goal.max_staging_time * 1e9)
+        target = pose_stamped(staging, dock.frame, self.node.now_ns)
+        sent = self._navigator.send_goal(new(NavigateToPose.Goal, pose=target))
+        try:
+            while not sent.done:
+                attempt.tell(_STAGING, self.node.now_ns)
+                if self.node.now_ns > deadline:
+                    raise DockError(
+                        _FAILED_TO_STAGE, f"not at the staging pose after {goal.max_staging_time:g} s"
+                    )
+                yield
+        finally:
+            if not sent.done:
+                sent.cancel()
+        if not sent.succeeded:
+            reason = sent.error or getattr(sent.result, "error_msg", "")
+            raise DockError(_FAILED_TO_STAGE, f"cannot drive to the staging pose: {reason}")
 
-    def _undock_robot(self, handle: GoalHandle) -> Generator[None, None, Any]:
-        pose = self._robot_pose.in_odom()
-        if pose is None:
+    def _dock_at(self, attempt: _Attempt, expected: Pose2, type_: DockType) -> Work:
+        """See the dock and approach it; after a miss drive back to the staging distance and try again."""
+        detection, docked = self._detection, expected
+        detection.begin(expected, type_)
+
+        def goal() -> Pose2:
+            nonlocal docked
+            seen = detection.docked()
+            if seen is None:
+                raise DockError(_FAILED_TO_DETECT_DOCK, f"lost sight of {detection.lacks}")
+            docked = seen
+            return docked
+
+        def staging() -> Pose2:
+            return docked @ Pose2(type_.staging_x_offset, 0.0, 0.0)
+
+        approach = replace(self.config.dock, time_allowance=self.config.dock_approach_timeout)
+        try:
+            yield from self._see(attempt)
+            while True:
+                try:
+                    yield from self._drive(attempt, goal, approach)
+                    return (yield from self._wait_for_charge(attempt, type_))
+                except DockError as error:
+                    self._count_retry(attempt, error)
+                yield from self._back_off(attempt, staging)
+        finally:
+            detection.end()
+            self._left_for = docked
+
+    def _count_retry(self, attempt: _Attempt, error: DockError) -> None:
+        if attempt.retries >= self.config.max_retries:
+            raise DockError(error.code, f"docking failed: {error}") from error
+        attempt.retries += 1
+        self.node.get_logger().warn(f"docking attempt {attempt.retries}: {error}; trying again")
+
+    def _see(self, attempt: _Attempt) -> Work:
+        deadline = self.node.now_ns + self.config.initial_perception_timeout_ns
+        while self._detection.docked() is None:
+            attempt.tell(_PERCEPTION, self.node.now_ns)
+            if self.node.now_ns > deadline:
+                raise DockError(_FAILED_TO_DETECT_DOCK, f"no {self._detection.lacks} in sight")
+            yield
+
+    def _back_off(self, attempt: _Attempt, goal: Callable[[], Pose2]) -> Work:
+        attempt.tell(_RETRY, self.node.now_ns)
+        try:
+            yield from self._drive(attempt, goal, self.config.undock, state=_RETRY, backward=True)
+        except DockError as error:
+            self.node.get_logger().warn(f"backing off: {error}")
+
+    def _wait_for_charge(self, attempt: _Attempt, type_: DockType) -> Work:
+        deadline = self.node.now_ns + self.config.wait_charge_timeout_ns
+        while type_.is_charger and not self._is_charging(type_):
+            self._stop()
+            attempt.tell(_WAITING, self.node.now_ns)
+            if self.node.now_ns > deadline:
+                raise DockError(_FAILED_TO_CHARGE, "docked, but the battery is not charged")
+            yield
+
+    def _is_charging(self, type_: DockType) -> bool:
+        if type_.use_battery_status:
+            return bool(self._current > type_.charging_threshold)
+        docked, pose = self._detection.docked(), self._robot_pose.in_odom()
+        return docked is not None and pose is not None and pose.distance(docked) < type_.docking_threshold
+
+    # Undocking
+
+    def _undock_robot(self, handle: GoalHandle) -> Work:
+        goal = handle.request
+        attempt = _Attempt(handle, self.node.now_ns)
+        try:
+            type_ = self.config.database.type_of(goal.dock_type or self._docked_type)
+            pose = self._robot_pose.in_odom()
+            if pose is None:
+                raise DockError(_FAILED_TO_CONTROL, "no odometry")
+            target = pose @ Pose2(-self._way_to_staging(pose, type_), 0.0, 0.0)
+            config = replace(self.config.undock, time_allowance=goal.max_undocking_time)
+            yield from self._drive(attempt, lambda: target, config, backward=True)
+        except _Cancelled:
+            handle.canceled()
+            return new(UndockRobot.Result, success=False, error_code=_FAILED_TO_CONTROL, error_msg="canceled")
+        except DockError as error:
             handle.abort()
-            return new(UndockRobot.Result, success=False, error_msg="no odometry")
-        goal = pose @ Pose2(-self._way_to_staging(pose), 0.0, 0.0)
-        reason = yield from self._drive(handle, lambda: goal, self.config.undock, backward=True)
-        self._publisher.publish(twist_from_planar(0.0, 0.0))
-        if reason is not None:
-            handle.abort()
-            return new(UndockRobot.Result, success=False, error_code=905, error_msg=reason)
-        self._left_for = None
+            return new(UndockRobot.Result, success=False, error_code=error.code, error_msg=str(error))
+        finally:
+            self._stop()
+        self._left_for, self._docked_type = None, ""
         return new(UndockRobot.Result, success=True)
 
-    def _way_to_staging(self, pose: Pose2) -> float:
+    def _way_to_staging(self, pose: Pose2, type_: DockType) -> float:
         """Return how far to back off [m]: none if the robot never left the staging pose for the dock."""
-        away = self.config.staging_distance - self.config.docked_distance
+        away = -type_.staging_x_offset
         if self._left_for is None:
             return away
-        distance = -(self._left_for.inverse() @ pose).x
-        return min(max(self.config.staging_distance - distance, 0.0), away)
+        return min(max(away + (self._left_for.inverse() @ pose).x, 0.0), away)
 
-    def _failed(self, code: int, reason: str, retries: int) -> Any:
-        return new(DockRobot.Result, success=False, error_code=code, num_retries=retries, error_msg=reason)
+    # Driving
+
+    def _stop(self) -> None:
+        self._publisher.publish(twist_from_planar(0.0, 0.0))
 
     def _drive(
         self,
-        handle: GoalHandle,
+        attempt: _Attempt,
         goal: Callable[[], Pose2],
         config: LineApproachConfig,
         *,
+        state: int = _CONTROLLING,
         backward: bool = False,
-    ) -> Generator[None, None, str | None]:
-        """Drive to `goal()`, which may move on the way; return why that failed, or None."""
+    ) -> Work:
+        """Drive to `goal()`, which may move on the way."""
         control = LineApproach(config, goal(), backward=backward)
         due = self.node.now_ns
         while True:
-            if handle.is_cancel_requested:
-                return "canceled"
+            attempt.check()
             pose = self._robot_pose.in_odom()
             if self.node.now_ns >= due and pose is not None:
-                due += self.config.period_ns
+                due += self.config.controller_period_ns
+                attempt.tell(state, self.node.now_ns)
                 control.retarget(goal())
-                step = control.update(pose, self.config.period_ns * 1e-9)
+                step = control.update(pose, self.config.controller_period_ns * 1e-9)
                 self._publisher.publish(twist_from_planar(step.v, step.w))
                 if step.done:
-                    return None
+                    return
                 if step.failed_reason is not None:
                     _, lateral, yaw = control.errors(pose)
-                    return f"{step.failed_reason}: {lateral:+.3f} m aside, {math.degrees(yaw):+.1f}° off"
+                    where = f"{lateral:+.3f} m aside, {math.degrees(yaw):+.1f}° off"
+                    raise DockError(_FAILED_TO_CONTROL, f"{step.failed_reason}: {where}")
             yield
+
+
+class _Attempt:
+    """One goal of either action, and how it is doing."""
+
+    def __init__(self, handle: GoalHandle, began_ns: int) -> None:
+        self.handle, self._began_ns = handle, began_ns
+        self.retries = 0
+
+    def check(self) -> None:
+        """Raise `_Cancelled` if a client wants the end."""
+        if self.handle.is_cancel_requested:
+            raise _Cancelled
+
+    def tell(self, state: int, now_ns: int) -> None:
+        """Publish feedback; undocking has none that says anything."""
+        self.check()
+        if isinstance(self.handle.request, DockRobot.Goal):
+            time = duration(now_ns - self._began_ns)
+            self.handle.publish_feedback(
+                new(DockRobot.Feedback, state=state, docking_time=time, num_retries=self.retries)
+            )
+
+    def failed(self, code: int, reason: str) -> Any:
+        """Return the result of a docking that failed."""
+        return new(
+            DockRobot.Result, success=False, error_code=code, num_retries=self.retries, error_msg=reason
+        )

@@ -39,6 +39,8 @@ class PlannerServerConfig:
     compute_alternatives: int = 0
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
+    path_distance: float = 1.0
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
     same_place: float = 0.5
     """How far the robot may have moved meanwhile [m]."""
 
@@ -214,7 +216,10 @@ class PlannerServerNode:
         path, costmap, robot = path_array(request.path), self._costmap.costmap, self._robot_pose.in_map()
         if not len(path) or costmap is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
-        nearest = int(np.argmin(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)))
+        away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
+        nearest = int(np.argmin(away))
+        if away[nearest] > self._server.path_distance:
+            return new(IsPathValid.Response, is_valid=False)
         columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
         height, width = costmap.costs.shape
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)

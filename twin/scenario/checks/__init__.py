@@ -8,7 +8,7 @@ from twin.scenario.checks.check import CheckResult as CheckResult
 from twin.scenario.checks.delivered import DeliveredConfig
 from twin.scenario.checks.localisation import LocalisationErrorConfig, OdometryDriftConfig
 from twin.scenario.checks.map_quality import MapAccuracyConfig, MapCoverageConfig
-from twin.scenario.checks.mission import MissionSucceededConfig, TimeLimitConfig
+from twin.scenario.checks.mission import MissionFailedConfig, MissionSucceededConfig, TimeLimitConfig
 from twin.scenario.checks.no_collision import NoCollisionConfig
 from twin.scenario.checks.path import ClosedLoopConfig, FinalPoseConfig, PathOnCircleConfig
 from twin.scenario.checks.recoveries import RecoveriesConfig
@@ -23,6 +23,8 @@ class CheckEntry(OneOf):
 
     mission_succeeded: MissionSucceededConfig | None = None
     """The mission ends and succeeded."""
+    mission_failed: MissionFailedConfig | None = None
+    """The mission gives up, and says why: for scenarios in which it must."""
     delivered: DeliveredConfig | None = None
     """A tote stands in a zone, upright, released and at rest."""
     time_limit: TimeLimitConfig | None = None

@@ -1,7 +1,8 @@
-"""Checks on the mission: it succeeded, and in time."""
+"""Checks on the mission: it succeeded, or failed as it should, and in time."""
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
 from typing import Annotated
 
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
@@ -44,6 +45,48 @@ class MissionSucceeded(Check):
         at_s = None if last is None else last.time_s
         return CheckResult(
             name=self.name, passed=passed, value=passed, limit=True, unit="", at_s=at_s, reason=reason
+        )
+
+
+class MissionFailedConfig(CheckConfig):
+    """The mission ends, and says that it failed, and why."""
+
+    reason: str = "*"
+    """What its reason must look like; `*` stands for any text."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return MissionFailed(kind, self)
+
+
+class MissionFailed(Check):
+    """Keeps the first tick at which the mission is done."""
+
+    def __init__(self, name: str, config: MissionFailedConfig) -> None:
+        super().__init__(name)
+        self._pattern = config.reason
+        self._last: Observation | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one observation."""
+        if self._last is None or not self._last.mission_done:
+            self._last = observation
+
+    def result(self) -> CheckResult:
+        """Return the outcome so far."""
+        last = self._last
+        reason = ""
+        if last is None:
+            reason = "the run made no step"
+        elif not last.mission_done:
+            reason = f"the mission was not done when the run ended, in state '{last.mission_state}'"
+        elif last.mission_succeeded:
+            reason = "the mission succeeded"
+        elif not fnmatchcase(last.mission_reason, self._pattern):
+            reason = f"the mission failed, but not for '{self._pattern}': {last.mission_reason}"
+        at_s = None if last is None else last.time_s
+        return CheckResult(
+            name=self.name, passed=not reason, value=not reason, limit=True, unit="", at_s=at_s, reason=reason
         )
 
 

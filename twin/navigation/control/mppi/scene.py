@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.geometry import Array
+from twin.geometry import Pose2
 from twin.navigation.control.footprint_cover import FootprintCover
+from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.path_handler import LocalPath
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import Costmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,13 +28,31 @@ class Scene:
     """Which of its poses are free, shape (n)."""
     local: LocalPath
     costmap: Costmap
+    limits: F32
+    """vx_max, vx_min, wz_max, ax_max, ax_min, az_max, least turning radius."""
+    tables: F32
+    """Of the costs; see `scoring.cost_tables`."""
+    to_grid: Pose2
+    """From the path's frame to the costmap's corner."""
     cover: FootprintCover
 
 
-def free_points(costmap: Costmap, points: Array) -> np.ndarray:
-    """Return which points, shape (n, 2) from the corner [m], are neither inscribed nor lethal."""
-    height, width = costmap.costs.shape
-    cells = np.floor(points / costmap.resolution).astype(np.int64)
-    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-    costs = costmap.costs[np.where(inside, cells[:, 1], 0), np.where(inside, cells[:, 0], 0)]
-    return ~inside | (costs < INSCRIBED_INFLATED_OBSTACLE) | (costs == NO_INFORMATION)
+def limits_of(config: MPPIConfig, speed_limit: float | None) -> F32:
+    """Return `Scene.limits`, under a limit of speed [m/s]; as in Nav2, turning is slowed as much."""
+    ratio = 1.0 if speed_limit is None else min(1.0, max(0.0, speed_limit) / config.vx_max)
+    radius = config.min_turning_r if config.motion_model == "Ackermann" else 0.0
+    speeds = [config.vx_max * ratio, config.vx_min * ratio, config.wz_max * ratio]
+    return np.array([*speeds, config.ax_max, config.ax_min, config.az_max, radius], dtype=np.float32)
+
+
+def expected_speed(
+    config: MPPIConfig, velocity: tuple[float, float], last: tuple[float, float] | None, dt: float
+) -> tuple[float, float]:
+    """Return the speed one period from now: towards the last command, as far as the limits let it."""
+    if last is None:
+        return velocity
+    if config.open_loop:
+        return last
+    v = min(max(last[0], velocity[0] + dt * config.ax_min), velocity[0] + dt * config.ax_max)
+    w = min(max(last[1], velocity[1] - dt * config.az_max), velocity[1] + dt * config.az_max)
+    return v, w

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import fields
+from functools import cached_property
 from typing import Any
 
 from twin.bridge.actions import ActionClient
@@ -74,21 +75,29 @@ class NavigatorContext(TreeContext):
         self,
         node: Node,
         robot_pose: RobotPose,
-        odometer: Odometer,
         *,
+        odom_topic: str,
+        filter_duration_ns: int,
         server_timeout_ns: int,
         goal_reached_tol: float,
     ) -> None:
         super().__init__(lambda: node.now_ns)
         self.node = node
         self.robot_pose = robot_pose
-        self.odometer = odometer
+        self.filter_duration_ns = filter_duration_ns
+        """Over which speeds are averaged [ns]."""
+        self._odom_topic = odom_topic
         self.server_timeout_ns = server_timeout_ns
         """How long a server may take to accept a goal, or a service to answer [ns]."""
         self.goal_reached_tol = goal_reached_tol
         """[m]"""
         self._clients: dict[tuple[str, str], ActionClient | Client] = {}
         self._topics: dict[str, Latest] = {}
+
+    @cached_property
+    def odometer(self) -> Odometer:
+        """Speed from odometry, whose messages are many: read only if a tree has a node that needs it."""
+        return Odometer(self.node, self._odom_topic, self.filter_duration_ns)
 
     def action_client(self, type_: ActionType, name: str) -> ActionClient:
         """Return the client of an action."""

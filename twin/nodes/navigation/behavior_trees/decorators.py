@@ -64,6 +64,10 @@ class SpeedController(NavigatorDecorator):
     _start = 0
     _is_first = False
 
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._odometer = self.context.odometer
+
     def tick(self) -> Status:
         """Tick the child if it is due or running."""
         now, goal = self.context.now_ns(), self.goal()
@@ -82,7 +86,7 @@ class SpeedController(NavigatorDecorator):
     def _rate(self) -> float:
         lowest, highest = self.get("min_rate"), self.get("max_rate")
         slow, fast = self.get("min_speed"), self.get("max_speed")
-        share = (self.context.odometer.speed - slow) / (fast - slow) if fast > slow else 1.0
+        share = (self._odometer.speed - slow) / (fast - slow) if fast > slow else 1.0
         return float(min(max(lowest + share * (highest - lowest), lowest), highest))
 
 

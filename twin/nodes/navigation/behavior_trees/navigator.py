@@ -16,7 +16,7 @@ from twin.navigation.behavior_trees.factory import Tree, TreeBuilder
 from twin.navigation.behavior_trees.node import Status
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext, fill
-from twin.nodes.navigation.behavior_trees.progress import Progress, time_remaining_ns
+from twin.nodes.navigation.behavior_trees.progress import Progress
 from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 
 SHIPPED = FilePath(__file__).parent / "trees"
@@ -83,7 +83,7 @@ class Navigator:
         self._tree = self._load(setup.default_tree)
         self._started = self._due = 0
         self._unplanned: Path | None = None
-        self._progress = Progress()
+        self._progress = Progress(context.filter_duration_ns)
         ActionServer(
             context.node,
             setup.action,
@@ -209,8 +209,7 @@ class Navigator:
         if pose is None:
             return
         board, now = self.blackboard, self._context.now_ns()
-        distance = self._progress.remaining(board.get("path"), pose)
-        to_go_ns = time_remaining_ns(distance, self._context.odometer.speed)
+        distance, to_go_ns = self._progress.update(board.get("path"), pose, now)
         feedback = fill(
             self.setup.action.Feedback,
             current_pose=pose_stamped(pose, self._context.robot_pose.frames.map, now),

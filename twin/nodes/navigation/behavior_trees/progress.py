@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from twin.bridge.msgs import Path
@@ -18,24 +20,43 @@ _SLOW, _NEAR = 0.01, 0.1
 class Progress:
     """Follows the robot along the path of the moment."""
 
-    def __init__(self) -> None:
+    def __init__(self, filter_duration_ns: int) -> None:
+        """Speed is averaged over `filter_duration_ns`."""
+        self._window_ns = filter_duration_ns
+        self._poses: deque[tuple[int, Pose2]] = deque()
         self._path: Path | None = None
         self._points: Array = np.zeros((0, 3))
+        self._to_go: Array = np.zeros(0)
+        """From each point to the end [m]."""
         self._nearest = 0
 
-    def remaining(self, path: Path | None, pose: Pose2) -> float:
-        """Return how much of the path is left [m]; 0 without a path."""
+    def update(self, path: Path | None, pose: Pose2, now_ns: int) -> tuple[float, int]:
+        """Return the length of path left [m], 0 without a path, and the time to go [ns], 0 if unknown."""
+        self._poses.append((now_ns, pose))
+        while len(self._poses) > 2 and self._poses[0][0] < now_ns - self._window_ns:
+            self._poses.popleft()
+        distance = self._remaining(path, pose)
+        speed = self._speed()
+        if speed <= _SLOW or distance <= _NEAR:
+            return distance, 0
+        return distance, round(distance / speed * 1e9)
+
+    def _speed(self) -> float:
+        (began_ns, first), (now_ns, last) = self._poses[0], self._poses[-1]
+        return first.distance(last) / ((now_ns - began_ns) * 1e-9) if now_ns > began_ns else 0.0
+
+    def _remaining(self, path: Path | None, pose: Pose2) -> float:
         if path is not self._path:
             self._path, self._nearest = path, 0
             self._points = path_array(path) if path is not None else np.zeros((0, 3))
+            ahead = paths.steps(self._points)[::-1].cumsum()[::-1] if len(self._points) else np.zeros(0)
+            self._to_go = np.append(ahead, 0.0)
         if not len(self._points):
             return 0.0
-        self._nearest = paths.nearest(self._points, pose.x, pose.y, self._nearest, _SEARCH_WINDOW)
-        return paths.length(self._points, self._nearest)
-
-
-def time_remaining_ns(distance: float, speed: float) -> int:
-    """Return the time to go at the present speed [ns]; 0 while it cannot be told."""
-    if speed <= _SLOW or distance <= _NEAR:
-        return 0
-    return round(distance / speed * 1e9)
+        to_go = self._to_go
+        # Falls along the path, so what is within the window is found from its far end.
+        behind = int(np.searchsorted(-to_go, _SEARCH_WINDOW - to_go[self._nearest], side="right"))
+        ahead_xy = self._points[self._nearest : behind, :2]
+        aside = ahead_xy - (pose.x, pose.y)
+        self._nearest += int(np.argmin(np.einsum("ij,ij->i", aside, aside)))
+        return float(to_go[self._nearest])

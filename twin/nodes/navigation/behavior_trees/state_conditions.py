@@ -73,6 +73,10 @@ class IsBatteryCharging(_Battery):
 class IsStuck(NavigatorCondition):
     """Whether the robot has just lost speed as it can only by a bump."""
 
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._odometer = self.context.odometer
+
     def holds(self) -> bool:
         """Look at odometry."""
-        return self.context.odometer.acceleration < _BRAKE_LIMIT
+        return self._odometer.acceleration < _BRAKE_LIMIT

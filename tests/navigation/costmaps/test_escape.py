@@ -1,0 +1,26 @@
+"""Which motions lead a robot away from what it touches by the costmap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from twin.navigation.costmaps.kernels import escapes
+
+CORNERS = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
+
+
+@pytest.mark.parametrize(
+    ("v", "w", "expected"),
+    [
+        (-0.15, 0.0, True),
+        (0.15, 0.0, False),  # its outline would leave the surface behind: further in all the same
+        (0.0, -0.5, True),
+        (0.0, 0.0, False),
+    ],
+)
+def test_from_the_surface_of_a_thing_at_the_left_front_corner(v: float, w: float, expected: bool) -> None:
+    costs = np.zeros((80, 80), dtype=np.uint8)
+    costs[44:54, 47] = 254  # seen from the front: x 0.175 to 0.2, y 0.1 to 0.35
+    costs[45, 44:47] = 254  # and from the side: y 0.125 to 0.15, x from 0.1 on
+    assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, v, w, 0.05, 20, -1.0, -1.0, 0.025) is expected

@@ -1,0 +1,42 @@
+"""A path is not changed for another that costs nearly the same."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.planning.commitment import CommitmentConfig, committed
+from twin.navigation.planning.planner import Planner, PlannerConfig
+
+START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(4.5, 2.5, 0.0)
+
+
+def block(**shift: int) -> Costmap:
+    """A block in the middle, `up` cells off it, so that one side is shorter."""
+    costs = np.zeros((50, 50), dtype=np.uint8)
+    up = shift.get("up", 0)
+    costs[15 + up : 36 + up, 20:30] = 254
+    return Costmap(costs=costs, resolution=0.1)
+
+
+def side(costmap: Costmap) -> float:
+    path = Planner(config=PlannerConfig()).plan(costmap, START, GOAL)
+    return float(np.sign(path[len(path) // 2, 1] - 2.5))
+
+
+def test_the_side_once_chosen_is_kept_until_it_is_blocked() -> None:
+    config = CommitmentConfig(commitment_cost=20)
+    assert (side(block(up=-2)), side(block(up=1))) == (1.0, -1.0)
+    first = Planner(config=PlannerConfig()).plan(block(up=-2), START, GOAL)
+    assert side(committed(block(up=1), first, config)) == 1.0
+    closed = block(up=1)
+    closed.costs[30:, 20:30] = 254
+    assert side(committed(closed, first, config)) == -1.0
+
+
+def test_only_free_cells_become_dearer() -> None:
+    costmap = Costmap(costs=np.array([[0, 100, 250, 253, 254, 255]], dtype=np.uint8), resolution=1.0)
+    config = CommitmentConfig(commitment_cost=20, commitment_width=0.1)
+    found = committed(costmap, np.array([[-9.0, -9.0]]), config)
+    assert found.costs.tolist() == [[20, 120, 252, 253, 254, 255]]

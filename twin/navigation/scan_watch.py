@@ -1,0 +1,80 @@
+"""Whether a lidar's scans can be believed: one that froze, broke or went blind still sends some."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twin.geometry import Array, Pose2, wrap_angle
+
+
+class RepeatedScan:
+    """Notices the same scan again and again while the robot moves: noise alone makes any two scans differ."""
+
+    def __init__(self, repeats: int, distance: float) -> None:
+        """Begin without a scan.
+
+        Args:
+            repeats: So many scans in a row that are equal to the one before ...
+            distance: ... while odometry has come so far, or turned by so many radians, are one old scan [m].
+        """
+        self._repeats, self._distance = repeats, distance
+        self._ranges: Array | None = None
+        self._count = 0
+        self._since: Pose2 | None = None
+
+    def is_frozen(self, ranges: Array, odom: Pose2) -> bool:
+        """Take a scan, shape (n,) [m], and the base's pose in odom; return whether it is an old one."""
+        if self._ranges is None or not np.array_equal(ranges, self._ranges, equal_nan=True):
+            self._ranges, self._count, self._since = ranges, 0, odom
+            return False
+        self._count += 1
+        assert self._since is not None
+        moved = self._since.distance(odom) >= self._distance
+        turned = abs(wrap_angle(self._since.yaw - odom.yaw)) >= self._distance
+        return self._count >= self._repeats and (moved or turned)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanWatchConfig:
+    """What no healthy lidar does."""
+
+    repeats: int = 3
+    """So many equal scans in a row, while odometry moves, are one old scan."""
+    repeats_distance: float = 0.1
+    """How far odometry must have come meanwhile [m], or turned [rad]."""
+    sudden_share: float = 0.2
+    """If so many of the rays hit something, not all of them hit nothing in the next scan."""
+
+
+class ScanWatch:
+    """Judges scans for whoever drives by them.
+
+    A scan in which nothing returns is believed where things have vanished little by little: a robot may be
+    out in the open.
+    """
+
+    def __init__(self, config: ScanWatchConfig | None = None) -> None:
+        self._config = config = config or ScanWatchConfig()
+        self._repeated = RepeatedScan(config.repeats, config.repeats_distance)
+        self._hits = 0.0
+
+    def fault(self, ranges: ArrayLike, odom: Pose2 | None) -> str:
+        """Take a scan; return why it must not be used, empty if it can be.
+
+        Args:
+            ranges: As REP-117 has them, shape (n,) [m].
+            odom: The base's pose in odom now; None: nobody knows.
+        """
+        values = np.asarray(ranges)
+        if np.isnan(values).all():
+            return "every reading is NaN"
+        hits = float(np.count_nonzero(values < np.inf)) / len(values)  # -inf is too near to be measured
+        if hits == 0.0 and self._hits >= self._config.sudden_share:
+            return "suddenly no ray returns"
+        self._hits = hits
+        if hits > 0.0 and odom is not None and self._repeated.is_frozen(values, odom):
+            return "it stays the same while the robot moves"
+        return ""
