@@ -22,10 +22,14 @@ LOST = 0.3
 """... and below this in all directions."""
 ALONE = 0.4
 """If nothing fits near odometry's guess, a match in another direction counts from this score on."""
-EXPANDED = np.diag([25.0, 25.0, 25.0])
-"""By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip."""
-SLIPPED = np.diag([100.0, 100.0, 1e4])
-"""By so much it is larger if it certainly has."""
+GAIN = 0.2
+"""Far from where odometry leads, a match must have a score that is better by this: corridors look alike."""
+TURNED = np.diag([1.0, 1.0, 25.0])
+"""By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip ..."""
+SLIPPED = np.diag([25.0, 25.0, 25.0])
+"""... but wheels may spin or count the wrong way, too."""
+LOST_PRIOR = np.diag([1.0, 1.0, 1e4])
+"""By so much it is larger if it certainly has slipped."""
 
 
 class Registration:
@@ -78,17 +82,21 @@ class Registration:
             return match
         # What responds most on the smeared grid need not fit best: ask for several.
         wide = replace(window, half_angle=2.0 * window.half_angle)
-        match = _better(match, reference.best_match(scan, guess, wide, EXPANDED * prior, least, SECTORS))
+        candidates = reference.candidates(scan, guess, wide, least, SECTORS)
+        match = _better(match, reference.best(scan, candidates, guess, TURNED * prior), 0.02)
+        if match is None or match.score < DOUBTFUL:
+            match = _better(match, reference.best(scan, candidates, guess, SLIPPED * prior), GAIN)
         if match is not None and match.score >= LOST:
             return match
         # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
         wide = replace(window, half_angle=math.pi)
-        other = reference.best_match(scan, guess, wide, SLIPPED * prior, least, 4 * SECTORS)
+        candidates = reference.candidates(scan, guess, wide, least, 4 * SECTORS)
+        other = reference.best(scan, candidates, guess, LOST_PRIOR * prior)
         enough = ALONE if match is None else DOUBTFUL
         return other if other is not None and other.score >= enough else match
 
 
-def _better(first: Match | None, second: Match | None) -> Match | None:
+def _better(first: Match | None, second: Match | None, gain: float) -> Match | None:
     if first is None or second is None:
         return first or second
-    return second if second.score > first.score + 0.02 else first
+    return second if second.score > first.score + gain else first
