@@ -27,7 +27,6 @@ HEAVY = (
     "pydantic",
     "rosbags",
     "xacro",
-    "py_trees",
 )
 
 WALL_CLOCK = {

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from twin.controllers.limiter import AxisLimits
-from twin.errors import NavigationError
+from twin.errors import NavigationError, ScenarioError
+from twin.geometry import Pose2
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.footprint import rectangle
+from twin.navigation.docking.docks import Dock
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.nav2_parameters import with_file, with_plugins
+from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import NavigationConfig
+from twin.scenario.schema import load
+
+ROOT = Path(__file__).parents[2]
 
 FILE = """\
 /**:
   ros__parameters:
     use_sim_time: true
     log_level: info
-amcl:
+lifecycle_manager:
   ros__parameters:
-    alpha1: 0.2
+    autostart: true
 bt_navigator:
   ros__parameters:
     bt_loop_duration: 20
@@ -117,7 +125,7 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert got.waypoints.wait_at_waypoint.waypoint_pause_duration == 300
     assert told == [
         "nav2.yaml: controller_server does not have min_y_velocity_threshold",
-        "nav2.yaml: not read for amcl",
+        "nav2.yaml: not read for lifecycle_manager",
     ]
 
 
@@ -196,3 +204,102 @@ controller_server:
 def test_a_file_that_is_none(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(NavigationError, match=words):
         applied(tmp_path, text)
+
+
+# docks, smoothers, localisation, the collision monitor
+
+MORE = """\
+amcl:
+  ros__parameters:
+    alpha1: 0.2
+    max_particles: 3000
+    base_frame_id: base_footprint
+    transform_tolerance: 1.0
+collision_monitor:
+  ros__parameters:
+    source_timeout: 1.5
+    polygons: ["FootprintApproach", "Round", "Slow", "Off"]
+    FootprintApproach: {type: polygon, action_type: approach, time_before_collision: 1.2, min_points: 6}
+    Round: {type: circle, action_type: stop, radius: 0.3, max_points: 3}
+    Slow: {type: polygon, action_type: slowdown, points: "[[0.4, 0.3], [0.4, -0.3], [-0.4, 0.0]]"}
+    Off: {type: circle, action_type: stop, radius: 2.0, enabled: false}
+docking_server:
+  ros__parameters:
+    controller_frequency: 20.0
+    max_retries: 5
+    dock_plugins: ["my_dock"]
+    my_dock:
+      plugin: "opennav_docking::SimpleChargingDock"
+      docking_threshold: 0.07
+      use_external_detection_pose: true
+      filter_coef: 0.1
+    docks: ["home"]
+    home: {type: my_dock, frame: map, pose: [1.0, 2.0, 0.5]}
+smoother_server:
+  ros__parameters:
+    smoother_plugins: ["simple_smoother"]
+    simple_smoother: {plugin: "nav2_smoother::SimpleSmoother", max_its: 77}
+"""
+
+
+def test_docks_and_smoothers_of_the_file(tmp_path: Path) -> None:
+    got, told = applied(tmp_path, MORE, {"docking": {"max_retries": 1}})
+    docking = got.docking
+    assert docking.database.docks["home"] == Dock(type="my_dock", pose=Pose2(1.0, 2.0, 0.5))
+    kind = docking.database.type_of("my_dock")
+    assert (kind.docking_threshold, kind.staging_x_offset) == (0.07, -0.7), "the rest is Nav2's"
+    assert kind.is_charger
+    assert kind.use_external_detection_pose
+    assert docking.controller_period_ns == 50_000_000
+    assert docking.max_retries == 1, "the scenario goes first"
+    assert got.path_smoother.simple_smoother.max_its == 77
+    assert told == ["nav2.yaml: docking_server does not have my_dock.filter_coef"]
+
+
+def test_a_dock_of_the_file_that_cannot_be(tmp_path: Path) -> None:
+    with pytest.raises(NavigationError) as caught:
+        applied(tmp_path, MORE.replace("pose: [1.0, 2.0, 0.5]", "pose: [1.0, 2.0]"))
+    assert "docking_server: home.pose must be a list: x, y and yaw" in str(caught.value)
+    with pytest.raises(NavigationError, match=r"home\.type must be one of my_dock, tote"):
+        applied(tmp_path, MORE.replace("type: my_dock", "type: other"))
+
+
+def _file(tmp_path: Path, text: str) -> str:
+    file = tmp_path / "nav2.yaml"
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+def test_localisation_of_the_file(tmp_path: Path) -> None:
+    given = frozenset({"max_particles"})
+    amcl, told = amcl_with_file(AmclConfig(), given, _file(tmp_path, MORE), "")
+    assert (amcl.filter.alpha1, amcl.filter.max_particles) == (0.2, AmclConfig().max_particles)
+    assert amcl.node.transform_tolerance_ns == 1_000_000_000
+    assert told == ["nav2.yaml: amcl does not have base_frame_id"]
+
+
+def test_the_files_collision_monitor_unless_the_scenario_has_one(tmp_path: Path) -> None:
+    file = _file(tmp_path, MORE)
+    monitor = monitor_with_file(NavigationConfig(params_file=file), "")
+    assert monitor is not None
+    assert monitor.source_timeout == 1.5
+    approach, circle, slow = monitor.polygons
+    assert (approach.points, approach.time_before_collision, approach.min_points) == ((), 1.2, 6)
+    assert min(math.hypot(*corner) for corner in circle.points) >= 0.3
+    assert circle.min_points == 4, "Nav2's older max_points is one less"
+    assert slow.points[2] == (-0.4, 0.0)
+    own = CollisionMonitorParameters()
+    assert monitor_with_file(NavigationConfig(params_file=file, collision_monitor=own), "") is own
+    wrong = _file(tmp_path, MORE.replace("action_type: stop, radius: 0.3", "action_type: stopp"))
+    with pytest.raises(NavigationError, match="collision_monitor: Input should be 'stop'"):
+        monitor_with_file(NavigationConfig(params_file=wrong), "")
+
+
+def test_one_file_for_every_robot_that_navigates(tmp_path: Path) -> None:
+    scenario = load(ROOT / "scenarios" / "warehouse_charger.yaml").with_params_file(tmp_path / "nav2.yaml")
+    navigation = scenario.robots[0].navigation
+    assert navigation is not None
+    assert navigation.params_file == str(tmp_path / "nav2.yaml")
+    assert "charger" in navigation.docking.docks
+    with pytest.raises(ScenarioError, match="no robot of 'r2d2_circle' has it"):
+        load(ROOT / "scenarios" / "r2d2_circle.yaml").with_params_file(tmp_path / "nav2.yaml")

@@ -38,6 +38,8 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         )
         clock = outside.clock(options.network is not None)
         scenario = schema.load(options.scenario, options.overrides)
+        if options.params_file is not None:
+            scenario = scenario.with_params_file(options.params_file.resolve())
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
 

@@ -20,6 +20,8 @@ class RunOptions:
 
     scenario: Path
     overrides: Mapping[str, str] = field(default_factory=dict)
+    params_file: Path | None = None
+    """Of Nav2, for every robot that navigates."""
     pace: float | None = None
     """Simulated seconds per second; None: as fast as possible."""
     listen: tuple[str, ...] = ()
@@ -57,6 +59,7 @@ class RunOptions:
         """Return the arguments of a `twin` that does the same and prints JSON."""
         words = ["run", str(self.scenario), "--json", "--out", str(out)]
         words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
+        words += [] if self.params_file is None else ["--params-file", str(self.params_file)]
         words += [] if self.pace is None else ["--pace", repr(self.pace)]
         words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
         words += [word for place in self.nodes for word in ("--node", place)]

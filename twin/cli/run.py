@@ -20,6 +20,15 @@ def run(
         typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None,
+    params_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+            help="A Nav2 parameter file for all robots that navigate, instead of the scenario's.",
+        ),
+    ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="Run this often, each time in a fresh process.")] = 1,
     expect_one_hash: Annotated[
         bool, typer.Option("--expect-one-hash", help="Fail if the repeated runs differ in a single bit.")
@@ -111,6 +120,7 @@ def run(
     options = RunOptions(
         scenario=scenario,
         overrides=parse_overrides(sets or [], seed),
+        params_file=params_file,
         pace=parse_pace(pace, free=free),
         listen=tuple(listen or ()),
         nodes=tuple(node or ()),

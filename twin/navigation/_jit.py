@@ -1,4 +1,7 @@
-"""The one way this package compiles a function: numba, cached on disk, typed as the Python function."""
+"""The one way this package compiles a function: numba, cached on disk, typed as the Python function.
+
+Copy an array by a loop: to assign one to a slice compiles numba's message about shapes, too, for a second.
+"""
 
 from __future__ import annotations
 

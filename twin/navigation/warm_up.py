@@ -1,8 +1,14 @@
-"""Compile (or load from the disk cache) every compiled function before the clock starts."""
+"""Compile (or load from the disk cache) what a node runs, before the clock starts.
+
+Each node calls its own function when it is built: a robot that does not explore waits for no explorer. A
+function calls what is compiled with the types that it is called with later, in a room of 2 x 2 m, once per
+process.
+"""
 
 from __future__ import annotations
 
 import contextlib
+from functools import cache
 
 import numpy as np
 
@@ -23,29 +29,59 @@ from twin.navigation.planning.planner import Planner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
 
-
-def warm_up() -> None:
-    """Call each compiled function once on a 2 x 2 m room with the types that it is called with later."""
-    data = np.zeros((40, 40), dtype=np.int8)
-    data[0] = data[-1] = 100
-    room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
-    layered = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room)
-    layered.update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
-    layered.update_range(Pose2(1.0, 1.0, 0.0), 0.3, (0.1, 0.5), 0.2)
-    layered.set_keepout(KeepoutFilter(mask=room))
-    costmap = layered.costmap
-    start, goal = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
-    SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, start, goal), costmap)
-    footprint_cost(costmap, layered.config.polygon, start)
-    DriveOnHeading().update(start, 0.1, costmap)
-    time_to_collision(np.ones((2, 2)), layered.config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
-    Explorer().update(room, start, 0.0)
-    _localise(room)
+_START, _GOAL = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
 
 
-def _localise(room: OccupancyMap) -> None:
+@cache
+def warm_up_costmap() -> None:
+    """Let a scan into a costmap."""
+    _costmap().update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
+
+
+@cache
+def warm_up_ranges() -> None:
+    """Let a reading of a range sensor into a costmap."""
+    _costmap().update_range(Pose2(1.0, 1.0, 0.0), 0.3, (0.1, 0.5), 0.2)
+
+
+@cache
+def warm_up_keepout() -> None:
+    """Lay a mask over a costmap."""
+    _costmap().set_keepout(KeepoutFilter(mask=_room()))
+
+
+@cache
+def warm_up_planning() -> None:
+    """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
+    costmap = _costmap().costmap
+    SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, _START, _GOAL), costmap)
+
+
+@cache
+def warm_up_behaviors() -> None:
+    """Look whether a command collides."""
+    layered = _costmap()
+    footprint_cost(layered.costmap, layered.config.polygon, _START)
+    DriveOnHeading().update(_START, 0.1, layered.costmap)
+
+
+@cache
+def warm_up_collision_monitor() -> None:
+    """Look when two points are hit."""
+    time_to_collision(np.ones((2, 2)), _costmap().config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
+
+
+@cache
+def warm_up_exploration() -> None:
+    """Look for what there is to explore."""
+    Explorer().update(_room(), _START, 0.0)
+
+
+@cache
+def warm_up_localisation() -> None:
+    """Weigh two particles by a scan. The beam model compiles when it is first used."""
     beams = chosen_beams([0.5, 0.6], [0.0, 1.0], Pose2(0.0, 0.0, 0.0), most=2, min_range=0.0, max_range=9.0)
-    field = LikelihoodField(SurfaceDistance(room, max_dist=2.0), z_hit=0.5, z_rand=0.5)
+    field = LikelihoodField(SurfaceDistance(_room(), max_dist=2.0), z_hit=0.5, z_rand=0.5)
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
     regularised(np.ones((2, 3)), clusters(np.ones((2, 3))), np.ones((2, 3)))
     tempered_weights(np.zeros(2), np.zeros(2), 1.0)
@@ -62,3 +98,13 @@ def warm_up_controller(controller: Controller) -> None:
         with contextlib.suppress(ControlFailure):
             controller.compute_velocity(Pose2(x, 2.0, yaw), (0.0, 0.0), path, costmap, 0.05)
     controller.reset()
+
+
+def _room() -> OccupancyMap:
+    data = np.zeros((40, 40), dtype=np.int8)
+    data[0] = data[-1] = 100
+    return OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
+
+
+def _costmap() -> LayeredCostmap:
+    return LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=_room())

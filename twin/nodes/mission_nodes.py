@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from py_trees.common import Status
-
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED
 from twin.bridge.types import ActionType
-from twin.nodes.navigation.bt.control import sequence
-from twin.nodes.navigation.bt.leaves import CallAction, Do
+from twin.navigation.behavior_trees.node import Status, TreeNode
+from twin.nodes.mission_leaves import CallAction, Do, sequence
 
 
 class MissionNode:
@@ -29,6 +27,16 @@ class MissionNode:
         self.done = False
         self.succeeded: bool | None = None
         self.reason = ""
+
+    def run(self, tree: TreeNode, period_ns: int) -> None:
+        """Tick a tree until it ends, and the mission with it."""
+
+        def tick() -> None:
+            status = Status.IDLE if self.done else tree.execute_tick()
+            if status.is_completed:
+                self.finish(status is Status.SUCCESS)
+
+        self.node.create_timer(period_ns, tick)
 
     def enter(self, state: str) -> None:
         """Go on to `state` and tell it."""
@@ -70,7 +78,7 @@ class ActionSequenceNode(MissionNode):
     ) -> None:
         super().__init__(bus, namespace=namespace)
         clients: dict[str, ActionClient] = {}
-        leaves = []
+        leaves: list[TreeNode] = []
         for step in steps:
             if step.name not in clients:
                 clients[step.name] = ActionClient(self.node, step.action_type, step.name)
@@ -78,15 +86,7 @@ class ActionSequenceNode(MissionNode):
                 Do(f"State[{step.label}]", partial(self.enter, step.label)),
                 CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
             ]
-        self._tree = sequence("Behaviors", leaves)
-        self.node.create_timer(period_ns, self._tick)
-
-    def _tick(self) -> None:
-        if self.done:
-            return
-        self._tree.tick_once()
-        if self._tree.status != Status.RUNNING:
-            self.finish(self._tree.status == Status.SUCCESS)
+        self.run(sequence("Behaviors", leaves), period_ns)
 
 
 class VelocityProfileNode(MissionNode):

@@ -17,9 +17,10 @@ from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 from twin.nodes.navigation.static_localisation import StaticLocalisationNode
+from twin.runtime.nav2_parameters import amcl_with_file
 from twin.runtime.navigation_config import overridden
 from twin.runtime.stack_context import StackContext
-from twin.scenario.localisation import SlamLocalisation
+from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.sim.noise import NoiseStream
 
 _MAP_UPDATE_INTERVAL = 2.0
@@ -40,15 +41,27 @@ def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNod
     assert context.map is not None
     MapServerNode(context.bus, context.map, namespace=context.namespace)
     MapSaverNode(context.bus, namespace=context.namespace)
-    AmclNode(
+    _amcl(context, config, pose, guess)
+    return None
+
+
+def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, guess: Pose2) -> None:
+    overrides = config.parameters.overrides()
+    navigation = context.config.navigation
+    file = navigation.params_file if navigation is not None else None
+    amcl = overridden(AmclConfig(), overrides)
+    parameters, not_understood = amcl_with_file(amcl, frozenset(overrides), file, context.namespace)
+    node = AmclNode(
         context.bus,
         pose,
-        overridden(AmclConfig(), config.parameters.overrides()),
+        parameters.filter,
         InitialPose.from_error(guess, config.initial_pose_error.xy, config.initial_pose_error.yaw),
         seed=context.seed,
+        config=parameters.node,
         namespace=context.namespace,
     )
-    return None
+    for sentence in not_understood:
+        node.node.get_logger().warn(sentence)
 
 
 def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> SlamToolboxNode:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -27,6 +27,9 @@ _TYPO = 0.85
 """As similar as this to a name that the node has, an unknown name is a mistake; else it is Nav2's alone."""
 _ONLY_NAV2S = ("critics", "transform_tolerance")
 """Names of Nav2 that only look like mistakes."""
+_LISTS = ("plugins", "plugin", "docks")
+"""What these name has sections of its own."""
+_DOCKS = ("SimpleChargingDock", "SimpleNonChargingDock")
 _LAYERS = ("static_layer", "obstacle_layer", "voxel_layer", "inflation_layer", "stvl_layer", "range_layer")
 _BEHAVIORS = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
 _SECTIONS = {
@@ -110,20 +113,42 @@ class Nav2Parameters:
         entry = _renamed(self._said(node)).get(f"{section}.{key}")
         return "" if entry is None else str(entry.value).rpartition("::")[2]
 
-    def finish(self) -> list[str]:
-        """Return one sentence per node of the file that was not, or not wholly, understood.
+    def values(self, node: str) -> dict[str, Any]:
+        """Return all that the file says of a node, by the names that it uses."""
+        self._nodes.add(node)
+        return {name: entry.value for name, entry in self._said(node).items() if not entry.is_general}
+
+    def wrong(self, node: str, name: str, why: str) -> None:
+        """Note that a value cannot be."""
+        entry = self._said(node).get(name)
+        self._problems.append(Problem(f"{node}: {name} {why}", self.path, entry and entry.line))
+
+    def ignored(self) -> list[str]:
+        """Return one sentence per node that was not wholly understood.
 
         Raises:
             NavigationError: every value that cannot be, every name that is a likely typing mistake.
         """
         if self._problems:
             raise NavigationError(self._problems)
-        others = sorted(s.node.strip("/") for s in self._sections if not s.is_pattern)
-        absent = [name for name in others if self._without_namespace(name) not in self._nodes]
-        told = [
+        return [
             f"{self.path.name}: {node} does not have {', '.join(what)}"
             for node, what in self._ignored.items()
         ]
+
+    def finish(self, elsewhere: Collection[str] = ()) -> list[str]:
+        """Return what `ignored` does, and which nodes of the file nobody read.
+
+        Args:
+            elsewhere: Nodes that are read on another occasion.
+
+        Raises:
+            NavigationError: as `ignored`.
+        """
+        told = self.ignored()
+        others = sorted(s.node.strip("/") for s in self._sections if not s.is_pattern)
+        read = self._nodes | set(elsewhere)
+        absent = [name for name in others if self._without_namespace(name) not in read]
         return [*told, f"{self.path.name}: not read for {', '.join(absent)}"] if absent else told
 
     def _without_namespace(self, name: str) -> str:
@@ -160,7 +185,7 @@ class Nav2Parameters:
     ) -> dict[str, _Value]:
         """Leave out sections of plugins that are others than those here, and the lists of plugins."""
         classes = {prefix: config} if prefix else dict(_plugins(config, names))
-        out = {name: entry for name, entry in values.items() if not name.endswith(("plugins", "plugin"))}
+        out = {name: entry for name, entry in values.items() if not name.endswith(_LISTS)}
         for section in sections:
             own, plugin = classes.get(section), str(values[section + "plugin"].value)
             if own is not None and not _is_same(plugin, own):
@@ -239,6 +264,8 @@ def _is_same(plugin: str, config: Any) -> bool:
     """Whether a plugin is of a config's kind, as RegulatedPurePursuitController is."""
     kind = type(config).__name__.removesuffix("Config").casefold()
     name = plugin.rpartition("::")[2]
+    if kind == "docktype":
+        return name in _DOCKS
     same = PLANNERS.get(name, "").replace("_", "").replace("smac", "")
     return kind in name.casefold() or kind in ("planner", same)
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.nodes.navigation.amcl import AmclNodeConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking_server import NAMES as DOCKING_NAMES
 from twin.runtime.nav2_file import PLANNERS, Nav2Parameters
+from twin.runtime.nav2_lists import database_of, monitor_of
 from twin.runtime.navigation_config import NavigationParameters
+from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
 
@@ -19,6 +24,10 @@ _CONTROLLERS = {
     "DWBLocalPlanner": "dwb",
     "MPPIController": "mppi",
 }
+
+
+_DOCKS = frozenset({"docks", "pose", "type", "frame"})
+"""Of a dock: these are read together."""
 
 
 def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
@@ -45,6 +54,50 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     return config.model_copy(update={"controller": controller, "planner": planner})
 
 
+@dataclass(frozen=True, kw_only=True)
+class AmclParameters:
+    """All of `/amcl`."""
+
+    filter: AmclConfig
+    node: AmclNodeConfig
+
+
+def amcl_with_file(
+    config: AmclConfig, given: frozenset[str], params_file: str | None, namespace: str
+) -> tuple[AmclParameters, list[str]]:
+    """Return the parameters of `/amcl` with those of a file, and what of them was not understood.
+
+    Args:
+        config: What holds without the file.
+        given: Parameters that the scenario gives: they stay.
+        params_file: Absent: there is none.
+        namespace: Of the robot.
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    parameters = AmclParameters(filter=config, node=AmclNodeConfig())
+    if params_file is None:
+        return parameters, []
+    file = Nav2Parameters(Path(params_file), namespace)
+    parameters = file.applied("amcl", parameters, {"filter": "", "node": ""}, keep=given)
+    return parameters, file.ignored()
+
+
+def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMonitorParameters | None:
+    """Return the collision monitor: the scenario's, else the file's; None if nobody wants one.
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    if config.collision_monitor is not None or config.params_file is None:
+        return config.collision_monitor
+    file = Nav2Parameters(Path(config.params_file), namespace)
+    monitor = monitor_of(file)
+    file.ignored()
+    return monitor
+
+
 def with_file(
     parameters: NavigationParameters, config: NavigationConfig, namespace: str
 ) -> tuple[NavigationParameters, list[str]]:
@@ -60,6 +113,8 @@ def with_file(
         "linear.max_velocity": config.max_linear_speed,
         "angular.max_velocity": config.max_angular_speed,
     }
+    docking = parameters.docking
+    docking = replace(docking, database=database_of(file, docking.database))
     given = frozenset(name for name, speed in speeds.items() if speed is not None)
     changed = replace(
         parameters,
@@ -76,10 +131,12 @@ def with_file(
             keep=_given(config.controller),
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
+        docking=file.applied("docking_server", docking, DOCKING_NAMES, keep=_given(config.docking) | _DOCKS),
+        path_smoother=file.applied("smoother_server", parameters.path_smoother),
         navigator=file.applied("bt_navigator", parameters.navigator, keep=_given(config.navigator)),
         waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
-    return changed, file.finish()
+    return changed, file.finish(elsewhere=("amcl", "collision_monitor"))
 
 
 def _given(group: ParameterGroup) -> frozenset[str]:

@@ -20,6 +20,7 @@ from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.runtime.docking_config import docking_config
@@ -46,6 +47,7 @@ class NavigationParameters:
     planner_server: PlannerServerConfig
     commitment: CommitmentConfig
     controller_server: ControllerServerConfig
+    path_smoother: SmootherServerConfig
     behaviors: BehaviorConfig
     docking: DockingServerConfig
     navigator: BtNavigatorConfig
@@ -119,6 +121,7 @@ def navigation_parameters(
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother),
         behaviors=BehaviorConfig(footprint=polygon),
+        path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
         navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),

@@ -16,7 +16,7 @@ from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
-from twin.runtime.nav2_parameters import with_file, with_plugins
+from twin.runtime.nav2_parameters import monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
@@ -50,7 +50,7 @@ def build_navigation(
     )
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    build_commands(context, config.collision_monitor, pose, footprint)
+    build_commands(context, monitor_with_file(config, namespace), pose, footprint)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
@@ -66,7 +66,7 @@ def build_navigation(
         commitment=parameters.commitment,
         namespace=namespace,
     )
-    SmootherServerNode(bus, global_costmap, namespace=namespace)
+    SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)
     server = ControllerServerNode(
         bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
     )

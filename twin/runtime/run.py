@@ -16,7 +16,6 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError, ScenarioError
-from twin.navigation.warm_up import warm_up
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.faults import FaultSchedule
@@ -215,7 +214,6 @@ def run(
             ending.callback(simulation.lockstep.close)
         if sink is not None:
             sink.declare(parts.world)
-        warm_up()
         wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if out is not None:

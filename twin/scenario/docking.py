@@ -17,8 +17,10 @@ class DockTypeParameters(ParameterGroup):
 
     is_charger: bool | None = None
     """Whether docking ends only when the battery is charged."""
-    detection: Literal["none", "topic", "face", "tote"] | None = None
-    """What tells where the dock is: the map alone, `detected_dock_pose`, a line in the scan, a tote there."""
+    detection: Literal["none", "face", "tote"] | None = None
+    """What tells where the dock is: the map alone, a line in the scan, or that and a tote there."""
+    use_external_detection_pose: bool | None = None
+    """Whether `detected_dock_pose` tells it instead."""
     face_width: Annotated[Metres, NotNegative] | None = None
     """Of a box whose edges tell where its middle is [m]; 0: its middle is where the map says."""
     external_detection_translation_x: Metres | None = None

@@ -55,6 +55,24 @@ class Scenario(StrictModel):
             raise Faults(faults)
         return self
 
+    def with_params_file(self, path: Path) -> Scenario:
+        """Return the scenario with one Nav2 parameter file for every robot that navigates.
+
+        Raises:
+            ScenarioError: no robot does.
+        """
+        robots = tuple(
+            robot
+            if robot.navigation is None
+            else robot.model_copy(
+                update={"navigation": robot.navigation.model_copy(update={"params_file": str(path)})}
+            )
+            for robot in self.robots
+        )
+        if all(robot.navigation is None for robot in robots):
+            raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
+        return self.model_copy(update={"robots": robots})
+
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
         """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
         return tuple(entry.build(context) for entry in self.checks)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
-
 from twin.bridge.bus import Bus
 from twin.manipulation.telescopic_arm import TelescopicArm
-from twin.nodes.navigation.bt.control import RecoveryNode, sequence
+from twin.navigation.behavior_trees.node import TreeNode
+from twin.nodes.mission_leaves import sequence, with_recovery
 from twin.nodes.navigation.robot_pose import Frames
 from twin.warehouse.skills import MobileManipulationNode, Station
 
@@ -75,17 +73,9 @@ class PickAndPlaceNode(MobileManipulationNode):
             namespace=namespace,
         )
         self.config = config or PickAndPlaceConfig()
-        self._tree = sequence("PickAndPlace", [self._task(task) for task in tasks])
-        self.node.create_timer(period_ns, self._tick)
+        self.run(sequence("PickAndPlace", [self._task(task) for task in tasks]), period_ns)
 
-    def _tick(self) -> None:
-        if self.done:
-            return
-        self._tree.tick_once()
-        if self._tree.status != Status.RUNNING:
-            self.finish(self._tree.status == Status.SUCCESS)
-
-    def _task(self, task: PickAndPlaceTask) -> Behaviour:
+    def _task(self, task: PickAndPlaceTask) -> TreeNode:
         carry_z = self.config.carry_z
         give_up = [
             self.stop_looking(),
@@ -96,7 +86,7 @@ class PickAndPlaceNode(MobileManipulationNode):
             self.report(f"{task.tote}: drive to {task.pick.name} again"),
             self.drive_to(task.pick),
         ]
-        pick = RecoveryNode(
+        pick = with_recovery(
             "PickWithRetries",
             self.config.pick_attempts - 1,
             self._pick(task),
@@ -121,7 +111,7 @@ class PickAndPlaceNode(MobileManipulationNode):
             ],
         )
 
-    def _pick(self, task: PickAndPlaceTask) -> Behaviour:
+    def _pick(self, task: PickAndPlaceTask) -> TreeNode:
         surface = task.pick.surface_z
         grasp_z = surface + task.tote_height / 2.0
         return sequence(
@@ -147,12 +137,12 @@ class PickAndPlaceNode(MobileManipulationNode):
             ],
         )
 
-    def _place(self, task: PickAndPlaceTask) -> Behaviour:
+    def _place(self, task: PickAndPlaceTask) -> TreeNode:
         config = self.config
         set_down = task.place.surface_z + task.tote_height / 2.0 + config.set_down_clearance
         above = set_down + config.lift_off
         x = self.skills.docked_distance + config.place_depth
-        dock = RecoveryNode(
+        dock = with_recovery(
             "DockWithRetries",
             config.dock_attempts - 1,
             self.dock_at(task.place, "table"),

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from twin.bridge.action_types import (
     DockRobot,
@@ -37,10 +35,11 @@ from twin.bridge.srvs import SetBool
 from twin.geometry import Pose2
 from twin.manipulation.telescopic_arm import GraspPose, TelescopicArm
 from twin.manipulation.trajectory import plan_joint_move
+from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.navigation.docking.docks import DockType
 from twin.nodes.messages import pose_stamped
+from twin.nodes.mission_leaves import CallAction, CallService, Condition, Do, MissionLeaf
 from twin.nodes.mission_nodes import MissionNode
-from twin.nodes.navigation.bt.leaves import CallAction, CallService, Condition, Do
 from twin.nodes.navigation.robot_pose import Frames
 
 
@@ -119,11 +118,11 @@ class MobileManipulationNode(MissionNode):
 
     # Driving
 
-    def report(self, state: str) -> Behaviour:
+    def report(self, state: str) -> TreeNode:
         """Go on to a state of the mission."""
         return Do(f"State[{state}]", lambda: self.enter(state))
 
-    def drive_to(self, station: Station) -> Behaviour:
+    def drive_to(self, station: Station) -> TreeNode:
         """Navigate to the staging pose before a station."""
         staging = station.face @ Pose2(-self.skills.staging_distance, 0.0, 0.0)
         return CallAction(
@@ -133,7 +132,7 @@ class MobileManipulationNode(MissionNode):
             on_failure=self.note,
         )
 
-    def dock_at(self, station: Station, dock_type: str) -> Behaviour:
+    def dock_at(self, station: Station, dock_type: str) -> TreeNode:
         """Dock at a station; `tote` centres the robot on the tote there, `table` on the plan's point."""
         docked = station.face @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
         return CallAction(
@@ -149,52 +148,52 @@ class MobileManipulationNode(MissionNode):
             on_failure=self.note,
         )
 
-    def undock_from(self, dock_type: str) -> Behaviour:
+    def undock_from(self, dock_type: str) -> TreeNode:
         """Back off to the staging distance."""
         goal = new(UndockRobot.Goal, dock_type=dock_type)
         return CallAction("Undock", self._undock, lambda: goal, on_failure=self.note)
 
     # Looking
 
-    def start_looking(self) -> Behaviour:
+    def start_looking(self) -> TreeNode:
         """Switch the detection of totes on."""
         return self._detect("StartLooking", True)
 
-    def stop_looking(self) -> Behaviour:
+    def stop_looking(self) -> TreeNode:
         """Switch the detection of totes off."""
         return self._detect("StopLooking", False)
 
-    def _detect(self, name: str, enabled: bool) -> Behaviour:
+    def _detect(self, name: str, enabled: bool) -> TreeNode:
         return CallService(name, self._detector, lambda: SetBool.Request(data=enabled))
 
-    def look(self) -> Behaviour:
+    def look(self) -> TreeNode:
         """Wait for fresh detections of the tote ahead."""
         return _Look(self)
 
     # The arm
 
-    def move_to_height(self, name: str, z: float, *, loaded: bool = False) -> Behaviour:
+    def move_to_height(self, name: str, z: float, *, loaded: bool = False) -> TreeNode:
         """Bring the grasp frame to height z [m]."""
         config = self._arm.config
         return self.move(name, lambda: {config.lift_joint: z - config.grasp_z}, loaded=loaded)
 
-    def retract(self, *, loaded: bool = False) -> Behaviour:
+    def retract(self, *, loaded: bool = False) -> TreeNode:
         """Bring the gripper back over the deck."""
         config = self._arm.config
         target = {config.extension_joint: 0.0, config.wrist_joint: 0.0}
         return self.move("Retract", lambda: target, loaded=loaded)
 
-    def stow(self, z: float) -> Behaviour:
+    def stow(self, z: float) -> TreeNode:
         """Retract the arm and bring the grasp frame to height z [m]."""
         config = self._arm.config
         target = {config.extension_joint: 0.0, config.wrist_joint: 0.0, config.lift_joint: z - config.grasp_z}
         return self.move("Stow", lambda: target)
 
-    def reach(self, name: str, x: float, z: float, *, loaded: bool = False) -> Behaviour:
+    def reach(self, name: str, x: float, z: float, *, loaded: bool = False) -> TreeNode:
         """Bring the grasp frame to x, z [m] in the base frame, straight ahead."""
         return self.move(name, lambda: self._arm.inverse(GraspPose(x=x, z=z)), loaded=loaded)
 
-    def reach_for_tote(self, z: float, depth: float) -> Behaviour:
+    def reach_for_tote(self, z: float, depth: float) -> TreeNode:
         """Bring the grasp frame to the middle, `depth` / 2 [m] behind the face, of the tote that was seen."""
 
         def target() -> dict[str, float]:
@@ -203,7 +202,7 @@ class MobileManipulationNode(MissionNode):
 
         return self.move("ReachForTote", target)
 
-    def move(self, name: str, target: Callable[[], dict[str, float]], *, loaded: bool = False) -> Behaviour:
+    def move(self, name: str, target: Callable[[], dict[str, float]], *, loaded: bool = False) -> TreeNode:
         """Move joints to `target()`; fails, saying why, where a joint cannot."""
 
         def goal() -> Any | None:
@@ -233,7 +232,7 @@ class MobileManipulationNode(MissionNode):
 
     # The gripper
 
-    def open_gripper(self) -> Behaviour:
+    def open_gripper(self) -> TreeNode:
         """Open the fingers fully."""
         return CallAction(
             "OpenGripper",
@@ -242,7 +241,7 @@ class MobileManipulationNode(MissionNode):
             on_failure=self.note,
         )
 
-    def close_on(self, width: float) -> Behaviour:
+    def close_on(self, width: float) -> TreeNode:
         """Close the fingers; fails unless they stall on something of this width [m]."""
 
         def judge(result: Any) -> str | None:
@@ -259,7 +258,7 @@ class MobileManipulationNode(MissionNode):
             on_failure=self.note,
         )
 
-    def holding(self, what: str, width: float) -> Behaviour:
+    def holding(self, what: str, width: float) -> TreeNode:
         """Succeeds while the fingers are held apart by something of this width [m]."""
 
         def held() -> bool:
@@ -276,14 +275,14 @@ class MobileManipulationNode(MissionNode):
         return new(GripperCommand.Goal, command=command)
 
 
-class _Look(Behaviour):
+class _Look(MissionLeaf):
     """Waits for detections made after it began."""
 
     def __init__(self, robot: MobileManipulationNode) -> None:
         super().__init__("Look")
         self._robot = robot
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         """Forget what was seen on the way."""
         self._robot._totes.clear()
         self._deadline = self._robot.node.now_ns + self._robot.skills.look_timeout_ns

@@ -487,7 +487,7 @@ def test_a_battery_that_is_charged_tells_that_it_docked(bench: Bench) -> None:
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_a_detector_of_somebody_else_tells_where_the_dock_is(bench: Bench, lost: bool) -> None:
-    charger = Charger(bench, DockType(detection="topic"))
+    charger = Charger(bench, DockType(use_external_detection_pose=True))
     at = Pose2(2.0, 0.03, 0.0)
 
     def detect() -> None:

@@ -17,7 +17,6 @@ from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Sample
 from twin.geometry import Array, Pose2, Pose3, wrap_angle
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
-from twin.navigation.warm_up import warm_up
 from twin.runtime.build import build
 from twin.runtime.robot_stack import RobotStack
 from twin.runtime.run import Run
@@ -74,7 +73,6 @@ def opened(
     )
     parts = build(scenario, taps=[] if tap is None else [tap])
     try:
-        warm_up()
         yield Bench(Run(scenario, parts), parts.stacks[ROBOT])
     finally:
         parts.bus.close()

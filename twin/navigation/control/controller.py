@@ -15,8 +15,14 @@ class Controller(Protocol):
     """Its parameters, frozen; see `configure`."""
     carrot: tuple[float, float] | None
     """The point that the last command steered for, in the path's frame [m]; None if it steers for none."""
-    trajectory: Array | None
-    """Where the last command begins to lead, in the path's frame: shape (n, 3); None if it plans none."""
+
+    @property
+    def trajectory(self) -> Array | None:
+        """Where the last command begins to lead, in the path's frame: shape (n, 3); None if it plans none."""
+
+    @property
+    def candidates(self) -> Array | None:
+        """Some of the ways it chose from, in the path's frame, shape (n, m, 2) [m]; None: there were none."""
 
     @property
     def max_speed(self) -> float:

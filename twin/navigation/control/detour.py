@@ -6,10 +6,13 @@ away from it, and the robot stays where it is. A search over the local costmap k
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2
+from twin.navigation._jit import fast_jit
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.failures import PlanningFailure
@@ -104,8 +107,18 @@ def _next_free(costmap: Costmap, points: Array) -> int | None:
 
 def free_points(costmap: Costmap, points: Array) -> NDArray[np.bool_]:
     """Return which points, shape (n, 2) [m], are neither inscribed nor lethal; off the map all are free."""
-    height, width = costmap.costs.shape
-    cells = np.floor((points - costmap.origin) / costmap.resolution).astype(np.int64)
-    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-    costs = costmap.costs[np.where(inside, cells[:, 1], 0), np.where(inside, cells[:, 0], 0)]
-    return ~inside | (costs < INSCRIBED_INFLATED_OBSTACLE) | (costs == NO_INFORMATION)
+    return _free(costmap.costs, points, *costmap.frame)
+
+
+@fast_jit
+def _free(
+    costs: NDArray[np.uint8], points: Array, x0: float, y0: float, resolution: float
+) -> NDArray[np.bool_]:
+    height, width = costs.shape
+    free = np.ones(points.shape[0], dtype=np.bool_)
+    for i in range(points.shape[0]):
+        u, v = math.floor((points[i, 0] - x0) / resolution), math.floor((points[i, 1] - y0) / resolution)
+        if 0 <= u < width and 0 <= v < height:
+            cost = costs[v, u]
+            free[i] = cost < INSCRIBED_INFLATED_OBSTACLE or cost == NO_INFORMATION
+    return free

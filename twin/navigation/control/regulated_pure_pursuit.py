@@ -108,6 +108,8 @@ class RegulatedPurePursuit:
     """The lookahead point of the last command, in the path's frame [m]."""
     trajectory: Array | None = field(init=False, default=None)
     """None: it plans none."""
+    candidates: None = field(init=False, default=None)
+    """It shows none."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")

@@ -59,12 +59,20 @@ class RotationShim:
     """Shape (n, 2) [m]."""
     carrot: tuple[float, float] | None = field(init=False, default=None)
     """The point of the path that the robot turns to, or that the primary controller steers for."""
-    trajectory: Array | None = field(init=False, default=None)
-    """That of the primary controller."""
 
     def __post_init__(self) -> None:
         self._tolerance = 0.0
         self._begin()
+
+    @property
+    def trajectory(self) -> Array | None:
+        """That of the primary controller, while it drives."""
+        return self.primary.trajectory if self._driving else None
+
+    @property
+    def candidates(self) -> Array | None:
+        """Those of the primary controller, while it drives."""
+        return self.primary.candidates if self._driving else None
 
     @property
     def reverses(self) -> bool:
@@ -97,7 +105,7 @@ class RotationShim:
         self._aligned = False
         self._at_goal = False
         self._last_w: float | None = None
-        self.carrot, self.trajectory = None, None
+        self.carrot, self._driving = None, False
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Pass the limit [m/s] on."""
@@ -138,9 +146,9 @@ class RotationShim:
             command = self.primary.compute_velocity(
                 pose, velocity, path, costmap, dt, costmap_pose=costmap_pose
             )
-            self.carrot, self.trajectory = self.primary.carrot, self.primary.trajectory
+            self.carrot, self._driving = self.primary.carrot, True
         else:
-            command, self.trajectory = (0.0, w), None
+            command, self._driving = (0.0, w), False
         self._last_w = command[1]
         return command
 

@@ -60,7 +60,9 @@ def _gaps(
         for k in range(run.size):
             run[k] = 0 if line[k] == 254 else min(run[k] + 1, far)
         if y >= y0:
-            gaps[y - y0] = run
+            row = gaps[y - y0]
+            for k in range(run.size):
+                row[k] = run[k]
     run[:] = far
     for i in range(above - y0):
         y = above - 1 - i

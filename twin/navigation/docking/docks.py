@@ -9,7 +9,7 @@ from types import MappingProxyType
 from twin.errors import nearest
 from twin.geometry import Pose2
 
-DETECTIONS = ("none", "topic", "face", "tote")
+DETECTIONS = ("none", "face", "tote")
 DOCK_NOT_IN_DB, DOCK_NOT_VALID = 901, 902
 
 
@@ -20,8 +20,9 @@ class DockType:
     is_charger: bool = False
     """Whether docking ends only when the battery is charged."""
     detection: str = "face"
-    """Where the dock is: by the map alone (none), by `detected_dock_pose` (topic), by a line in the scan
-    (face), by the scan and the tote there (tote)."""
+    """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a tote)."""
+    use_external_detection_pose: bool = False
+    """Whether `detected_dock_pose` tells instead."""
     face_width: float = 0.0
     """Of a box whose edges tell where its middle is [m]; 0: its middle is where the map says."""
     external_detection_timeout: float = 1.0

@@ -225,8 +225,9 @@ def search(
             if unused == capacity:
                 more_following = np.empty(2 * capacity, np.int32)
                 more_cell, more_g = np.empty(2 * capacity, np.int32), np.empty(2 * capacity, np.float64)
-                more_following[:capacity] = following
-                more_cell[:capacity], more_g[:capacity] = entry_cell, entry_g
+                for i in range(capacity):
+                    more_following[i] = following[i]
+                    more_cell[i], more_g[i] = entry_cell[i], entry_g[i]
                 for i in range(capacity, 2 * capacity):
                     more_following[i] = i + 1
                 following, entry_cell, entry_g = more_following, more_cell, more_g

@@ -30,6 +30,7 @@ from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.localisation.amcl import Amcl, Estimate
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.input_watch import InputWatch
+from twin.navigation.warm_up import warm_up_localisation
 from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.navigation.amcl_status import amcl_status
 from twin.nodes.navigation.map_server import occupancy_map
@@ -113,6 +114,7 @@ class AmclNode:
         namespace: str = "",
     ) -> None:
         self.node = node = bus.create_node("amcl", namespace)
+        warm_up_localisation()
         self.config = config = config or AmclNodeConfig()
         self._filter_config = filter_config
         if initial is None and config.set_initial_pose:

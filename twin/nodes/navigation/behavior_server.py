@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
 
+from twin.navigation.warm_up import warm_up_behaviors
 from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
@@ -55,6 +56,7 @@ class BehaviorServerNode:
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("behavior_server", namespace)
+        warm_up_behaviors()
         self.config = config
         self._robot_pose = robot_pose
         self._costmap = costmap

@@ -19,6 +19,7 @@ from twin.navigation.control.collision_monitor import (
     CollisionMonitor,
     CollisionMonitorConfig,
 )
+from twin.navigation.warm_up import warm_up_collision_monitor
 from twin.nodes.navigation.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.scan_input import ScanInput
@@ -45,6 +46,7 @@ class CollisionMonitorNode:
         namespace: str = "",
     ) -> None:
         self.node = node = bus.create_node("collision_monitor", namespace)
+        warm_up_collision_monitor()
         self.monitor = CollisionMonitor(footprint=footprint, config=config or CollisionMonitorConfig())
         declare_config(node, self.monitor.config, self._reconfigure)
         self._robot_pose = robot_pose

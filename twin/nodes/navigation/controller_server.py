@@ -12,7 +12,7 @@ from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
+from twin.bridge.msgs import MarkerArray, Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker, GoalCheckerConfig, PositionGoalCheckerConfig
@@ -29,6 +29,7 @@ from twin.navigation.failures import ControlFailure, NoValidControl
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.trajectory_markers import trajectory_markers
 from twin.nodes.node_parameters import declare_config
 
 P = TypeVar("P")
@@ -125,6 +126,7 @@ class ControllerServerNode:
         self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
         self._optimal = node.create_publisher(Path, "optimal_path", 1)
+        self._trajectories = node.create_publisher(MarkerArray, "trajectories", 1)
         node.create_subscription(Odometry, "odom", self._on_odom, 1)
         node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
         ActionServer(node, FollowPath, "follow_path", self._execute)
@@ -270,8 +272,10 @@ class ControllerServerNode:
             self._lookahead.publish(PointStamped(header=header(now, frame), point=Point(x=x, y=y, z=0.0)))
         if self._plan.has_subscribers:
             self._plan.publish(path_msg(ahead, frame, now))
-        if controller.trajectory is not None and self._optimal.has_subscribers:
-            self._optimal.publish(path_msg(controller.trajectory, frame, now))
+        if self._optimal.has_subscribers and (trajectory := controller.trajectory) is not None:
+            self._optimal.publish(path_msg(trajectory, frame, now))
+        if self._trajectories.has_subscribers and (candidates := controller.candidates) is not None:
+            self._trajectories.publish(trajectory_markers(candidates, controller.trajectory, frame, now))
 
 
 def _chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:

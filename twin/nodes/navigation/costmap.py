@@ -14,6 +14,7 @@ from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.warm_up import warm_up_costmap, warm_up_ranges
 from twin.nodes.navigation.costmap_filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, polygon_msg
 from twin.nodes.navigation.costmap_services import CostmapServices
@@ -66,6 +67,9 @@ class CostmapNode:
     ) -> None:
         self.node = node = bus.create_node(config.name, f"{namespace}/{config.name}")
         self.config = config
+        warm_up_costmap()
+        if config.range_topics:
+            warm_up_ranges()
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scan: LaserScan | None = None

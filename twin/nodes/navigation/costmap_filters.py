@@ -24,6 +24,7 @@ from twin.navigation.costmaps.filters import (
 from twin.navigation.costmaps.filters import SpeedLimit as Limit
 from twin.navigation.costmaps.layered_costmap import LayeredCostmap
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.warm_up import warm_up_keepout
 from twin.nodes.navigation.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 
@@ -78,6 +79,7 @@ class KeepoutFilterPart:
     def __init__(
         self, node: Node, pose: RobotPose, frame: str, info_topic: str, config: KeepoutConfig
     ) -> None:
+        warm_up_keepout()
         self._pose, self._frame, self._config = pose, frame, config
         self._filter: KeepoutFilter | None = None
         self._mask_frame = frame

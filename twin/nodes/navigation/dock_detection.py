@@ -33,7 +33,7 @@ class DockDetection:
         """Look for the dock at which the base would stand at `docked`, in the odom frame."""
         self._type, self._expected = type_, docked
         self._estimate = None
-        if type_.detection in ("face", "tote"):
+        if type_.detection != "none" and not type_.use_external_detection_pose:
             face = docked @ type_.T_detected_docked.inverse()
             self._estimate = DockEstimate(
                 face,
@@ -49,11 +49,11 @@ class DockDetection:
 
     def docked(self) -> Pose2 | None:
         """Return where the base stands when docked, in the odom frame; None while the dock is not seen."""
-        if self._type.detection == "none":
+        if self._type.use_external_detection_pose:
+            return self._from_topic()
+        if self._estimate is None:
             return self._expected
-        if self._estimate is not None:
-            return self._estimate.face @ self._type.T_detected_docked if self._estimate.seen else None
-        return self._from_topic()
+        return self._estimate.face @ self._type.T_detected_docked if self._estimate.seen else None
 
     @property
     def lacks(self) -> str:

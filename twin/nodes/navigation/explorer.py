@@ -14,6 +14,7 @@ from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.navigation.exploration.explorer import Explorer, ExplorerConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.warm_up import warm_up_exploration
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.frontier_markers import frontier_markers
 from twin.nodes.navigation.map_server import occupancy_map
@@ -51,6 +52,7 @@ class ExplorerNode:
     ) -> None:
         self.node = node = bus.create_node("explore", namespace)
         self.config = config or ExplorerNodeConfig()
+        warm_up_exploration()
         self.explorer = Explorer(self.config.explorer)
         self.done = False
         """Whether nothing is left to explore, and the robot is back where it was to return."""

@@ -22,6 +22,7 @@ from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
+from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -89,6 +90,7 @@ class PlannerServerNode:
         self._last: tuple[Pose2, Array] | None = None
         """The goal of the last leg, and its path."""
         self._asked: tuple[Pose2, Pose2] | None = None
+        warm_up_planning()
         parameters = PlannerParameters(
             planner_plugins=tuple(self._configs),
             server=server or PlannerServerConfig(),

@@ -36,6 +36,8 @@ class DWB:
     """The end of the local path, in the path's frame [m]."""
     trajectory: Array | None = field(init=False, default=None)
     """Present pose and end of the best sample, in the path's frame: shape (2, 3)."""
+    candidates: None = field(init=False, default=None)
+    """It shows none."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")

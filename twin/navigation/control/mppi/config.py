@@ -160,6 +160,16 @@ class SpeedCriticConfig(CriticConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
+class TrajectoryVisualizerConfig:
+    """What `/trajectories` shows to those who listen."""
+
+    trajectory_step: int = 5
+    """Every so many rollouts."""
+    time_step: int = 3
+    """At every so many of their steps."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MPPIConfig:
     """Parameters of the optimizer, by the critics' names those of the critics."""
 
@@ -215,7 +225,7 @@ class MPPIConfig:
     inversion_yaw_tolerance: float = 0.4
     """[rad]"""
     detours: bool = True
-    """Whether a way around is searched and followed where the path is blocked; not Nav2's."""
+    """Whether a way around what stands on the path is searched in the costmap and followed; not Nav2's."""
     max_robot_pose_search_dist: float = 3.0
     """How far along the path the nearest pose is searched each time [m]."""
     seed: int = 0
@@ -234,6 +244,10 @@ class MPPIConfig:
     TwirlingCritic: TwirlingCriticConfig = field(default_factory=TwirlingCriticConfig)
     VelocityDeadbandCritic: VelocityDeadbandCriticConfig = field(default_factory=VelocityDeadbandCriticConfig)
     SpeedCritic: SpeedCriticConfig = field(default_factory=SpeedCriticConfig)
+
+    visualize: bool = True
+    """Whether `/trajectories` is published when somebody listens; Nav2's default is False."""
+    TrajectoryVisualizer: TrajectoryVisualizerConfig = field(default_factory=TrajectoryVisualizerConfig)
 
     def scores(self, name: str) -> bool:
         """Return whether the critic of this name is listed and enabled."""

@@ -13,22 +13,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Array, Pose2
 from twin.navigation.control.detour import DetouringPathHandler, free_points
 from twin.navigation.control.footprint_cover import FootprintCover
 from twin.navigation.control.mppi import kernels
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.noise import NoiseBank
-from twin.navigation.control.mppi.path_critics import (
-    follow_target,
-    score_align,
-    score_angle,
-    score_follow,
-)
 from twin.navigation.control.mppi.pursuit import pursue
-from twin.navigation.control.mppi.scene import Scene
-from twin.navigation.control.mppi.scoring import cost_tables, total
+from twin.navigation.control.mppi.rollouts import Rollouts
+from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
+from twin.navigation.control.mppi.scoring import CostTables
 from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import NoValidControl
@@ -52,12 +47,28 @@ class MPPI:
     """Shape (n, 2) [m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
     carrot: tuple[float, float] | None = field(init=False, default=None)
     """The pose of the path that the rollouts are drawn to, in the path's frame [m]."""
-    trajectory: Array | None = field(init=False, default=None)
-    """What the last command is the beginning of, in the path's frame: shape (time_steps, 3)."""
 
     def __post_init__(self) -> None:
         self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
         self.configure(self.config)
+
+    @property
+    def trajectory(self) -> Array | None:
+        """What the last command is the beginning of, in the path's frame: shape (time_steps, 3)."""
+        if self._scene is None:
+            return None
+        back = self._scene.to_grid.inverse()
+        return np.column_stack([back.apply(self._leads[:, :2]), self._leads[:, 2] + back.yaw])
+
+    @property
+    def candidates(self) -> Array | None:
+        """Some of the rollouts of the last command, in the path's frame: shape (n, m, 2) [m]."""
+        if self._scene is None or not self.config.visualize:
+            return None
+        shown = self.config.TrajectoryVisualizer
+        return self._scene.to_grid.inverse().apply(
+            self._rollouts.every(shown.trajectory_step, shown.time_step)
+        )
 
     @property
     def max_speed(self) -> float:
@@ -74,16 +85,9 @@ class MPPI:
         self.config = config
         self._noise = NoiseBank(config)
         self._limit: float | None = None
-        steps, batch = config.time_steps, config.batch_size
-        self._state = np.zeros((8, batch), dtype=np.float32)
-        self._points = np.zeros((3, steps, batch), dtype=np.float32)
-        self._raw = np.zeros((kernels.CRITIC_COUNT, batch), dtype=np.float32)
-        self._hit = np.zeros(batch, dtype=np.uint8)
-        self._total = np.zeros(batch, dtype=np.float32)
-        self._leads = np.zeros((steps, 3))
-        self._delays = np.array(
-            [round(config.model_delay_vx / config.model_dt), round(config.model_delay_wz / config.model_dt)]
-        )
+        self._rollouts = Rollouts(config)
+        self._tables = CostTables(config)
+        self._leads = np.zeros((config.time_steps, 3))
         self._cover: tuple[tuple[float, ...], FootprintCover] | None = None
         self._handler = DetouringPathHandler(
             PathHandlerConfig(
@@ -100,11 +104,12 @@ class MPPI:
     def reset(self) -> None:
         """Forget the path, and the controls found for it."""
         self._handler.reset()
-        self.carrot, self.trajectory = None, None
+        self.carrot = None
+        self._scene: Scene | None = None
         self._forget_controls()
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Drive no faster than `limit` [m/s]; None lifts the limit. As in Nav2, turning is slowed as much."""
+        """Drive no faster than `limit` [m/s]; None lifts the limit."""
         self._limit = limit
 
     def set_goal_tolerance(self, xy: float) -> None:
@@ -131,17 +136,17 @@ class MPPI:
             NoValidControl: every rollout collides, also after a start from rest.
         """
         self._handler.accept(path)
-        scene = self._scene(pose, velocity, costmap, costmap_pose or pose, dt)
+        scene = self._look(pose, velocity, costmap, costmap_pose or pose, dt)
         for _ in range(self.config.retry_attempt_limit + 1):
             if self._optimize(scene, dt):
                 break
             self._forget_controls()
         else:
-            self.trajectory = None
+            self._scene = None
             raise NoValidControl(f"all {self.config.batch_size} rollouts of MPPI collide")
         command = float(self._mean[0, 0]), float(self._mean[1, 0])
         self._remember(command)
-        self.trajectory = self._in_path_frame(self._leads, pose, costmap_pose or pose, scene)
+        self._scene = scene
         self._shift(dt)
         return command
 
@@ -150,50 +155,33 @@ class MPPI:
     def _forget_controls(self) -> None:
         self._mean = np.zeros((2, self.config.time_steps), dtype=np.float32)
         self._sent = deque([(0.0, 0.0)] * 4, maxlen=4)
-        self._under_way = np.zeros((2, max(1, int(self._delays.max()))), dtype=np.float32)
+        self._under_way = np.zeros((2, max(1, int(self._rollouts.delays.max()))), dtype=np.float32)
         self._last: tuple[float, float] | None = None
         self._noise.reset()
 
-    @property
-    def _limits(self) -> F32:
-        """vx_max, vx_min, wz_max, ax_max, ax_min, az_max, least turning radius."""
-        config = self.config
-        ratio = 1.0 if self._limit is None else min(1.0, max(0.0, self._limit) / config.vx_max)
-        radius = config.min_turning_r if config.motion_model == "Ackermann" else 0.0
-        speeds = [config.vx_max * ratio, config.vx_min * ratio, config.wz_max * ratio]
-        return np.array([*speeds, config.ax_max, config.ax_min, config.az_max, radius], dtype=np.float32)
-
-    def _scene(
+    def _look(
         self, pose: Pose2, velocity: tuple[float, float], costmap: Costmap | None, at: Pose2, dt: float
     ) -> Scene:
         local = self._handler.local(pose, costmap, at)
-        grid = costmap or _NO_COSTMAP
-        to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw)
-        turn = wrap_angle(at.yaw - pose.yaw)
-        points = to_grid.apply(pose.inverse().apply(local.poses[:, :2]))
-        path = np.array([points[:, 0], points[:, 1], local.poses[:, 2] + turn], dtype=np.float32)
+        grid, limits = costmap or _NO_COSTMAP, limits_of(self.config, self._limit)
+        to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw) @ pose.inverse()
+        points = to_grid.apply(local.poses[:, :2])
+        path = np.array([points[:, 0], points[:, 1], local.poses[:, 2] + to_grid.yaw], dtype=np.float32)
         step = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
-        v, w = self._expected(velocity, dt)
+        near_goal = local.ends_at_goal and local.length < self.config.CostCritic.near_goal_distance
+        v, w = expected_speed(self.config, velocity, self._last, dt)
         return Scene(
-            start=np.array([*to_grid, v, w], dtype=np.float32),
+            start=np.array([*to_grid.apply(pose[:2]), at.yaw, v, w], dtype=np.float32),
             path=path,
             along=np.concatenate([[0.0], np.cumsum(step)]).astype(np.float32),
             valid=free_points(grid, points + grid.origin),
             local=local,
             costmap=grid,
+            limits=limits,
+            tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits[0])),
+            to_grid=to_grid,
             cover=self._cover_for(grid),
         )
-
-    def _expected(self, velocity: tuple[float, float], dt: float) -> tuple[float, float]:
-        """Return the speed one period from now: towards the last command, as far as the limits let it."""
-        config = self.config
-        if self._last is None:
-            return velocity
-        if config.open_loop:
-            return self._last
-        v = min(max(self._last[0], velocity[0] + dt * config.ax_min), velocity[0] + dt * config.ax_max)
-        w = min(max(self._last[1], velocity[1] - dt * config.az_max), velocity[1] + dt * config.az_max)
-        return v, w
 
     def _cover_for(self, costmap: Costmap) -> FootprintCover:
         key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
@@ -214,21 +202,26 @@ class MPPI:
 
     def _optimize(self, scene: Scene, dt: float) -> bool:
         """Improve the controls; return False if nothing is left that does not collide."""
-        tables = self._tables(scene)
-        pursuit = self._pursuit(scene, tables[2])
+        pursuit = self._pursuit(scene)
         for _ in range(self.config.iteration_count):
             noise = self._noise.draw()
             noise[:, :, 0] = 0.0
             noise[:, :, 1] = -self._mean
             noise[:, :, 2] = pursuit - self._mean
-            self._roll_out(scene, noise, tables)
-            if self._hit.all():
+            self._rollouts.simulate(scene, noise, self._mean, self._under_way)
+            if self._rollouts.hit.all():
                 return False
-            self._score(scene)
+            at = self._rollouts.score(scene)
+            self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
             before = self._mean.copy()
             config = self.config
             best = kernels.average(
-                noise, self._mean, self._total, self._noise.gains, np.float32(config.temperature), _EXACT
+                noise,
+                self._mean,
+                self._rollouts.total,
+                self._noise.gains,
+                np.float32(config.temperature),
+                _EXACT,
             )
             self._smooth()
             self._constrain(scene, dt)
@@ -240,79 +233,21 @@ class MPPI:
                     return False
         return True
 
-    def _tables(self, scene: Scene) -> F32:
-        near = scene.local.ends_at_goal and scene.local.length < self.config.CostCritic.near_goal_distance
-        limit = float(self._limits[0])
-        return cost_tables(self.config, scene.costmap, near_goal=near, vx_max=limit)
-
-    def _pursuit(self, scene: Scene, allowed: F32) -> F32:
+    def _pursuit(self, scene: Scene) -> F32:
         controls = np.zeros_like(self._mean)
         pursue(
             scene.path,
             scene.along,
             scene.start,
-            self._limits,
+            scene.limits,
             np.float32(self.config.model_dt),
             scene.costmap.costs,
             np.float32(1.0 / scene.costmap.resolution),
-            allowed,
+            scene.tables[2],
             scene.local.reversing and self.reverses,
             controls,
         )
         return controls
-
-    def _roll_out(self, scene: Scene, noise: F32, tables: F32) -> None:
-        config, local = self.config, scene.local
-        limits = self._limits
-        goal, angle = config.GoalCritic, config.GoalAngleCritic
-        near = [
-            config.scores("GoalCritic") and local.length <= goal.threshold_to_consider,
-            config.scores("GoalAngleCritic") and local.length <= angle.threshold_to_consider,
-            angle.symmetric_yaw_tolerance,
-        ]
-        dead = config.VelocityDeadbandCritic.deadband_velocities
-        if not config.scores("VelocityDeadbandCritic"):
-            dead = (0.0, 0.0, 0.0)
-        kernels.roll_out(
-            noise,
-            self._mean,
-            self._under_way,
-            self._delays,
-            scene.start,
-            limits,
-            np.float32(config.model_dt),
-            scene.costmap.costs,
-            np.float32(1.0 / scene.costmap.resolution),
-            tables,
-            np.array([config.CostCritic.trajectory_point_step, *scene.cover.costs]),
-            scene.cover.circles,
-            scene.cover.outline,
-            scene.cover.padded,
-            np.float32(config.CostCritic.critical_cost),
-            np.array([*scene.path[:, -1], *near, local.length], dtype=np.float32),
-            np.array([config.scores("TwirlingCritic"), dead[0], dead[2]], dtype=np.float32),
-            self._state,
-            self._points,
-            self._raw,
-            self._hit,
-        )
-
-    def _score(self, scene: Scene) -> None:
-        config, length, raw = self.config, scene.local.length, self._raw
-        stride = max(1, config.batch_size // 256)
-        furthest = kernels.furthest_reached(self._state, scene.path, scene.along, stride)
-        at = follow_target(config, scene, furthest)
-        self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
-        active = {
-            "GoalCritic": length <= config.GoalCritic.threshold_to_consider,
-            "GoalAngleCritic": length <= config.GoalAngleCritic.threshold_to_consider,
-            "PathAlignCritic": score_align(config, scene, furthest, self._points, raw),
-            "PathFollowCritic": score_follow(config, scene, at, self._state, raw),
-            "PathAngleCritic": score_angle(config, scene, furthest, self._state, raw),
-            "PreferForwardCritic": length >= config.PreferForwardCritic.threshold_to_consider
-            and not scene.local.reversing,
-        }
-        total(config, raw, self._hit, active, self._total)
 
     # The controls
 
@@ -325,8 +260,10 @@ class MPPI:
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)
-        kernels.constrain(self._mean, scene.start, self._limits, np.float32(dt), model_dt)
-        kernels.simulate(self._mean, self._under_way, self._delays, scene.start, model_dt, self._leads)
+        kernels.constrain(self._mean, scene.start, scene.limits, np.float32(dt), model_dt)
+        kernels.simulate(
+            self._mean, self._under_way, self._rollouts.delays, scene.start, model_dt, self._leads
+        )
 
     def _collides(self, scene: Scene) -> bool:
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
@@ -347,17 +284,14 @@ class MPPI:
     def _remember(self, command: tuple[float, float]) -> None:
         self._last = command
         self._sent.append(command)
-        self._under_way = np.roll(self._under_way, -1, axis=1)
+        self._under_way[:, :-1] = self._under_way[:, 1:]
         self._under_way[:, -1] = command
 
     def _shift(self, dt: float) -> None:
         """Move the controls on by one control period; Nav2 asks for a period of model_dt for that."""
+        if abs(dt - self.config.model_dt) < 1e-6:
+            self._mean[:, :-1] = self._mean[:, 1:]
+            return
         steps = np.arange(self.config.time_steps, dtype=np.float64)
         at = np.minimum(steps + dt / self.config.model_dt, steps[-1])
         self._mean = np.stack([np.interp(at, steps, axis) for axis in self._mean]).astype(np.float32)
-
-    def _in_path_frame(self, trajectory: Array, pose: Pose2, at: Pose2, scene: Scene) -> Array:
-        points = trajectory.copy()
-        points[:, :2] = pose.apply(at.inverse().apply(points[:, :2] + scene.costmap.origin))
-        points[:, 2] += pose.yaw - at.yaw
-        return points

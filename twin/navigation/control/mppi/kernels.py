@@ -290,6 +290,7 @@ def align_to_path(
     segments: int,
     step: int,
     orientations: bool,
+    hit: NDArray[np.uint8],
     raw: F32,
 ) -> None:
     """Score PathAlignCritic: mean distance to the pose as far along the path as the rollout has come.
@@ -303,12 +304,16 @@ def align_to_path(
         segments: Only poses before this one count.
         step: Every so many points of a rollout are looked at.
         orientations: Whether the difference in heading [rad] counts as a distance too.
+        hit: Which rollouts collide: they are lost anyway, and score nothing here.
         raw: Shape (CRITIC_COUNT, batch), written.
     """
     _, steps, batch = points.shape
     score = raw[ALIGN]
     turn, per_turn, half = np.float32(2.0 * math.pi), np.float32(0.5 / math.pi), np.float32(0.5)
     for k in range(batch):
+        score[k] = np.float32(0.0)
+        if hit[k] != 0:
+            continue
         px, py = start[0], start[1]
         gone, total = np.float32(0.0), np.float32(0.0)
         count, i = 0, 0
@@ -331,7 +336,32 @@ def align_to_path(
                     d2 += off * off
                 total += np.sqrt(d2)
                 count += 1
-        score[k] = total / np.float32(count) if count > 0 else np.float32(0.0)
+        if count > 0:
+            score[k] = total / np.float32(count)
+
+
+@fast_jit
+def weigh(raw: F32, terms: F32, hit: NDArray[np.uint8], collision: np.float32, out: F32) -> None:
+    """Write the sum of (weight * raw score)^power to `out`, shape (batch).
+
+    Args:
+        raw: Shape (CRITIC_COUNT, batch).
+        terms: Row of `raw`, weight and power of each critic, shape (3, n).
+        hit: Which rollouts collide, shape (batch).
+        collision: What these pay more.
+        out: Written.
+    """
+    batch = out.shape[0]
+    for k in range(batch):
+        out[k] = collision if hit[k] != 0 else np.float32(0.0)
+    for i in range(terms.shape[1]):
+        row, weight, power = raw[int(terms[0, i])], terms[1, i], int(terms[2, i])
+        if power == 1:
+            for k in range(batch):
+                out[k] += weight * row[k]
+        else:
+            for k in range(batch):
+                out[k] += (weight * row[k]) ** power
 
 
 @fast_jit
@@ -391,8 +421,8 @@ def first_collision(
             continue
         cost = int(costs[int(y), int(x)])
         if cost != 255 and cost >= check[1]:
-            c, s = np.cos(trajectory[t, 2]), np.sin(trajectory[t, 2])
-            if collides(costs, cost, circles, check[2], outline, x, y, c, s):
+            c, s = np.float32(np.cos(trajectory[t, 2])), np.float32(np.sin(trajectory[t, 2]))
+            if collides(costs, cost, circles, check[2], outline, np.float32(x), np.float32(y), c, s):
                 return t
     return -1
 
@@ -403,9 +433,11 @@ def smooth(mean: F32, past: F32, weights: F32) -> None:
     steps, side = mean.shape[1], weights.shape[0] // 2
     padded = np.empty(steps + 2 * side, dtype=np.float32)
     for axis in range(2):
-        padded[:side] = past[axis, past.shape[1] - side :]
-        padded[side : side + steps] = mean[axis]
-        padded[side + steps :] = mean[axis, steps - 1]
+        for t in range(side):
+            padded[t] = past[axis, past.shape[1] - side + t]
+            padded[side + steps + t] = mean[axis, steps - 1]
+        for t in range(steps):
+            padded[side + t] = mean[axis, t]
         for t in range(steps):
             total = np.float32(0.0)
             for i in range(weights.shape[0]):

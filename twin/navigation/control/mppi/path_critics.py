@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.geometry import wrap_angle
 from twin.navigation.control.mppi import kernels
@@ -13,7 +14,9 @@ from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.scene import Scene
 
 
-def score_align(config: MPPIConfig, scene: Scene, furthest: int, points: F32, raw: F32) -> bool:
+def score_align(
+    config: MPPIConfig, scene: Scene, furthest: int, points: F32, hit: NDArray[np.uint8], raw: F32
+) -> bool:
     """Score PathAlignCritic; return whether it counts now.
 
     Args:
@@ -21,6 +24,7 @@ def score_align(config: MPPIConfig, scene: Scene, furthest: int, points: F32, ra
         scene: With the local path.
         furthest: Its last pose that a rollout reaches.
         points: Of the rollouts, shape (3, time_steps, batch).
+        hit: Which of them collide, shape (batch).
         raw: Shape (CRITIC_COUNT, batch), written.
     """
     critic = config.PathAlignCritic
@@ -42,6 +46,7 @@ def score_align(config: MPPIConfig, scene: Scene, furthest: int, points: F32, ra
         furthest,
         critic.trajectory_point_step,
         critic.use_path_orientations,
+        hit,
         raw,
     )
     return True

@@ -56,7 +56,7 @@ def pursue(
             d = (path[0, j] - x) ** 2 + (path[1, j] - y) ** 2
             if d < nearest:
                 nearest, i = d, j
-        ahead, j = min(max(0.8 * abs(v), 0.3), 0.8), i
+        ahead, j = min(max(0.5 * abs(v), 0.25), 0.8), i
         while j < n - 1 and along[j] < along[i] + ahead:
             j += 1
         dx, dy = path[0, j] - x, path[1, j] - y

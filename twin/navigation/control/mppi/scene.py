@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.geometry import Pose2
 from twin.navigation.control.footprint_cover import FootprintCover
+from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.path_handler import LocalPath
 from twin.navigation.costmaps.costmap import Costmap
@@ -26,4 +28,31 @@ class Scene:
     """Which of its poses are free, shape (n)."""
     local: LocalPath
     costmap: Costmap
+    limits: F32
+    """vx_max, vx_min, wz_max, ax_max, ax_min, az_max, least turning radius."""
+    tables: F32
+    """Of the costs; see `scoring.cost_tables`."""
+    to_grid: Pose2
+    """From the path's frame to the costmap's corner."""
     cover: FootprintCover
+
+
+def limits_of(config: MPPIConfig, speed_limit: float | None) -> F32:
+    """Return `Scene.limits`, under a limit of speed [m/s]; as in Nav2, turning is slowed as much."""
+    ratio = 1.0 if speed_limit is None else min(1.0, max(0.0, speed_limit) / config.vx_max)
+    radius = config.min_turning_r if config.motion_model == "Ackermann" else 0.0
+    speeds = [config.vx_max * ratio, config.vx_min * ratio, config.wz_max * ratio]
+    return np.array([*speeds, config.ax_max, config.ax_min, config.az_max, radius], dtype=np.float32)
+
+
+def expected_speed(
+    config: MPPIConfig, velocity: tuple[float, float], last: tuple[float, float] | None, dt: float
+) -> tuple[float, float]:
+    """Return the speed one period from now: towards the last command, as far as the limits let it."""
+    if last is None:
+        return velocity
+    if config.open_loop:
+        return last
+    v = min(max(last[0], velocity[0] + dt * config.ax_min), velocity[0] + dt * config.ax_max)
+    w = min(max(last[1], velocity[1] - dt * config.az_max), velocity[1] + dt * config.az_max)
+    return v, w

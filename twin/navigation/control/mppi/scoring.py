@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.navigation.control.mppi import kernels
 from twin.navigation.control.mppi.config import MPPIConfig
@@ -47,26 +48,46 @@ def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max
     return tables.astype(np.float32)
 
 
-def total(config: MPPIConfig, raw: F32, hit: np.ndarray, active: dict[str, bool], out: F32) -> None:
-    """Write the weighted sum of the raw scores, shape (CRITIC_COUNT, batch), to `out`, shape (batch).
+class CostTables:
+    """`cost_tables`, kept until something that they depend on changes."""
 
-    Args:
-        config: Names, weights and powers of the critics.
-        raw: What the compiled loops found.
-        hit: Which rollouts collide: they get CostCritic's collision cost.
-        active: Critics that score now; others that are not named do too.
-        out: Written.
-    """
-    out[:] = 0.0
-    for name, row in ROWS.items():
-        critic = getattr(config, name)
-        if not config.scores(name) or not active.get(name, True):
-            continue
+    def __init__(self, config: MPPIConfig) -> None:
+        self._config = config
+        self._key: tuple[float, ...] | None = None
+        self._tables: F32 = np.zeros((3, 256), dtype=np.float32)
+
+    def of(self, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
+        """Return the tables; see `cost_tables`."""
+        key = (costmap.inscribed_radius, costmap.cost_scaling_factor, near_goal, vx_max)
+        if key != self._key:
+            self._key = key
+            self._tables = cost_tables(self._config, costmap, near_goal=near_goal, vx_max=vx_max)
+        return self._tables
+
+
+class Totals:
+    """The weighted sum of the critics that score."""
+
+    def __init__(self, config: MPPIConfig) -> None:
+        self._names = [
+            name for name in ROWS if config.scores(name) and getattr(config, name).cost_weight != 0.0
+        ]
+        critics = [getattr(config, name) for name in self._names]
+        rows = [ROWS[name] for name in self._names]
         # Nav2 weighs costs as fractions of 254.
-        weight = critic.cost_weight / 254.0 if name == "CostCritic" else critic.cost_weight
-        if critic.cost_power == 1:
-            out += np.float32(weight) * raw[row]
-        else:
-            out += (np.float32(weight) * raw[row]) ** critic.cost_power
-    if hit.any():
-        out[hit != 0] += np.float32(config.CostCritic.collision_cost)
+        weights = [critic.cost_weight / (254.0 if critic is config.CostCritic else 1.0) for critic in critics]
+        powers = [critic.cost_power for critic in critics]
+        self._terms = np.array([rows, weights, powers], dtype=np.float32)
+        self._collision = np.float32(config.CostCritic.collision_cost)
+
+    def write(self, raw: F32, hit: NDArray[np.uint8], active: dict[str, bool], out: F32) -> None:
+        """Write the weighted sum of the raw scores, shape (CRITIC_COUNT, batch), to `out`, shape (batch).
+
+        Args:
+            raw: What the compiled loops found.
+            hit: Which rollouts collide: they get CostCritic's collision cost.
+            active: Critics that score now; others that are not named do too.
+            out: Written.
+        """
+        terms = self._terms[:, [active.get(name, True) for name in self._names]]
+        kernels.weigh(raw, terms, hit, self._collision, out)

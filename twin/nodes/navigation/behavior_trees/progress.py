@@ -31,7 +31,7 @@ class Progress:
         self._nearest = 0
 
     def update(self, path: Path | None, pose: Pose2, now_ns: int) -> tuple[float, int]:
-        """Return how much of the path is left [m], and the time to go [ns]; 0 if unknown."""
+        """Return the length of path left [m], 0 without a path, and the time to go [ns], 0 if unknown."""
         self._poses.append((now_ns, pose))
         while len(self._poses) > 2 and self._poses[0][0] < now_ns - self._window_ns:
             self._poses.popleft()

@@ -1,18 +1,66 @@
-"""Leaves that do the work: call an action or a service, test a condition."""
+"""What missions are made of: leaves that call an action or a service, ask, or do; and how they are joined."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
-
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from twin.bridge.actions import ActionClient, ClientGoal
 from twin.bridge.services import Client, Future
+from twin.navigation.behavior_trees import sequences
+from twin.navigation.behavior_trees.blackboard import Blackboard
+from twin.navigation.behavior_trees.nav2_control import RecoveryNode
+from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeContext, TreeNode
 
 
-class CallAction(Behaviour):
+def sequence(name: str, children: Sequence[TreeNode]) -> TreeNode:
+    """Return a node that ticks its children one after the other, until one fails."""
+    return sequences.Sequence(_setup(name, *children))
+
+
+def with_recovery(name: str, retries: int, main: TreeNode, recovery: TreeNode) -> TreeNode:
+    """Return a node that, when `main` fails, runs `recovery` and tries again, at most `retries` times."""
+    return RecoveryNode(_setup(name, main, recovery, number_of_retries=str(retries)))
+
+
+def _setup(name: str, *children: TreeNode, **ports: str) -> NodeSetup:
+    """Return what a node of a mission is made with; none of them uses blackboard or clock."""
+    context = TreeContext(lambda: 0)
+    return NodeSetup(
+        name=name, uid=0, context=context, blackboard=Blackboard(), ports=ports, children=children
+    )
+
+
+class MissionLeaf(TreeNode):
+    """A leaf: `begin` is called when it starts, `update` at every tick."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(_setup(name))
+        self.reason = ""
+        """Why it failed."""
+
+    def begin(self) -> None:
+        """Start."""
+        return
+
+    def update(self) -> Status:
+        """Look how it is doing."""
+        raise NotImplementedError
+
+    def tick(self) -> Status:
+        """Begin if it does not run, and look."""
+        if self.status is not Status.RUNNING:
+            self.reason = ""
+            self.begin()
+        return self.update()
+
+    def fail(self, reason: str) -> Status:
+        """Fail for a reason."""
+        self.reason = reason
+        return Status.FAILURE
+
+
+class CallAction(MissionLeaf):
     """Sends a goal and waits for its result; cancels it when halted (Nav2's `BtActionNode`).
 
     Args:
@@ -39,7 +87,7 @@ class CallAction(Behaviour):
         self._on_failure = on_failure
         self._goal: ClientGoal | None = None
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         """Send the goal."""
         goal = self._make_goal()
         self._goal = None if goal is None else self._client.send_goal(goal)
@@ -47,35 +95,32 @@ class CallAction(Behaviour):
     def update(self) -> Status:
         """Look whether the result is there."""
         if self._goal is None:
-            self.feedback_message = "no goal could be made"
-            return Status.FAILURE
+            return self.fail("no goal could be made")
         if self._goal.accepted is False:
-            return self._fail(self._goal.error or f"{self._client.name} rejected the goal")
+            return self.fail(self._goal.error or f"{self._client.name} rejected the goal")
         if not self._goal.done:
             return Status.RUNNING
         if not self._goal.succeeded:
             text = getattr(self._goal.result, "error_msg", "") or getattr(
                 self._goal.result, "error_string", ""
             )
-            return self._fail(text or f"{self._client.name} was aborted")
+            return self.fail(text or f"{self._client.name} was aborted")
         reason = self._on_result(self._goal.result) if self._on_result else None
-        return Status.SUCCESS if reason is None else self._fail(reason)
+        return Status.SUCCESS if reason is None else self.fail(reason)
 
-    def terminate(self, new_status: Status) -> None:
-        """Cancel the goal when halted."""
-        if new_status == Status.INVALID and self._goal is not None and not self._goal.done:
+    def halt(self) -> None:
+        """Cancel the goal."""
+        if self._goal is not None and not self._goal.done:
             self._goal.cancel()
-        if new_status == Status.INVALID:
-            self._goal = None
 
-    def _fail(self, reason: str) -> Status:
-        self.feedback_message = reason
-        if self._on_failure is not None:
+    def fail(self, reason: str) -> Status:
+        """Fail, and tell the reason."""
+        if self._on_failure is not None and self._goal is not None:
             self._on_failure(f"{self.name}: {reason}")
-        return Status.FAILURE
+        return super().fail(reason)
 
 
-class CallService(Behaviour):
+class CallService(MissionLeaf):
     """Calls a service and waits for the answer (Nav2's `BtServiceNode`)."""
 
     def __init__(
@@ -91,7 +136,7 @@ class CallService(Behaviour):
         self._accept = accept
         self._future: Future | None = None
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         """Send the request."""
         self._future = self._client.call_async(self._request())
 
@@ -101,12 +146,11 @@ class CallService(Behaviour):
         if not self._future.done:
             return Status.RUNNING
         if self._future.error is not None:
-            self.feedback_message = self._future.error
-            return Status.FAILURE
+            return self.fail(self._future.error)
         return Status.SUCCESS if self._accept(self._future.result) else Status.FAILURE
 
 
-class Condition(Behaviour):
+class Condition(MissionLeaf):
     """Succeeds while `test` holds."""
 
     def __init__(self, name: str, test: Callable[[], bool]) -> None:
@@ -118,7 +162,7 @@ class Condition(Behaviour):
         return Status.SUCCESS if self._test() else Status.FAILURE
 
 
-class Do(Behaviour):
+class Do(MissionLeaf):
     """Does something that is over at once; a returned text is the reason why it failed."""
 
     def __init__(self, name: str, action: Callable[[], str | None]) -> None:
@@ -128,7 +172,4 @@ class Do(Behaviour):
     def update(self) -> Status:
         """Do it."""
         reason = self._action()
-        if reason is None:
-            return Status.SUCCESS
-        self.feedback_message = reason
-        return Status.FAILURE
+        return Status.SUCCESS if reason is None else self.fail(reason)

@@ -6,14 +6,14 @@ from collections.abc import Generator
 from typing import Any
 
 import pytest
-from py_trees.common import Status
 
 from tests.nodes.conftest import Bench
 from twin.bridge.action_types import Wait
 from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.msgs import GoalStatus, duration, new
 from twin.bridge.srvs import AddTwoInts
-from twin.nodes.navigation.bt.leaves import CallAction, CallService, Condition, Do
+from twin.navigation.behavior_trees.node import Status
+from twin.nodes.mission_leaves import CallAction, CallService, Condition, Do, sequence, with_recovery
 
 
 class Server:
@@ -60,7 +60,7 @@ def client(bench: Bench, server: Server) -> ActionClient:
 
 def finish(bench: Bench, leaf: Any, ticks: int = 40) -> Status:
     for _ in range(ticks):
-        leaf.tick_once()
+        leaf.execute_tick()
         if leaf.status != Status.RUNNING:
             break
         bench.tick()
@@ -72,7 +72,7 @@ def test_success_hands_the_result_over(bench: Bench, client: ActionClient) -> No
     leaf = CallAction(
         "leaf", client, lambda: goal(5), on_result=lambda r: got.append(r.total_elapsed_time.nanosec)
     )
-    leaf.tick_once()
+    leaf.execute_tick()
     assert leaf.status == Status.RUNNING
     assert finish(bench, leaf) == Status.SUCCESS
     assert got == [5]
@@ -122,7 +122,7 @@ def test_a_halt_cancels_the_goal_at_the_server(bench: Bench, client: ActionClien
     leaf = CallAction("leaf", client, lambda: goal(100))
     finish(bench, leaf, ticks=5)
     assert leaf.status == Status.RUNNING
-    leaf.stop(Status.INVALID)
+    leaf.reset()
     bench.run(0.2)
     assert server.log == ["start 100", "cancel 100"]
 
@@ -131,8 +131,8 @@ def test_a_halted_leaf_sends_a_new_goal_at_its_next_start(
     bench: Bench, client: ActionClient, server: Server
 ) -> None:
     leaf = CallAction("leaf", client, lambda: goal(3))
-    leaf.tick_once()
-    leaf.stop(Status.INVALID)
+    leaf.execute_tick()
+    leaf.reset()
     assert finish(bench, leaf) == Status.SUCCESS
     assert server.log[-1] == "end 3"
 
@@ -141,7 +141,7 @@ def test_a_late_result_of_a_halted_goal_does_not_count(bench: Bench, client: Act
     ticks = iter([2, 50])
     leaf = CallAction("leaf", client, lambda: goal(next(ticks)))
     finish(bench, leaf, ticks=2)
-    leaf.stop(Status.INVALID)
+    leaf.reset()
     assert finish(bench, leaf, ticks=20) == Status.RUNNING
 
 
@@ -176,9 +176,37 @@ def test_condition_and_do() -> None:
     failed = Do("d", lambda: "no such place")
     assert finish_once(Do("d", lambda: None)) == Status.SUCCESS
     assert finish_once(failed) == Status.FAILURE
-    assert failed.feedback_message == "no such place"
+    assert failed.reason == "no such place"
 
 
 def finish_once(leaf: Any) -> Status:
-    leaf.tick_once()
+    leaf.execute_tick()
     return leaf.status
+
+
+def test_a_recovery_lets_a_sequence_begin_anew_so_many_times() -> None:
+    log: list[str] = []
+    results = iter(["no", "no", None])
+
+    def grasp() -> str | None:
+        log.append("grasp")
+        return next(results)
+
+    def leaf(name: str) -> Do:
+        return Do(name, lambda: log.append(name))
+
+    pick = sequence("pick", [leaf("dock"), Do("grasp", grasp)])
+    tree = with_recovery("retry", 2, pick, leaf("undock"))
+    assert tree.execute_tick() is Status.SUCCESS
+    assert log == ["dock", "grasp", "undock", "dock", "grasp", "undock", "dock", "grasp"]
+    assert (
+        with_recovery("retry", 2, Do("never", lambda: "no"), leaf("undock")).execute_tick() is Status.FAILURE
+    )
+
+
+def test_halting_a_tree_cancels_what_runs_in_it(bench: Bench, client: ActionClient, server: Server) -> None:
+    tree = sequence("s", [Do("d", lambda: None), CallAction("Wait", client, lambda: goal(100))])
+    finish(bench, tree, ticks=5)
+    tree.reset()
+    bench.run(0.2)
+    assert server.log == ["start 100", "cancel 100"]
