@@ -90,3 +90,23 @@ def test_a_graph_that_is_not_there_is_named(scenario: Make) -> None:
     text = text.replace("MISSION", "{type: idle}").replace("CHECKS", "{no_collision: }")
     with pytest.raises(MapError, match=r"none\.posegraph"):
         build(scenario(text))
+
+
+def test_two_robots_map_one_room_each_in_its_namespace(scenario: Make, tmp_path: Path) -> None:
+    text = ROOM.replace("LOCALISATION", "{type: slam}").replace("CHECKS", "{no_collision: }")
+    first = text[text.index("  - model") : text.index("mission:")]
+    both = first.replace("- model", "- name: left\n    model") + first.replace(
+        "- model: warehouse_bot\n    pose: {x: -2.5, y: -1.5}",
+        "- name: right\n    model: warehouse_bot\n    pose: {x: 2.5, y: 0, yaw: 90 deg}",
+    )
+    text = text.replace(first, both).replace("120 s", "20 s")
+    steps = "[{wait: {duration: 1 s}}, {navigate_to_pose: {x: 2.5, y: 1.0, yaw: 90 deg}}]"
+    text = text.replace("MISSION", f"{{type: behaviors, robot: right, steps: {steps}}}")
+    checks = "{localisation_error: {robot: right, rms: 3 cm}}, {localisation_error: {robot: left, rms: 3 cm}}"
+    text = text.replace("{no_collision: }", f"{{no_collision: }}, {{mission_succeeded: }}, {checks}")
+    verdict = run(scenario(text), out=tmp_path / "out", record=False)
+    assert verdict.verdict == "pass", [(c.name, c.value, c.reason) for c in verdict.checks]
+    left, right = (OccupancyMap.load(tmp_path / "out" / f"{name}_map.yaml") for name in ("left", "right"))
+    behind_the_divider = (3.0, 0.5)
+    assert right.value_at(behind_the_divider) == 0
+    assert left.value_at(behind_the_divider) == -1

@@ -10,7 +10,10 @@ from typing import Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.names import RemapRule
+from twin.bridge.node_options import NodeOptions
 from twin.bridge.programs.factory import create_nodes
+from twin.bridge.programs.ros_args import RosArguments
 from twin.bridge.topics import Sample
 from twin.bridge.wire.session import SessionConfig
 from twin.convert import convert
@@ -43,6 +46,11 @@ from twin.warehouse.map_files import map_of_arena, named_map
 INPROC = SessionConfig()
 """No network: nobody else takes part."""
 _OBSTACLE_RGBA = (0.85, 0.33, 0.10, 1.0)
+
+_TREE_EACH = NodeOptions(
+    arguments=RosArguments(remappings=(RemapRule("/tf", "tf"), RemapRule("/tf_static", "tf_static")))
+)
+"""Each of several robots has its own tree of frames in its namespace, as nav2_bringup starts them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +116,7 @@ def build(
     try:
         control_period_ns = round(scenario.physics.control_period * 1e9)
         alone = len(scenario.robots) == 1
+        bus.node_options = None if alone else _TREE_EACH
         namespaces = {robot.id: "" if alone else f"/{robot.id}" for robot in scenario.robots}
         stacks = {
             robot.id: RobotStack(
@@ -127,6 +136,7 @@ def build(
             for robot in scenario.robots
         }
         mission = build_mission(bus, scenario.mission, stacks, arena, namespaces, scenario.seed)
+        bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)
     except BaseException:

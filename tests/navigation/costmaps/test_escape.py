@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.navigation.costmaps.kernels import escapes
+from twin.navigation.costmaps.kernels import escapes, outline_cost
 
 CORNERS = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
 
@@ -32,3 +32,13 @@ def test_a_robot_whose_outlines_cells_touch_something_may_back_off() -> None:
     x, y = CORNERS.max(axis=0)
     costs[int((y + 0.01 + 1.0) / 0.025), int((x + 0.01 + 1.0) / 0.025)] = 254
     assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, -0.15, 0.0, 0.05, 20, -1.0, -1.0, 0.025)
+
+
+@pytest.mark.parametrize(("v", "expected"), [(-0.15, True), (0.15, False)])
+def test_an_outline_that_grazes_a_cell_which_no_sample_of_the_inside_hits(v: float, expected: bool) -> None:
+    corners = np.array([[0.21, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.21, -0.15]])
+    costs = np.zeros((40, 40), dtype=np.uint8)
+    costs[:, 24] = 254  # from x = 0.205 m on
+    frame = (-0.995, -1.0, 0.05)
+    assert outline_cost(costs, corners, 0.0, 0.0, 0.0, *frame) == 254
+    assert escapes(costs, corners, 0.0, 0.0, 0.0, v, 0.0, 0.05, 20, *frame) is expected

@@ -202,6 +202,22 @@ def footprint_hits(
 
 
 @jit
+def _contact(
+    costs: Cells,
+    corners: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+) -> int:
+    """Return `footprint_hits`, and one more where the outline is lethal: it may graze what no sample hits."""
+    hits = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+    return hits + int(outline_cost(costs, corners, x, y, yaw, origin_x, origin_y, resolution) == 254)
+
+
+@jit
 def escapes(
     costs: Cells,
     corners: Array,
@@ -220,13 +236,13 @@ def escapes(
 
     For a robot whose present pose is a collision by the costmap, which is coarser than the world.
     """
-    first = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+    first = _contact(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
     last = first
     for _ in range(steps):
         x += v * dt * math.cos(yaw)
         y += v * dt * math.sin(yaw)
         yaw += w * dt
-        last = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        last = _contact(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
         if last > first:
             return False
     return last == 0 or last < 0.8 * first  # none at all: only the outline's cells touch something

@@ -119,10 +119,15 @@ class FrontierMap:
 
     def _near(self, points: Sequence[tuple[float, float]], radius: float) -> NDArray[np.bool_]:
         """Return the cells within `radius` [m] of any of the points."""
-        rows, columns = np.ogrid[: self._grid.height, : self._grid.width]
         near = np.zeros(self._grid.data.shape, dtype=np.bool_)
+        reach = math.ceil(radius / self._grid.resolution)
         for column, row in self._grid.world_to_cell(np.reshape(points, (-1, 2))):
-            near |= np.hypot(columns - column, rows - row) * self._grid.resolution < radius
+            window = (
+                slice(max(row - reach, 0), min(row + reach + 1, self._grid.height)),
+                slice(max(column - reach, 0), min(column + reach + 1, self._grid.width)),
+            )
+            rows, columns = np.ogrid[window]
+            near[window] |= np.hypot(columns - column, rows - row) * self._grid.resolution < radius
         return near
 
     def _start(self, passable: NDArray[np.bool_], position: tuple[float, float]) -> tuple[int, int] | None:
@@ -130,8 +135,8 @@ class FrontierMap:
         rows, columns = np.nonzero(passable)
         if not rows.size:
             return None
-        centres = self._grid.cell_to_world(np.column_stack([columns, rows]))
-        nearest = int(np.argmin(np.hypot(*(centres - position).T)))
+        column, row = self._grid.world_to_cell(position)
+        nearest = int(np.argmin((columns - column) ** 2 + (rows - row) ** 2))
         return int(rows[nearest]), int(columns[nearest])
 
     def _find(self, unknown: NDArray[np.bool_]) -> list[Frontier]:

@@ -20,7 +20,8 @@ def travel_distances(passable: NDArray[np.bool_], distance: Array) -> None:
 
     Args:
         passable: Where the robot's centre may be, shape (h, w).
-        distance: Shape (h, w): what is finite is where the ways begin, after so much; written.
+        distance: Shape (h, w): what is finite is where the ways begin, after so much, each cell as near as
+            the ones beside it allow; written.
     """
     height, width = passable.shape
     size = height * width
@@ -29,7 +30,7 @@ def travel_distances(passable: NDArray[np.bool_], distance: Array) -> None:
     root2 = math.sqrt(2.0)
     head, count = 0, 0
     for cell in range(size):
-        if distance[cell // width, cell % width] < math.inf:
+        if _has_news(distance, cell // width, cell % width):
             waiting[cell] = True
             queue[count] = cell
             count += 1
@@ -54,6 +55,18 @@ def travel_distances(passable: NDArray[np.bool_], distance: Array) -> None:
                         waiting[neighbour] = True
                         queue[(head + count) % size] = neighbour
                         count += 1
+
+
+@jit
+def _has_news(distance: Array, row: int, column: int) -> bool:
+    """Return whether a cell has been reached and one beside it has not."""
+    if distance[row, column] == math.inf:
+        return False
+    for v in range(max(0, row - 1), min(distance.shape[0], row + 2)):
+        for u in range(max(0, column - 1), min(distance.shape[1], column + 2)):
+            if distance[v, u] == math.inf:
+                return True
+    return False
 
 
 @jit

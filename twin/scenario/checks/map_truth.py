@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
-from twin.geometry import Array
-from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.geometry import Array, Pose2
+from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 from twin.scenario.observation import Surroundings
 from twin.warehouse.footprint import Rectangle
 
@@ -17,6 +18,8 @@ FREE_TO = 25
 """Occupancy up to which a cell is free, likewise."""
 _CELL = 0.05
 _MARGIN = 0.5
+_NEIGHBOURS = 4
+"""Among so many cells whose centres are nearest is the one whose edge is."""
 _BESIDE = 0.02
 """So far before a surface lies the floor that it borders on [m]."""
 
@@ -39,8 +42,9 @@ class MapTruth:
         self._centres = self._low + (np.stack([columns, rows], axis=-1) + 0.5) * _CELL
         solid = self._inside(self._centres)
         self._floor = self._reachable(solid, surroundings)
-        self.wall_points: Array = self._bordering()
+        self.wall_points: Array
         """Every 5 cm a point of the surfaces beside the floor that the robot can get to, shape (n, 2) [m]."""
+        self.wall_points, self._wall_fronts = self._bordering()
 
     @property
     def floor_points(self) -> Array:
@@ -51,10 +55,33 @@ class MapTruth:
         """Return the distances of points, shape (n, 2), to the nearest surface, shape (n,) [m]."""
         nearest = np.full(len(points), np.inf)
         for solid in self._solids:
-            beyond = np.abs(solid.centre.inverse().apply(points)) - (solid.size_x / 2.0, solid.size_y / 2.0)
-            outside = np.hypot(*np.maximum(beyond, 0.0).T)
-            nearest = np.minimum(nearest, np.where(outside > 0.0, outside, -beyond.max(axis=1)))
+            nearest = np.minimum(nearest, np.hypot(*(_on_surface(solid, points) - points).T))
         return nearest
+
+    def distances_of_cells(self, grid: OccupancyMap) -> Array:
+        """Return the distances of a map's occupied cells to the nearest surface, shape (n,) [m].
+
+        A cell is a square: one that a surface goes through or along has none.
+        """
+        centres = wall_cells(grid)
+        nearest = np.full(len(centres), np.inf)
+        for solid in self._solids:
+            nearest = np.minimum(nearest, _off_squares(_on_surface(solid, centres) - centres, grid))
+        return nearest
+
+    def distances_of_walls(self, grid: OccupancyMap) -> Array:
+        """Return the distances of the walls' points to the map's nearest occupied cell, shape (n,) [m].
+
+        Walls behind ground that is unknown on the map are left out: they are missing, not wrong.
+        """
+        cells = wall_cells(grid)
+        points = self.wall_points[grid.value_at(self._wall_fronts) != UNKNOWN]
+        if not len(cells) or not len(points):
+            return np.full(len(points), np.inf)
+        count = min(_NEIGHBOURS, len(cells))
+        nearest = cells[cKDTree(cells).query(points, k=count)[1].reshape(-1, count)]
+        offsets = points[:, None] - nearest
+        return _off_squares(offsets.reshape(-1, 2), grid).reshape(-1, count).min(axis=1)
 
     def _inside(self, points: Array) -> NDArray[np.bool_]:
         inside = np.zeros(points.shape[:-1], dtype=np.bool_)
@@ -78,16 +105,32 @@ class MapTruth:
         ) & ~solid
         return covered
 
-    def _bordering(self) -> Array:
-        points, before = [], []
-        for solid in self._solids:
-            edge, out = _outline(solid)
-            points.append(edge)
-            before.append(edge + _BESIDE * out)
-        edges, fronts = np.concatenate(points), np.concatenate(before)
+    def _bordering(self) -> tuple[Array, Array]:
+        """Return points of the surfaces beside the floor, and one a cell before each, shape (n, 2)."""
+        outlines = [_outline(solid) for solid in self._solids]
+        edges, out = (np.concatenate(parts) for parts in zip(*outlines, strict=True))
+        fronts = edges + _BESIDE * out
         near = ndimage.binary_dilation(self._floor, iterations=2)
         cells = np.floor((fronts - self._low) / _CELL).astype(int)
-        return edges[~self._inside(fronts) & near[cells[:, 1], cells[:, 0]]]
+        beside = ~self._inside(fronts) & near[cells[:, 1], cells[:, 0]]
+        return edges[beside], (edges + _CELL * out)[beside]
+
+
+def _on_surface(solid: Rectangle, points: Array) -> Array:
+    """Return the points of a rectangle's edge that are nearest to `points`, both of shape (n, 2)."""
+    local = solid.centre.inverse().apply(points)
+    half = np.array([solid.size_x / 2.0, solid.size_y / 2.0])
+    nearest = np.clip(local, -half, half)
+    inside = np.flatnonzero(np.all(np.abs(local) < half, axis=1))
+    side = np.argmin(half - np.abs(local[inside]), axis=1)
+    nearest[inside, side] = np.copysign(half[side], local[inside, side])
+    return solid.centre.apply(nearest)
+
+
+def _off_squares(offsets: Array, grid: OccupancyMap) -> Array:
+    """Return how far points, at `offsets` (n, 2) from cells' centres, are from those cells, shape (n,)."""
+    along = Pose2(0.0, 0.0, -grid.origin.yaw).apply(offsets)
+    return np.hypot(*np.maximum(np.abs(along) - grid.resolution / 2.0, 0.0).T)
 
 
 def _outline(solid: Rectangle) -> tuple[Array, Array]:
