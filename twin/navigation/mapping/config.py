@@ -57,8 +57,8 @@ class SlamConfig:
     """Of the correlative match of a loop."""
     loop_match_minimum_response_fine: float = 0.55
     """Part of a scan's points that lie on the lines of the place seen again."""
-    loop_search_space_dimension: float = 8.0
-    """Largest width of the window searched for a loop [m]."""
+    loop_search_space_dimension: float = 30.0
+    """Largest width of the window searched for a loop [m]; in a small one the wrong door is found."""
     loop_search_space_resolution: float = 0.05
     """[m]"""
     loop_search_space_smear_deviation: float = 0.07

@@ -19,6 +19,8 @@ Pyramid = NDArray[np.uint8]
 FULL = 255.0
 MOST_POINTS = 200
 """Of a scan that are looked up: more do not tell places apart better."""
+APART = 1.5
+"""So far apart two places are that are not the same [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,10 +70,22 @@ class CorrelationGrid:
         _stamp(self._pyramid[0], cells, _kernel(resolution, deviation))
         _raise_pyramid(self._pyramid)
 
-    def search(self, points: Array, guess: Pose2, window: Window, least: float = 0.0) -> Correlation | None:
-        """Return the pose near `guess` in which `points` (in the robot's frame) respond most.
+    def search(
+        self,
+        points: Array,
+        guess: Pose2,
+        window: Window,
+        least: float = 0.0,
+        apart_from: Pose2 | None = None,
+    ) -> Correlation | None:
+        """Return the pose near `guess` in which `points` respond most, None if nothing responds enough.
 
-        None if nothing responds more than `least`.
+        Args:
+            points: In the robot's frame, shape (n, 2) [m].
+            guess: The middle of the window.
+            window: Where it is looked for.
+            least: A response must be more than this.
+            apart_from: Poses nearer to this than `APART` do not count.
         """
         if not len(points):
             return None
@@ -83,6 +97,10 @@ class CorrelationGrid:
         cells = np.empty((len(turns), len(points), 2), dtype=np.int32)
         _place(points, guess.x, guess.y, guess.yaw + turns, self.resolution, self._low, cells)
         reach = round(window.half_width / self.resolution)
+        excluded = np.zeros(3)
+        if apart_from is not None:
+            away = np.array([apart_from.x - guess.x, apart_from.y - guess.y, APART])
+            excluded = away / self.resolution
         best = _branch_and_bound(
             self._pyramid,
             cells,
@@ -92,6 +110,7 @@ class CorrelationGrid:
             np.array([window.distance_variance, window.angle_variance]),
             np.array([window.minimum_distance_penalty, window.minimum_angle_penalty]),
             least,
+            excluded,
         )
         if best[0] <= least:
             return None
@@ -198,8 +217,12 @@ def _branch_and_bound(
     variances: Array,
     minima: Array,
     least: float,
+    excluded: Array,
 ) -> tuple[float, int, int, int, float]:
-    """Return punished response, index of the turn, offsets in cells and plain response of the best leaf."""
+    """Return punished response, index of the turn, offsets in cells and plain response of the best leaf.
+
+    `excluded` is a circle without leaves: offsets of its middle and its radius in cells.
+    """
     top = pyramid.shape[0] - 1
     size = 1 << top
     side = (2 * reach + size) // size
@@ -230,6 +253,11 @@ def _branch_and_bound(
             if stack_bounds[depth] <= best:
                 continue
             level, dx, dy = stack[depth, 0], stack[depth, 1], stack[depth, 2]
+            last = (1 << level) - 1
+            far_x = max(abs(dx - excluded[0]), abs(dx + last - excluded[0]))
+            far_y = max(abs(dy - excluded[1]), abs(dy + last - excluded[1]))
+            if far_x * far_x + far_y * far_y < excluded[2] * excluded[2]:
+                continue
             if level == 0:
                 best, best_turn, best_dx, best_dy = stack_bounds[depth], a, dx, dy
                 plain = _response(pyramid[0], cells[a], dx, dy)

@@ -20,6 +20,10 @@ MOST_PLACES = 3
 """So many places are tried for a scan."""
 SURE = 0.25
 """Below this standard deviation [m] one match is enough; above, matches must agree."""
+UNSURE_SCORE = 0.45
+"""Such a match must have this score ..."""
+DISTINCT = 0.15
+"""... and one that is by this better than in any other place in the window."""
 AGREEING = 3
 """So many matches must agree."""
 REMEMBERED = 12
@@ -137,7 +141,19 @@ class LoopCloser:
         moved = difference(there, match.pose)
         if moved @ np.linalg.solve(prior + match.covariance, moved) > GATE:
             return None
-        return _Candidate(edge=_edge(place, node, here, match), sure=position < SURE)
+        sure = position < SURE
+        if not sure and self._ambiguous(reference, scans[node], match, there, window, 9.0 * prior):
+            return None
+        return _Candidate(edge=_edge(place, node, here, match), sure=sure)
+
+    def _ambiguous(
+        self, reference: Reference, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array
+    ) -> bool:
+        """Return whether a scan fits badly, or elsewhere in the window as well."""
+        if match.score < UNSURE_SCORE:
+            return True
+        rival = reference.rival(scan, match, guess, window, prior)
+        return rival is not None and rival.score > match.score - DISTINCT
 
     def _members(self, graph: PoseGraph, place: int, node: int) -> list[int]:
         """Return nodes before and after a place, spread over the path, without those just before `node`."""

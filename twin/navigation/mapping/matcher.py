@@ -19,6 +19,8 @@ DEVIATION = 0.03
 """Of a point from the line it lies on [m]."""
 CORRELATED = 6.0
 """So many points of a scan are as good as one independent one: all of them see the same faults."""
+RIVAL = 0.8
+"""What responds less than this part of the best is no rival."""
 FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
 """No match is better than this: variances of x, y [m^2], yaw [rad^2]."""
 
@@ -93,6 +95,12 @@ class Reference:
         """
         coarse = self.grid.search(scan.points, guess, window, least)
         return None if coarse is None else self.refined(scan, coarse, believed or guess, prior)
+
+    def rival(self, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array) -> Match | None:
+        """Return where else `scan` fits best; None: nowhere nearly as well. See `match`."""
+        least = RIVAL * match.response
+        coarse = self.grid.search(scan.points, guess, window, least, match.pose)
+        return None if coarse is None else self.refined(scan, coarse, guess, prior)
 
     def candidates(
         self, scan: Scan, guess: Pose2, window: Window, least: float, sectors: int
