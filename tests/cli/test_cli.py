@@ -160,7 +160,7 @@ def test_a_closed_output_is_no_fault() -> None:
 def test_commands_are_grouped() -> None:
     out = CliRunner().invoke(app_module.app, ["--help"], env={"COLUMNS": "120"}).output
     panels = re.findall(r"^╭─ (\w.*?) ─", out, re.MULTILINE)
-    assert panels == ["Options", "Scenarios", "Robot files", "ROS 2 graph"]
+    assert panels == ["Options", "Scenarios", "Robot files", "ROS 2 graph", "Navigation"]
 
 
 def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
@@ -220,7 +220,7 @@ def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, i
     assert err.splitlines() == [
         f"error: {demo}:2: duration: must have a unit of time (s, ms, us, min, h), not '1 kg'",
         f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? Valid: closed_loop, delivered, "
-        "driven_distance, energy, final_pose, localisation_error, mission_succeeded, no_collision, odometry_drift, "
+        "driven_distance, energy, final_pose, localisation_error, map_accuracy, map_coverage, mission_failed, mission_succeeded, no_collision, odometry_drift, "
         "path_on_circle, recoveries, time_limit, tote_slip",
         "2 problems",
     ]

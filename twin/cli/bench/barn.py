@@ -28,10 +28,10 @@ def barn(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 1,
     runs: Annotated[int, typer.Option(min=1, help="Runs of each world, with seeds that count up.")] = 1,
-    max_speed: Annotated[float, typer.Option(min=0.1, max=2.0, help="Of the robot [m/s].")] = 2.0,
+    max_speed: Annotated[float, typer.Option(min=0.1, max=2.0, help="Of the robot in m/s.")] = 2.0,
     no_noise: Annotated[bool, typer.Option("--no-noise", help="A lidar without noise.")] = False,
     latency: Annotated[
-        float, typer.Option(min=0.0, help="From a command to the motors [s]; a multiple of 0.02.")
+        float, typer.Option(min=0.0, help="From a command to the motors in s; a multiple of 0.02.")
     ] = 0.06,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes at a time.", show_default="one per core")
