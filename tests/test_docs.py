@@ -39,6 +39,7 @@ SLOW = {
     "docs/getting-started.md",
     "docs/navigation.md",
     "docs/arenas.md",
+    "docs/navigation/faults.md",
     "docs/navigation/mapping.md",
     "docs/ros/commands.md",
 }

@@ -82,6 +82,13 @@ def _caster(model: mujoco.MjModel, data: mujoco.MjData, link: str, spec: LidarSp
     return cast
 
 
+def with_mppi(path: Path) -> Scenario | None:
+    """Return a scenario with every robot that navigates under MPPI; None if none does."""
+    robots = [i for i, robot in enumerate(load(path).robots) if robot.navigation is not None]
+    plugin = {f"robots.{i}.navigation.controller.plugin": "mppi" for i in robots}
+    return load(path, plugin) if robots else None
+
+
 def measure(scenario: Scenario, *, record: bool) -> tuple[float, float]:
     """Return simulated time and CPU time [s] of a run."""
     with tempfile.TemporaryDirectory() as folder:
@@ -95,18 +102,25 @@ def main() -> None:
     parser.add_argument("scenario", nargs="?", type=Path, default=SCENARIOS / "warehouse.yaml")
     parser.add_argument("--rounds", type=int, default=2, help="best of so many (default: 2)")
     options = parser.parse_args()
-    scenario = load(options.scenario)
-    plain = recorded = raw = float("inf")
+    scenario, other = load(options.scenario), with_mppi(options.scenario)
+    plain = recorded = raw = mppi = float("inf")
+    driven = 0.0
     for _ in range(options.rounds):
         simulated, cpu = measure(scenario, record=False)
         plain = min(plain, cpu)
         recorded = min(recorded, measure(scenario, record=True)[1])
         raw = min(raw, raw_limit(scenario, simulated))
+        if other is not None:
+            driven, cpu = measure(other, record=False)
+            mppi = min(mppi, cpu)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{scenario.name}: {simulated:.1f} s simulated, best of {options.rounds}")
     print(f"{'':24}{'CPU s':>8}{'x real time':>13}{'x raw limit':>13}")
     for name, cpu in (("raw: steps and rays", raw), ("run", plain), ("run with recording", recorded)):
         print(f"{name:24}{cpu:8.2f}{simulated / cpu:13.1f}{cpu / raw:13.2f}")
+    if other is not None:  # another controller takes another time: per simulated second
+        ratio = mppi / driven * simulated / raw
+        print(f"{'run with MPPI':24}{mppi:8.2f}{driven / mppi:13.1f}{ratio:13.2f}")
     print(f"recording costs {recorded / plain:.2f}x; peak memory {memory:.0f} MB")
 
 

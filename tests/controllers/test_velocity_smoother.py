@@ -38,3 +38,22 @@ def test_nan_is_refused() -> None:
     smoother = VelocitySmoother(CONFIG)
     assert not smoother.set_command(math.nan, 0.0)
     assert smoother.update(0.02) == (0.0, 0.0)
+
+
+def test_scaled_velocities_brake_on_the_commanded_curve() -> None:
+    """A robot that straightens while it brakes leaves the curve that was checked for collisions."""
+    config = VelocitySmootherConfig(
+        linear=AxisLimits(max_velocity=1.0, max_acceleration=0.8),
+        angular=AxisLimits(max_velocity=2.0, max_acceleration=4.0),
+        scale_velocities=True,
+    )
+    smoother = VelocitySmoother(config)
+    smoother.set_command(0.6, 0.9)
+    speeds = [smoother.update(0.02) for _ in range(24)]
+    smoother.set_command(0.0, 0.0)
+    speeds += [smoother.update(0.02) for _ in range(60)]
+    moving = [(v, w) for v, w in speeds if v > 1e-9]
+    assert max(v for v, _ in moving) == pytest.approx(24 * 0.8 * 0.02)
+    assert len(moving) > 40
+    assert all(w / v == pytest.approx(1.5) for v, w in moving)
+    assert speeds[-1] == (0.0, 0.0)

@@ -86,11 +86,22 @@ def test_the_seed_draws_the_goals() -> None:
 
 def test_a_goal_that_is_given_up_ends_it_with_the_navigators_reason(bench: Bench) -> None:
     robot = Robot(bench, open_room())
-    navigator, node = Navigator(bench, gives_up=True), mission(bench, robot, max_failed=1)
+    navigator, node = Navigator(bench, gives_up=True), mission(bench, robot, max_failed=1, retries=0)
     bench.until(lambda: node.done, 30.0)
     assert not node.succeeded
     assert node.failed == len(navigator.goals) == 2
     assert node.reason.endswith("no way")
+
+
+def test_a_goal_that_somebody_stands_on_is_sent_again(bench: Bench) -> None:
+    robot = Robot(bench, open_room())
+    navigator, node = Navigator(bench, gives_up=True), mission(bench, robot, retries=1)
+    bench.until(lambda: len(navigator.goals) == 2, 20.0)
+    assert navigator.goals[0] == navigator.goals[1]
+    assert bench.now_s > 2.0 + 5.0, "somebody gets the time to go"
+    navigator.gives_up = False
+    bench.until(lambda: node.reached == 1, 10.0)
+    assert node.failed == 0
 
 
 def test_a_map_without_room_is_told(bench: Bench) -> None:

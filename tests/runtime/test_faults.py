@@ -1,4 +1,4 @@
-"""Hardware that fails, a robot carried away, a wrong map: each ends in a recovery or in an abort."""
+"""Hardware that fails, a robot carried away, a wrong map: each ends well or says why."""
 
 from __future__ import annotations
 

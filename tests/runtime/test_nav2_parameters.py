@@ -40,6 +40,7 @@ controller_server:
   ros__parameters:
     controller_frequency: 25.0
     min_x_velocity_threshold: 0.001
+    costmap_update_timeout: 0.3
     min_y_velocity_threshold: 0.5
     goal_checker_plugins: ["precise"]
     controller_plugins: ["FollowPath"]
@@ -109,6 +110,7 @@ def test_names_that_the_nodes_have_are_taken(tmp_path: Path) -> None:
     assert got.navigator.bt_loop_duration == 20
     assert got.navigator.error_code_name_prefixes == ("compute_path", "follow_path")
     assert got.controller_server.controller_period_ns == 40_000_000
+    assert got.controller_server.costmap_update_timeout_ns == 300_000_000
     assert _controller(got).lookahead_dist == 0.55
     assert got.controller_server.goal_checkers["general_goal_checker"].xy_goal_tolerance == 0.11, (
         "whatever the plugin is called"

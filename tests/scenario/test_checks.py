@@ -63,6 +63,18 @@ def test_mission_succeeded() -> None:
     assert fold(entry, [lost]).reason == "no path to rack_a"
 
 
+def test_mission_failed_for_the_reason_that_was_expected() -> None:
+    entry = {"mission_failed": {"reason": "*no scan*"}}
+    why = {"mission_reason": "navigate: no scan for 5 s"}
+    failed = at(2, mission_done=True, mission_succeeded=False, **why)
+    assert fold(entry, [at(1), failed]).passed
+    assert fold({"mission_failed": None}, [failed]).passed
+    other = at(2, mission_done=True, mission_succeeded=False, mission_reason="no path")
+    assert fold(entry, [other]).reason == "the mission failed, but not for '*no scan*': no path"
+    assert fold(entry, [at(2, mission_done=True, mission_succeeded=True)]).reason == "the mission succeeded"
+    assert not fold(entry, [at(1, mission_state="driving")]).passed
+
+
 def test_time_limit() -> None:
     entry = {"time_limit": {"limit": "10 s"}}
     assert fold(entry, [at(9), at(10, mission_done=True), at(11, mission_done=True)]).value == 10.0
@@ -245,6 +257,7 @@ def test_closed_loop() -> None:
     "entry",
     [
         {"mission_succeeded": None},
+        {"mission_failed": None},
         {"time_limit": {"limit": 1}},
         DELIVERED,
         {"no_collision": None},

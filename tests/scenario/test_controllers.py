@@ -10,7 +10,9 @@ from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.runtime.controller_config import controller_server_config
-from twin.scenario.controllers import ControllerParameters
+from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
+from twin.scenario.navigation import NavigationConfig
+from twin.strict_yaml import Faults
 
 LIMITS = VelocitySmootherConfig(
     linear=AxisLimits(max_velocity=0.8, max_acceleration=0.7, max_deceleration=1.1),
@@ -64,3 +66,31 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
 def test_a_key_of_another_plugin_is_refused(keys: dict[str, object], told: str) -> None:
     with pytest.raises(ValidationError, match=told):
         ControllerParameters.model_validate(keys)
+
+
+def test_more_controllers_are_there_by_id_with_a_goal_checker_each() -> None:
+    precise = FurtherControllerParameters(plugin="mppi", xy_goal_tolerance=0.02)
+    server = controller_server_config(
+        ControllerParameters(controller_frequency=20.0), LIMITS, {"Precise": precise}
+    )
+    assert list(server.controllers) == ["FollowPath", "Precise"]
+    shim = server.controllers["Precise"]
+    assert isinstance(shim, RotationShimConfig)
+    assert isinstance(shim.primary_controller, MPPIConfig)
+    assert shim.primary_controller.model_dt == 0.05, "of the server's frequency"
+    tolerances = {name: one.xy_goal_tolerance for name, one in server.goal_checkers.items()}
+    assert tolerances == {"general_goal_checker": 0.05, "Precise": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("controllers", "told"),
+    [
+        ({"FollowPath": {}}, "is what `controller` describes"),
+        ({"a b": {}}, "pattern"),
+        ({"Slow": {"controller_frequency": 10.0}}, "give it under `controller`"),
+        ({"Slow": {"plugin": "dwb", "vx_max": 0.1}}, "of another plugin"),
+    ],
+)
+def test_ids_and_keys_of_more_controllers_are_checked(controllers: object, told: str) -> None:
+    with pytest.raises((ValidationError, Faults), match=told):
+        NavigationConfig.model_validate({"controllers": controllers})

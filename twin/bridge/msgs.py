@@ -39,6 +39,7 @@ TransformStamped = ros.geometry_msgs__msg__TransformStamped
 Twist = ros.geometry_msgs__msg__Twist
 TwistStamped = ros.geometry_msgs__msg__TwistStamped
 TwistWithCovariance = ros.geometry_msgs__msg__TwistWithCovariance
+TwistWithCovarianceStamped = ros.geometry_msgs__msg__TwistWithCovarianceStamped
 Vector3 = ros.geometry_msgs__msg__Vector3
 Vector3Stamped = ros.geometry_msgs__msg__Vector3Stamped
 Wrench = ros.geometry_msgs__msg__Wrench
@@ -216,6 +217,7 @@ __all__ = [
     "Twist",
     "TwistStamped",
     "TwistWithCovariance",
+    "TwistWithCovarianceStamped",
     "UInt8",
     "UInt32",
     "Vector3",

@@ -26,12 +26,23 @@ class SpeedLimiter:
 
     def limit(self, target: float, dt: float) -> float:
         """Return the velocity nearest to `target` that is reachable within `dt` [s]."""
-        limits = self.limits
-        target = min(max(target, -limits.max_velocity), limits.max_velocity)
+        target, step = self._clamped(target), self._step(target, dt)
+        self.value += min(max(target - self.value, -step), step)
+        return self.value
+
+    def share(self, target: float, dt: float) -> float:
+        """Return how much, 0 … 1, of the way to `target` can be gone within `dt` [s]."""
+        change = abs(self._clamped(target) - self.value)
+        return min(1.0, self._step(target, dt) / change) if change else 1.0
+
+    def _clamped(self, target: float) -> float:
+        return min(max(target, -self.limits.max_velocity), self.limits.max_velocity)
+
+    def _step(self, target: float, dt: float) -> float:
+        """Return the largest change within `dt` [s]."""
+        limits, target = self.limits, self._clamped(target)
         braking = abs(target) < abs(self.value) or target * self.value < 0.0
         rate = limits.max_acceleration
         if braking and limits.max_deceleration is not None:
             rate = limits.max_deceleration
-        step = rate * dt
-        self.value += min(max(target - self.value, -step), step)
-        return self.value
+        return rate * dt

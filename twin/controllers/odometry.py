@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
 from twin.geometry import Array, Pose2, wrap_angle
 
 
@@ -18,12 +19,12 @@ class OdometryConfig:
     """[m]"""
     track: float
     """Effective wheel separation [m]."""
-    distance_variance: float = 1e-4
-    """Variance of the driven distance per metre [m²/m]."""
-    angle_variance: float = 2e-4
-    """Variance of the heading per radian turned [rad²/rad]."""
-    drift_variance: float = 1e-4
-    """Variance of the heading per metre driven [rad²/m]."""
+    noise: OdometryNoise = DIFF_DRIVE
+    """How wrong it is."""
+
+
+_AT_REST = 1e-5
+"""Variance of each velocity while the wheels stand [m²/s², rad²/s²]."""
 
 
 class Odometry:
@@ -35,6 +36,9 @@ class Odometry:
         self.velocity = (0.0, 0.0)
         """Linear [m/s] and angular [rad/s] velocity over the last interval."""
         self._variances = (0.0,) * 6  # of xx, xy, yy, x yaw, y yaw, yaw yaw
+        self._grown = (0.0, 0.0)  # in the last interval, of the place in each direction and of yaw
+        self._dt = 1.0
+        self._gyro_time = 0.0
         self._last: tuple[float, float] | None = None
 
     def update(self, left: float, right: float, dt: float, *, yaw_rate: float | None = None) -> Pose2:
@@ -59,7 +63,7 @@ class Odometry:
         # The chord of an arc is its length times sinc of half the angle.
         half = angle / 2.0
         chord = distance * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
-        self._grow_covariance(distance, angle, heading)
+        self._grow_covariance(distance, angle, heading, dt, gyro=yaw_rate is not None)
         self.pose = Pose2(
             self.pose.x + chord * math.cos(heading),
             self.pose.y + chord * math.sin(heading),
@@ -68,21 +72,40 @@ class Odometry:
         self.velocity = (distance / dt, angle / dt)
         return self.pose
 
-    def _grow_covariance(self, distance: float, angle: float, heading: float) -> None:
+    def _grow_covariance(
+        self, distance: float, angle: float, heading: float, dt: float, *, gyro: bool
+    ) -> None:
         """Propagate F P Fᵀ + Q with F = [[1, 0, a], [0, 1, b], [0, 0, 1]], in plain floats for speed."""
-        c, s = math.cos(heading), math.sin(heading)
-        a, b = -distance * s, distance * c
-        along = self.config.distance_variance * abs(distance)
-        turn = self.config.angle_variance * abs(angle) + self.config.drift_variance * abs(distance)
+        a, b = -distance * math.sin(heading), distance * math.cos(heading)
+        noise, length, turned = self.config.noise, abs(distance), abs(angle)
+        centripetal = length * turned / dt**2
+        place = noise.distance_variance * length + noise.turn_distance_variance * turned
+        place += (noise.side_slip * centripetal) ** 2 * noise.slip_time * dt
+        if gyro:
+            self._gyro_time += dt
+            turn = 2.0 * noise.gyro_bias**2 * self._gyro_time * dt  # the growth of (bias x time)²
+        else:
+            turn = noise.angle_variance * turned + noise.drift_variance * length
+            turn += (noise.turn_slip * centripetal * (1.0 + centripetal)) ** 2 * noise.slip_time * dt
+        self._grown, self._dt = (place, turn), dt
         xx, xy, yy, xt, yt, tt = self._variances
         self._variances = (
-            xx + a * (2.0 * xt + a * tt) + along * c * c,
-            xy + a * yt + b * xt + a * b * tt + along * c * s,
-            yy + b * (2.0 * yt + b * tt) + along * s * s,
+            xx + a * (2.0 * xt + a * tt) + place,
+            xy + a * yt + b * xt + a * b * tt,
+            yy + b * (2.0 * yt + b * tt) + place,
             xt + a * tt,
             yt + b * tt,
             tt + turn,
         )
+
+    @property
+    def velocity_covariance(self) -> Array:
+        """Of the linear, sideways and angular velocity of the last interval, shape (3, 3).
+
+        Integrated as white noise it makes the pose as unsure as `covariance` says.
+        """
+        place, turn = (grown / self._dt**2 for grown in self._grown)
+        return np.diag([place + _AT_REST, place + _AT_REST, turn + _AT_REST])
 
     @property
     def covariance(self) -> Array:

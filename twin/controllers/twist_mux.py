@@ -19,6 +19,8 @@ class MuxInput:
     """0 … 255; the highest live source wins."""
     timeout: float = 0.5
     """A source without a command for this long is not live [s]."""
+    guarded: bool = True
+    """Whether a collision monitor, where there is one, sees its commands."""
 
 
 class TwistMux:

@@ -16,6 +16,9 @@ class VelocitySmootherConfig:
     angular: AxisLimits = AxisLimits(max_velocity=1.5, max_acceleration=2.5, max_deceleration=3.5)
     velocity_timeout: float = 0.5
     """Without a command for this long the target is zero [s]."""
+    scale_velocities: bool = False
+    """Whether the axis that is farthest from its target holds the other back, so that the robot speeds up and
+    brakes, along the curve that was commanded; otherwise each axis is limited by itself."""
     deadband_linear: float = 0.0
     """Speeds below this are sent as zero [m/s]."""
     deadband_angular: float = 0.0
@@ -46,11 +49,19 @@ class VelocitySmoother:
         at_rest = self._linear.value == 0.0 and self._angular.value == 0.0
         return at_rest and self._age > self.config.velocity_timeout
 
+    def reset(self) -> None:
+        """Start from rest."""
+        self._linear.value = self._angular.value = 0.0
+
     def update(self, dt: float) -> tuple[float, float]:
         """Advance by `dt` [s] and return the smoothed command [m/s, rad/s]."""
         timed_out = self._age > self.config.velocity_timeout
         self._age += dt
         linear, angular = (0.0, 0.0) if timed_out else self._target
+        if self.config.scale_velocities:
+            share = min(self._linear.share(linear, dt), self._angular.share(angular, dt))
+            linear = self._linear.value + share * (linear - self._linear.value)
+            angular = self._angular.value + share * (angular - self._angular.value)
         v, w = self._linear.limit(linear, dt), self._angular.limit(angular, dt)
         if abs(v) < self.config.deadband_linear:
             v = 0.0

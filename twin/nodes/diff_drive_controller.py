@@ -27,6 +27,7 @@ from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
+from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
 from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
@@ -41,6 +42,8 @@ class DiffDriveNodeConfig:
     right_joints: tuple[str, ...]
     odom_frame: str = "odom"
     base_frame: str = "base_footprint"
+    noise: OdometryNoise = DIFF_DRIVE
+    """How wrong odometry is."""
     period_ns: int = 20_000_000
     use_imu: bool = False
     """Whether odometry takes its heading from the gyroscope (`odometry.use_imu` of turtlebot3_node)."""
@@ -59,7 +62,9 @@ class DiffDriveControllerNode:
         self.config = config
         self.controller = DiffDriveController(config.drive)
         self.odometry = Odometry(
-            OdometryConfig(wheel_radius=config.drive.wheel_radius, track=self.controller.track)
+            OdometryConfig(
+                wheel_radius=config.drive.wheel_radius, track=self.controller.track, noise=config.noise
+            )
         )
         declare_config(self.node, config, names={"drive": "", "linear": "linear.x", "angular": "angular.z"})
         self._hardware = hardware
@@ -127,7 +132,7 @@ class DiffDriveControllerNode:
                     twist=Twist(
                         linear=Vector3(x=linear, y=0.0, z=0.0), angular=Vector3(x=0.0, y=0.0, z=angular)
                     ),
-                    covariance=_TWIST_COVARIANCE,
+                    covariance=planar_covariance(self.odometry.velocity_covariance),
                 ),
             )
         )
@@ -150,4 +155,3 @@ def planar_covariance(covariance: Array) -> Array:
 
 _UNUSED_AXES = np.diag([0.0, 0.0, _UNUSED_AXIS, _UNUSED_AXIS, _UNUSED_AXIS, 0.0]).ravel()
 _PLANAR = np.array([6 * row + column for row in (0, 1, 5) for column in (0, 1, 5)])
-_TWIST_COVARIANCE = planar_covariance(np.diag([1e-3, 1e-4, 1e-3]))

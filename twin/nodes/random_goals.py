@@ -32,7 +32,11 @@ class RandomGoalsConfig:
     min_goal_distance: float = 3.0
     """Of a goal from the robot, as the crow flies [m]."""
     max_failed: int = 0
-    """How many goals may be given up by the navigator; one more ends the mission."""
+    """How many goals may be given up; one more ends the mission."""
+    retries: int = 3
+    """How often a goal that the navigator gives up is sent again: somebody may stand on it."""
+    retry_after_ns: int = 5_000_000_000
+    """How long is waited before that [ns]."""
 
 
 class RandomGoalsNode(MissionNode):
@@ -55,6 +59,10 @@ class RandomGoalsNode(MissionNode):
         self._map: OccupancyMap | None = None
         self._places: Array | None = None
         self._goal: ClientGoal | None = None
+        self._again: tuple[Pose2, int] | None = None
+        """The goal to send again, and when."""
+        self._place = Pose2(0.0, 0.0, 0.0)
+        self._tries = 0
         self._at: tuple[float, float] | None = None
         self.driven = 0.0
         """By odometry, so far [m]."""
@@ -83,6 +91,10 @@ class RandomGoalsNode(MissionNode):
             return
         if self._goal is not None and not self._settle(self._goal):
             return
+        if self._again is not None:
+            if self.node.now_ns >= self._again[1]:
+                self._send(self._again[0])
+            return
         if self.driven >= self._config.distance:
             self.finish(succeeded=True)
             return
@@ -93,6 +105,12 @@ class RandomGoalsNode(MissionNode):
             self.note("the map has no free place that far away from the robot")
             self.finish(succeeded=False)
             return
+        self._tries = 0
+        self._send(goal)
+
+    def _send(self, goal: Pose2) -> None:
+        self._again, self._place = None, goal
+        self._tries += 1
         self.enter(f"goal {self.reached + self.failed + 1}: ({goal.x:.2f}, {goal.y:.2f})")
         target = pose_stamped(goal, self._robot_pose.frames.map, self.node.now_ns)
         self._goal = self._navigate.send_goal(new(NavigateToPose.Goal, pose=target))
@@ -104,6 +122,9 @@ class RandomGoalsNode(MissionNode):
         self._goal = None
         if goal.succeeded:
             self.reached += 1
+            return True
+        if self._tries <= self._config.retries:
+            self._again = self._place, self.node.now_ns + self._config.retry_after_ns
             return True
         self.failed += 1
         self.note(getattr(goal.result, "error_msg", "") or goal.error or "the goal was given up")

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.navigation.control.collision_monitor import CollisionMonitorConfig, MonitorPolygon
+from twin.models.specs import LidarSpec
+from twin.navigation.control.collision_monitor import (
+    FOOTPRINT_APPROACH,
+    CollisionMonitorConfig,
+    MonitorPolygon,
+)
 from twin.nodes.navigation.collision_monitor import CollisionMonitorNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.twist_mux import TwistMuxNode
@@ -11,26 +20,58 @@ from twin.runtime.stack_context import StackContext
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 
 _GUARDED = "cmd_vel_muxed"
+_SCAN = "scan"
+_REACTION_S = 0.2
+"""Age of a scan, and a command's way to the wheels."""
 
 
 def build_commands(
-    context: StackContext, config: CollisionMonitorParameters | None, pose: RobotPose, footprint: Array
+    context: StackContext,
+    config: CollisionMonitorParameters,
+    pose: RobotPose,
+    footprint: Array,
+    brakes: VelocitySmootherConfig,
 ) -> None:
-    """Create the multiplexer, and behind it the collision monitor if the scenario has one."""
+    """Create the multiplexer, and behind it the collision monitor if the robot has what it looks with.
+
+    Args:
+        context: What the robot's nodes are built from.
+        config: What the scenario overrides.
+        pose: What the robot believes about its pose.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+        brakes: What its drive can do.
+    """
     bus, namespace = context.bus, context.namespace
-    if config is None:
+    sensors = context.handle.description.sensors
+    scans = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
+    if not config.enabled or not (scans or config.range_topics):
         TwistMuxNode(bus, namespace=namespace)
         return
     TwistMuxNode(bus, output=_GUARDED, namespace=namespace)
+    polygons: tuple[MonitorPolygon, ...] = (_approach(brakes.linear),)
+    if config.polygons is not None:
+        polygons = tuple(MonitorPolygon(**polygon.model_dump()) for polygon in config.polygons)
     CollisionMonitorNode(
         bus,
         pose,
         footprint,
-        CollisionMonitorConfig(
-            polygons=tuple(MonitorPolygon(**polygon.model_dump()) for polygon in config.polygons),
-            source_timeout_ns=round(config.source_timeout * 1e9),
-        ),
+        CollisionMonitorConfig(polygons=polygons, source_timeout_ns=round(config.source_timeout * 1e9)),
+        brakes=brakes,
         cmd_vel_in=_GUARDED,
+        scan_topics=(_SCAN,) if scans else (),
         range_topics=config.range_topics,
         namespace=namespace,
+    )
+
+
+def _approach(limits: AxisLimits) -> MonitorPolygon:
+    """Return `approach` for a robot's brakes.
+
+    It lets the robot drive at d / T, d before an obstacle, which takes a deceleration of v / T.
+    """
+    braking = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
+    return replace(
+        FOOTPRINT_APPROACH,
+        time_before_collision=round(limits.max_velocity / braking + _REACTION_S, 2),
+        simulation_time_step=0.05,
     )

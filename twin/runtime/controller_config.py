@@ -28,6 +28,8 @@ from twin.runtime.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 
 _PERIOD_NS = 60_000_000
+_PATIENCE_NS = 4_000_000_000
+"""How long somebody in the way is waited for: until they have walked past, or are planned around."""
 _TOLERANCE = 0.05
 """Of position [m] and heading [rad]: what docking can start from."""
 _TOLERANCE_BUFFER = 0.25
@@ -37,37 +39,55 @@ _TURN = 1.2
 
 
 def controller_server_config(
-    parameters: ControllerParameters, smoother: VelocitySmootherConfig
+    parameters: ControllerParameters,
+    smoother: VelocitySmootherConfig,
+    further: Mapping[str, ControllerParameters] | None = None,
 ) -> ControllerServerConfig:
-    """Return the server's parameters for a robot that the velocity smoother limits."""
+    """Return the server's parameters for a robot that the velocity smoother limits.
+
+    Args:
+        parameters: Of the server, and of the controller `FollowPath`.
+        smoother: Its limits are the controllers'.
+        further: More controllers, by id; each brings a goal checker of the same id.
+    """
     overrides = parameters.overrides()
-    frequency = overrides.get("controller_frequency")
+    frequency, tolerance = overrides.get("controller_frequency"), overrides.get("failure_tolerance")
     period_ns = _PERIOD_NS if frequency is None else round(1e9 / frequency)
-    goal_checker, progress_checker = _goal_checker(overrides), _progress_checker(overrides)
-    controller: ControllerConfig
+    by_id = {"FollowPath": parameters, **(further or {})}
+    checkers = {
+        "general_goal_checker" if name == "FollowPath" else name: _goal_checker(one.overrides())
+        for name, one in by_id.items()
+    }
+    return ControllerServerConfig(
+        controllers={name: _controller(one, smoother, period_ns * 1e-9) for name, one in by_id.items()},
+        goal_checkers=checkers,
+        progress_checkers={"progress_checker": _progress_checker(overrides)},
+        controller_period_ns=period_ns,
+        failure_tolerance_ns=_PATIENCE_NS if tolerance is None else round(tolerance * 1e9),
+    )
+
+
+def _controller(
+    parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float
+) -> ControllerConfig:
+    overrides = parameters.overrides()
+    controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig
     if parameters.chosen == "mppi":
-        controller = overridden(_mppi(smoother, period_ns * 1e-9, overrides), overrides)
+        controller = overridden(_mppi(smoother, period, overrides), overrides)
     elif parameters.chosen == "dwb":
         controller = overridden(_dwb(smoother, overrides), overrides)
     else:
-        controller = overridden(_pure_pursuit(smoother, goal_checker.xy_goal_tolerance), overrides)
-    if parameters.shim:
-        angular = smoother.angular.max_velocity
-        shim = RotationShimConfig(
-            primary_controller=controller,
-            rotate_to_heading_angular_vel=min(_TURN, angular),
-            max_angular_accel=_TURN,
-            rotate_to_goal_heading=True,
-        )
-        controller = overridden(shim, overrides)
-    tolerance = overrides.get("failure_tolerance")
-    return ControllerServerConfig(
-        controllers={"FollowPath": controller},
-        goal_checkers={"general_goal_checker": goal_checker},
-        progress_checkers={"progress_checker": progress_checker},
-        controller_period_ns=period_ns,
-        failure_tolerance_ns=300_000_000 if tolerance is None else round(tolerance * 1e9),
+        tolerance = _goal_checker(overrides).xy_goal_tolerance
+        controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
+    if not parameters.shim:
+        return controller
+    shim = RotationShimConfig(
+        primary_controller=controller,
+        rotate_to_heading_angular_vel=min(_TURN, smoother.angular.max_velocity),
+        max_angular_accel=_TURN,
+        rotate_to_goal_heading=True,
     )
+    return overridden(shim, overrides)
 
 
 def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> RegulatedPurePursuitConfig:
@@ -83,6 +103,8 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         rotate_to_heading_min_angle=0.6,
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
+        max_linear_decel=_braking(smoother.linear),
+        cost_scaling_dist=0.7,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from twin.errors import ScenarioError
@@ -11,7 +12,8 @@ from twin.models.specs import ImuSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
-from twin.nodes.navigation.ekf import EkfNode, for_robot
+from twin.nodes.navigation.ekf import EkfNode, EkfNodeConfig, for_robot
+from twin.nodes.navigation.ekf_sources import EkfSource
 from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
@@ -21,6 +23,7 @@ from twin.runtime.nav2_parameters import amcl_with_file
 from twin.runtime.navigation_config import overridden
 from twin.runtime.stack_context import StackContext
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
+from twin.scenario.localisation_parameters import EkfParameters
 from twin.sim.noise import NoiseStream
 
 _MAP_UPDATE_INTERVAL = 2.0
@@ -50,12 +53,13 @@ def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, gues
     navigation = context.config.navigation
     file = navigation.params_file if navigation is not None else None
     amcl = overridden(AmclConfig(), overrides)
+    error = (config.initial_pose_error.xy, config.initial_pose_error.yaw)
     parameters, not_understood = amcl_with_file(amcl, frozenset(overrides), file, context.namespace)
     node = AmclNode(
         context.bus,
         pose,
         parameters.filter,
-        InitialPose.from_error(guess, config.initial_pose_error.xy, config.initial_pose_error.yaw),
+        None if config.initial_pose == "global" else InitialPose.from_error(guess, *error),
         seed=context.seed,
         config=parameters.node,
         namespace=context.namespace,
@@ -96,7 +100,22 @@ def build_odometry_filter(context: StackContext, frames: Frames) -> None:
             "odometry of type ekf needs both, type wheels needs no IMU"
         )
     config = for_robot(frames.odom, frames.base, context.control_period_ns, imus[0])
-    EkfNode(context.bus, config, namespace=context.namespace)
+    EkfNode(
+        context.bus, _with_overrides(config, context.config.odometry.parameters), namespace=context.namespace
+    )
+
+
+def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNodeConfig:
+    """Return a filter's config with the scenario's overrides, sources by name."""
+    sources = dict(config.sources)
+    for name, given in parameters.sources.items():
+        changes = {key: value for key, value in given.overrides().items() if value is not None}
+        try:
+            sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
+        except TypeError:
+            raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
+    ekf = overridden(config.ekf, parameters.overrides())
+    return replace(config, ekf=ekf, sources=sources)
 
 
 def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:

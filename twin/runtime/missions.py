@@ -102,6 +102,7 @@ def build_mission(
                 clearance=mission.clearance,
                 min_goal_distance=mission.min_goal_distance,
                 max_failed=mission.max_failed,
+                retries=mission.retries,
             )
             return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():

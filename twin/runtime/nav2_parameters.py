@@ -84,18 +84,20 @@ def amcl_with_file(
     return parameters, file.ignored()
 
 
-def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMonitorParameters | None:
-    """Return the collision monitor: the scenario's, else the file's; None if nobody wants one.
+def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMonitorParameters:
+    """Return the collision monitor: the scenario's, else the file's, else the default.
 
     Raises:
         NavigationError: the file is wrong.
     """
-    if config.collision_monitor is not None or config.params_file is None:
+    if config.collision_monitor is not None:
         return config.collision_monitor
+    if config.params_file is None:
+        return CollisionMonitorParameters()
     file = Nav2Parameters(Path(config.params_file), namespace)
     monitor = monitor_of(file)
     file.ignored()
-    return monitor
+    return monitor or CollisionMonitorParameters()
 
 
 def with_file(

@@ -92,17 +92,21 @@ def navigation_parameters(
         obstacle_max_range=3.0,
         expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
     )
+    # No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
     smoother = VelocitySmootherConfig(
-        linear=AxisLimits(
-            max_velocity=linear,
-            max_acceleration=config.max_linear_acceleration or 0.8,
-            max_deceleration=config.max_linear_deceleration or 1.2,
+        linear=_limits(
+            linear,
+            config.max_linear_acceleration or 0.8,
+            config.max_linear_deceleration or 1.2,
+            drive.max_linear_acceleration,
         ),
-        angular=AxisLimits(
-            max_velocity=angular,
-            max_acceleration=config.max_angular_acceleration or 2.0,
-            max_deceleration=config.max_angular_acceleration or 3.0,
+        angular=_limits(
+            angular,
+            config.max_angular_acceleration or 2.0,
+            config.max_angular_acceleration or 3.0,
+            drive.max_angular_acceleration,
         ),
+        scale_velocities=True,
     )
     return NavigationParameters(
         smoother=smoother,
@@ -119,7 +123,7 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
@@ -134,6 +138,14 @@ def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
     return replace(
         overridden(defaults, overrides),
         bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
+    )
+
+
+def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
+    return AxisLimits(
+        max_velocity=speed,
+        max_acceleration=min(acceleration, drive or acceleration),
+        max_deceleration=min(deceleration, drive or deceleration),
     )
 
 

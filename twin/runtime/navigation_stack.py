@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.specs import LidarSpec
+from twin.models.specs import DriveSpec, LidarSpec
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
@@ -50,7 +53,13 @@ def build_navigation(
     )
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    build_commands(context, monitor_with_file(config, namespace), pose, footprint)
+    build_commands(
+        context,
+        monitor_with_file(config, namespace),
+        pose,
+        footprint,
+        _drive_limits(parameters.smoother, description.drive),
+    )
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
@@ -82,3 +91,13 @@ def build_navigation(
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
     return navigator
+
+
+def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:
+    """Return what people may ask for, too: the smoother's accelerations at the drive's own speeds."""
+    linear, angular = drive.max_linear_velocity, drive.max_angular_velocity
+    return replace(
+        smoother,
+        linear=replace(smoother.linear, max_velocity=linear or smoother.linear.max_velocity),
+        angular=replace(smoother.angular, max_velocity=angular or smoother.angular.max_velocity),
+    )

@@ -34,12 +34,12 @@ class MonitorPolygonConfig(StrictModel):
 
 
 class CollisionMonitorParameters(StrictModel):
-    """Guards all commands, people's too; `collision_monitor: {}` slows down before the footprint collides."""
+    """Guards the commands of navigation and of people."""
 
-    polygons: tuple[MonitorPolygonConfig, ...] = (
-        MonitorPolygonConfig(name="FootprintApproach", action_type="approach", min_points=3),
-    )
-    """The slowest of their results holds."""
+    enabled: bool = True
+    """Whether there is one; only robots with a `scan` or `range_topics` have."""
+    polygons: tuple[MonitorPolygonConfig, ...] | None = None
+    """The slowest of their results holds; absent: `approach` with the footprint, as early as it brakes."""
     source_timeout: Annotated[Seconds, NotNegative] = 1.0
     """The robot stops when a sensor is silent for so long [s]; 0: it does not."""
     range_topics: tuple[str, ...] = ()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from twin.errors import nearest
 from twin.scenario.fields import NotNegative, Positive
@@ -26,6 +26,15 @@ from twin.strict_yaml import (
     Seconds,
 )
 
+
+def _not_the_first(name: str) -> str:
+    if name == "FollowPath":
+        raise ValueError("'FollowPath' is what `controller` describes; take another name")
+    return name
+
+
+ControllerId = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$"), AfterValidator(_not_the_first)]
+"""As in Nav2's controller_plugins."""
 Plugin = Literal["regulated_pure_pursuit", "dwb", "mppi"]
 
 
@@ -66,6 +75,8 @@ class PurePursuitParameters(ParameterGroup):
     """How far ahead a command is checked for collisions [s]."""
     turn_before_collision: bool | None = None
     """Whether, where the arc ahead is blocked, the robot turns in place or creeps before following fails."""
+    max_linear_decel: Annotated[float, NotNegative] | None = None
+    """With which the robot brakes: the way to a stop is kept free; 0: not [m/s²]."""
     use_collision_detection: bool | None = None
     """Whether commands are checked for collisions."""
     cost_scaling_dist: Annotated[Metres, Positive] | None = None
@@ -103,7 +114,7 @@ class ShimParameters(ParameterGroup):
     rotate_to_goal_heading: bool | None = None
     """Whether the robot turns in place at the goal, too."""
     rotate_to_heading_once: bool | None = None
-    """Whether only the beginning of a path is turned to."""
+    """Whether a path to the same goal as the last one is not turned to."""
 
 
 class ServerParameters(ParameterGroup):
@@ -139,6 +150,10 @@ _OF_PLUGIN: dict[str, tuple[type[ParameterGroup], ...]] = {
     "dwb": (DWBParameters,),
     "mppi": (MPPIParameters,),
 }
+
+
+_OF_EACH_CONTROLLER = {"plugin", "rotation_shim", "goal_checker", "xy_goal_tolerance", "yaw_goal_tolerance"}
+"""The server's keys that every controller has for itself."""
 
 
 class ControllerParameters(
@@ -186,3 +201,18 @@ class ControllerParameters(
             name: value.overrides() if isinstance(value, ParameterGroup) else value
             for name, value in found.items()
         }
+
+
+class FurtherControllerParameters(ControllerParameters):
+    """Parameters of a controller beside FollowPath, and of a goal checker of the same name."""
+
+    @model_validator(mode="after")
+    def _keys_of_no_server(self) -> FurtherControllerParameters:
+        server = set(ServerParameters.model_fields) - _OF_EACH_CONTROLLER
+        faults = [
+            Fault((name,), f"'{name}' holds for all controllers: give it under `controller`")
+            for name in sorted(server & self.model_fields_set)
+        ]
+        if faults:
+            raise Faults(faults)
+        return self

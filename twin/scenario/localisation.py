@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from twin.scenario.fields import FileBeside, Fraction, NameOrPath, NotNegative, PoseConfig, Positive
-from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, Radians, Seconds, StrictModel
+from twin.scenario.fields import FileBeside, NameOrPath, NotNegative, PoseConfig
+from twin.scenario.localisation_parameters import AmclParameters, EkfParameters, SlamParameters
+from twin.strict_yaml import Metres, Radians, StrictModel
 
 
 class InitialPoseError(StrictModel):
@@ -18,37 +18,6 @@ class InitialPoseError(StrictModel):
     """Distance from the true start, in a direction drawn from the seed [m]."""
     yaw: Annotated[Radians, NotNegative] = 0.0
     """Size of the heading error, its sign drawn from the seed [rad]."""
-
-
-class AmclParameters(ParameterGroup):
-    """Parameters of `/amcl`."""
-
-    min_particles: Annotated[int, Positive] | None = None
-    """Fewest particles."""
-    max_particles: Annotated[int, Positive] | None = None
-    """Most particles."""
-    alpha1: Annotated[float, NotNegative] | None = None
-    """Rotation noise from rotation."""
-    alpha2: Annotated[float, NotNegative] | None = None
-    """Rotation noise from translation."""
-    alpha3: Annotated[float, NotNegative] | None = None
-    """Translation noise from translation."""
-    alpha4: Annotated[float, NotNegative] | None = None
-    """Translation noise from rotation."""
-    max_beams: Annotated[int, Positive] | None = None
-    """Beams of a scan that are compared with the map."""
-    sigma_hit: Annotated[Metres, Positive] | None = None
-    """Standard deviation of a hit [m]."""
-    z_hit: Annotated[float, Fraction] | None = None
-    """Weight of hits in the beam model."""
-    z_rand: Annotated[float, Fraction] | None = None
-    """Weight of random readings in the beam model."""
-    laser_likelihood_max_dist: Annotated[Metres, Positive] | None = None
-    """Distance beyond which a beam says nothing [m]."""
-    update_min_d: Annotated[Metres, NotNegative] | None = None
-    """Translation before the next update [m]."""
-    update_min_a: Annotated[Radians, NotNegative] | None = None
-    """Rotation before the next update [rad]."""
 
 
 class WheelOdometry(StrictModel):
@@ -63,6 +32,8 @@ class EkfOdometry(StrictModel):
 
     type: Literal["ekf"]
     """`ekf`"""
+    parameters: EkfParameters = EkfParameters()
+    """Overrides of the filter's parameters."""
 
 
 Odometry = Annotated[WheelOdometry | EkfOdometry, Field(discriminator="type")]
@@ -93,31 +64,13 @@ class AmclLocalisation(StrictModel):
     """`amcl`"""
     map: NameOrPath | None = None
     """Name of a shipped map, or path of a map_server YAML file; absent: the arena's own map."""
+    initial_pose: Literal["start", "global"] = "start"
+    """`start`: a guess is given, the start within `initial_pose_error`; `global`: the robot has no idea and
+    looks for itself on the whole map (nav2_amcl's `set_initial_pose: false`)."""
     initial_pose_error: InitialPoseError = InitialPoseError()
     """How wrong the first guess is."""
     parameters: AmclParameters = AmclParameters()
     """Overrides of the filter's parameters."""
-
-
-class SlamParameters(ParameterGroup):
-    """Parameters of `/slam_toolbox`."""
-
-    resolution: Annotated[Metres, Positive] | None = None
-    """Edge of a cell of the map [m]."""
-    map_update_interval: Annotated[Seconds, Positive] | None = None
-    """Time between two maps [s]."""
-    min_laser_range: Annotated[Metres, NotNegative] | None = None
-    """Shorter readings are not used [m]."""
-    max_laser_range: Annotated[Metres, Positive] | None = None
-    """Longer readings are cut [m]."""
-    minimum_travel_distance: Annotated[Metres, NotNegative] | None = None
-    """A scan is taken after driving so far [m]..."""
-    minimum_travel_heading: Annotated[Radians, NotNegative] | None = None
-    """...or turning so far [rad]."""
-    do_loop_closing: bool | None = None
-    """Whether places that are seen again correct the graph."""
-    loop_search_maximum_distance: Annotated[Metres, Positive] | None = None
-    """How near a place has to be to be looked for [m]."""
 
 
 class SlamLocalisation(StrictModel):

@@ -135,7 +135,9 @@ class RandomGoals(StrictModel):
     min_goal_distance: Annotated[Metres, NotNegative] = 3.0
     """Distance of a goal from the robot, as the crow flies [m]."""
     max_failed: Annotated[int, NotNegative] = 0
-    """How many goals the navigator may give up; one more ends the mission."""
+    """How many goals may be given up; one more ends the mission."""
+    retries: Annotated[int, NotNegative] = 3
+    """How often a goal that the navigator gives up is sent again, 5 s later: somebody may stand on it."""
 
 
 class VelocityStep(StrictModel):

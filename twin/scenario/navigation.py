@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from pydantic import Field
+
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.controllers import ControllerParameters
+from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath, NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
@@ -82,7 +84,7 @@ class NavigationConfig(StrictModel):
     max_angular_acceleration: Annotated[float, Positive] | None = None
     """Limit of the velocity smoother, also when braking [rad/s²]."""
     collision_monitor: CollisionMonitorParameters | None = None
-    """Stops or slows down every command that leads into what the sensors see; absent: nobody does."""
+    """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; keys below go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
@@ -95,6 +97,8 @@ class NavigationConfig(StrictModel):
     """Overrides of the global planner."""
     controller: ControllerParameters = ControllerParameters()
     """Overrides of the path follower."""
+    controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)
+    """More of them, for goals and behaviour trees that name a controller or a goal checker."""
     global_costmap: CostmapParameters = CostmapParameters()
     """Overrides of the costmap that plans are made on."""
     local_costmap: CostmapParameters = CostmapParameters()

@@ -201,36 +201,40 @@ class _WheelServos:
         self._data, self._actuators, self._gain = data, actuators, gain
         joints = model.actuator_trnid[actuators, 0]
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        torque = np.array([_torque_limit(model, i) for i in actuators])
-        self._reach = torque / -model.actuator_biasprm[actuators, 2]
-        limited = model.actuator_ctrllimited[actuators].astype(bool)
-        self._fastest = np.where(limited, model.actuator_ctrlrange[actuators, 1], math.inf)
+        torques = [_torque_limit(model, i) for i in actuators]
+        damping = (-model.actuator_biasprm[actuators, 2]).tolist()
+        self._reach = [torque / slope for torque, slope in zip(torques, damping, strict=True)]
+        limited = model.actuator_ctrllimited[actuators].tolist()
+        ranges = model.actuator_ctrlrange[actuators, 1].tolist()
+        self._fastest = [top if known else math.inf for known, top in zip(limited, ranges, strict=True)]
         self.reset()
 
     def reset(self) -> None:
         """Owe nothing; to be called when the state was set from outside."""
-        self._command = np.zeros(len(self._actuators))
-        self._owed = np.zeros(len(self._actuators))
-        self._position = self._data.qpos[self._qpos]
+        self._command = [0.0] * len(self._actuators)
+        self._owed = [0.0] * len(self._actuators)
+        self._position: list[float] = self._data.qpos[self._qpos].tolist()
         self._time = float(self._data.time)
 
     def apply(self) -> None:
         """Add the integral to the commands in `ctrl`."""
-        data, gain = self._data, self._gain
-        position, speed = data.qpos[self._qpos], data.qvel[self._dof]
-        owed = self._owed + self._command * (data.time - self._time) - (position - self._position)
-        command = _clip(data.ctrl[self._actuators], -self._fastest, self._fastest)
-        low = np.maximum(speed - self._reach, -self._fastest) - command
-        high = np.minimum(speed + self._reach, self._fastest) - command
-        # Where the command alone is out of reach, nothing is owed.
-        self._owed = _clip(owed, np.minimum(low, 0.0) / gain, np.maximum(high, 0.0) / gain)
-        self._command, self._position, self._time = command, position, float(data.time)
-        data.ctrl[self._actuators] = command + gain * self._owed
-
-
-def _clip(values: Array, low: Array, high: Array) -> Array:
-    """Return what `np.clip` does, which for a few wheels costs three times as much."""
-    return np.minimum(np.maximum(values, low), high)
+        data = self._data
+        now = float(data.time)
+        elapsed = now - self._time
+        position, speed = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
+        commands = data.ctrl[self._actuators].tolist()
+        # Numbers one by one: for a few wheels arrays cost five times as much.
+        for i, (reach, fastest) in enumerate(zip(self._reach, self._fastest, strict=True)):
+            owed = self._owed[i] + self._command[i] * elapsed - (position[i] - self._position[i])
+            command = min(max(commands[i], -fastest), fastest)
+            low = max(speed[i] - reach, -fastest) - command
+            high = min(speed[i] + reach, fastest) - command
+            # Where the command alone is out of reach, nothing is owed.
+            self._owed[i] = min(max(owed, min(low, 0.0) / self._gain), max(high, 0.0) / self._gain)
+            self._command[i] = command
+            commands[i] = command + self._gain * self._owed[i]
+        self._position, self._time = position, now
+        data.ctrl[self._actuators] = commands
 
 
 def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:

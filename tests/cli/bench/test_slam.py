@@ -45,7 +45,7 @@ def test_a_log_is_mapped_and_scored(tmp_path: Path):
     assert trial["loops"] > 0
     assert (tmp_path / "flat.png").read_bytes().startswith(b"\x89PNG")
     assert OccupancyMap.load(tmp_path / "flat.yaml").width > 200
-    assert len(Slam.load(tmp_path / "flat.posegraph").graph().poses) == trial["scans"]
+    assert len(Slam.load(tmp_path / "flat.posegraph").graph().poses) > 0.9 * trial["scans"]
 
 
 def test_a_log_above_the_bar_fails(tmp_path: Path):

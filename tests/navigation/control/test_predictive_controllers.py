@@ -71,7 +71,7 @@ def make(request: pytest.FixtureRequest) -> Callable[[], Controller]:
     return lambda: shimmed(request.param)
 
 
-def hall(*boxes: tuple[float, float, float, float]) -> Costmap:
+def hall(*boxes: tuple[float, float, float, float], padding: float = 0.0) -> Costmap:
     """8 x 4 m, walled; boxes are x0, y0, x1, y1."""
     data = np.zeros((80, 160), dtype=np.int8)
     data[:2] = data[-2:] = 100

@@ -26,6 +26,14 @@ def test_from_the_surface_of_a_thing_at_the_left_front_corner(v: float, w: float
     assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, v, w, 0.05, 20, -1.0, -1.0, 0.025) is expected
 
 
+def test_a_robot_whose_outlines_cells_touch_something_may_back_off() -> None:
+    """The cell of its corner is lethal, what is in it is beside the robot: no sample is inside of it."""
+    costs = np.zeros((80, 80), dtype=np.uint8)
+    x, y = CORNERS.max(axis=0)
+    costs[int((y + 0.01 + 1.0) / 0.025), int((x + 0.01 + 1.0) / 0.025)] = 254
+    assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, -0.15, 0.0, 0.05, 20, -1.0, -1.0, 0.025)
+
+
 @pytest.mark.parametrize(("v", "expected"), [(-0.15, True), (0.15, False)])
 def test_an_outline_that_grazes_a_cell_which_no_sample_of_the_inside_hits(v: float, expected: bool) -> None:
     corners = np.array([[0.21, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.21, -0.15]])

@@ -138,6 +138,17 @@ def test_things_that_the_map_does_not_know(hall: Any, hall_map: OccupancyMap) ->
     assert yaw < 0.5
 
 
+def test_a_map_in_which_a_rack_is_half_a_metre_off(hall: Any) -> None:
+    wrong = type(hall)()
+    x0, y0, x1, y1 = wrong.boxes[2]  # 5 m long, driven past on both sides
+    wrong.boxes = (*wrong.boxes[:2], (x0, y0 + 0.5, x1, y1 + 0.5), *wrong.boxes[3:])
+    run = localise(hall, tracking(wrong.map(), 5))
+    position, yaw = rms(run)
+    assert position < 0.06
+    assert yaw < 1.0
+    assert np.hypot(run.errors[:, 0], run.errors[:, 1]).max() < 0.3
+
+
 def test_worse_odometry_than_the_config_says(hall: Any, hall_map: OccupancyMap) -> None:
     position, _ = rms(localise(hall, tracking(hall_map, 4, alpha1=0.2, alpha2=0.2, alpha3=0.2, alpha4=0.2)))
     assert position < 0.05

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from twin.navigation.localisation.ekf import (
     AX,
@@ -121,3 +122,37 @@ def test_measurements_make_it_surer_and_time_less_sure() -> None:
 def test_bad_matrices_are_refused() -> None:
     with pytest.raises(ValueError, match="process_noise_covariance must be 15 numbers"):
         EkfConfig(process_noise_covariance=(1.0,) * 14)
+
+
+def test_a_whole_process_noise_matrix_counts() -> None:
+    matrix = np.diag(EkfConfig().process_noise_covariance)
+    matrix[X, Y] = matrix[Y, X] = 0.02
+    ekf = Ekf(EkfConfig(process_noise_covariance=tuple(matrix.ravel())))
+    ekf.predict(0.5)
+    assert ekf.covariance[X, Y] == pytest.approx(0.01)
+    matrix[X, Y] = 0.0
+    with pytest.raises(ValueError, match="symmetric"):
+        EkfConfig(process_noise_covariance=tuple(matrix.ravel()))
+
+
+def test_its_covariance_is_honest_in_its_own_world() -> None:
+    """NEES over runs of a robot that moves, and is measured, with the noise that the filter assumes."""
+    q = np.zeros(SIZE)
+    q[[X, Y, YAW, VX, VYAW]] = 1e-5, 1e-5, 1e-5, 0.02, 0.05
+    runs, steps, dt = 60, 100, 0.05
+    states, found, random = [X, Y, YAW], [], np.random.default_rng(5)
+    R = np.diag([0.02**2, 0.03**2])
+    for _ in range(runs):
+        ekf = Ekf(EkfConfig(two_d_mode=True, process_noise_covariance=tuple(q)))
+        truth = np.zeros(SIZE)
+        truth[VX], truth[VYAW] = ekf.state[VX], ekf.state[VYAW]
+        for _ in range(steps):
+            truth = advanced(truth, dt) + random.normal(size=SIZE) * np.sqrt(q * dt)
+            ekf.predict(dt)
+            ekf.correct([VX, VYAW], truth[[VX, VYAW]] + random.normal(size=2) * np.sqrt(np.diag(R)), R)
+        error = ekf.state[states] - truth[states]
+        error[2] = math.remainder(error[2], 2.0 * math.pi)
+        found.append(error @ np.linalg.solve(ekf.covariance[np.ix_(states, states)], error))
+    # The sum over the runs is chi-squared with 3 degrees of freedom each: 99.9 % bounds.
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs) / runs
+    assert low < float(np.mean(found)) < high

@@ -171,3 +171,11 @@ def test_it_can_be_switched_off(bench: Bench) -> None:
     assert answer.success
     bench.run(0.1)
     assert driven.robot.commands[-1] == (1.0, 0.0)
+
+
+def test_a_robot_that_is_touched_may_drive_away_but_not_on() -> None:
+    approach = MonitorPolygon(name="Ahead", action_type="approach", min_points=3)
+    touching = points(5, x=0.19)
+    assert monitor(approach).process((-0.2, 0.0), touching) == Action((-0.2, 0.0))
+    assert monitor(approach).process((0.2, 0.0), touching).velocity == (0.0, 0.0)
+    assert monitor(approach).process((0.0, 0.1), touching).velocity == (0.0, 0.0)

@@ -16,16 +16,25 @@ from twin.bridge.msgs import (
     PoseWithCovarianceStamped,
     Quaternion,
     Twist,
+    TwistWithCovariance,
+    TwistWithCovarianceStamped,
     Vector3,
     header,
 )
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.srvs import SetEkfPose
 from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.geometry import Pose2, Pose3
+from twin.navigation.localisation.ekf import SIZE, VX, VY, VYAW, X, Y
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
 from twin.nodes.navigation.ekf import EkfNode, EkfNodeConfig
+from twin.nodes.navigation.ekf_sources import EkfSource
 from twin.nodes.transforms import TransformListenerNode
+
+
+def which(*chosen: int) -> tuple[bool, ...]:
+    return tuple(state in chosen for state in range(SIZE))
 
 
 class Driven:
@@ -89,7 +98,7 @@ def test_the_gyroscope_is_believed_about_turns_and_its_bias_is_learnt(bench: Ben
     wheels = abs(math.remainder(robot.drive.odometry.pose.yaw - robot.yaw, 2.0 * math.pi))
     assert wheels > 0.5
     assert robot.error < 0.04
-    assert robot.ekf.bias.value[2] == pytest.approx(robot.bias, abs=1e-4)
+    assert robot.ekf.biases[1].value[2] == pytest.approx(robot.bias, abs=1e-4)
 
 
 def test_it_publishes_the_transform_and_the_covariance_grows(bench: Bench) -> None:
@@ -125,3 +134,37 @@ def test_an_imu_that_returns_nan_leaves_the_wheels(bench: Bench) -> None:
     assert np.isfinite(robot.ekf.filter.state).all()
     wheels = robot.drive.odometry.pose.yaw
     assert yaw_from_quaternion(robot.filtered[-1].pose.pose.orientation) == pytest.approx(wheels, abs=0.05)
+
+
+def test_a_second_source_and_the_service_set_pose(bench: Bench) -> None:
+    """A pose source corrects where the wheels lead; its parameters have robot_localization's names."""
+    sources = {
+        "odom0": EkfSource(topic="odom", config=which(VX, VYAW)),
+        "pose0": EkfSource(topic="fix", config=which(X, Y)),
+        "twist0": EkfSource(topic="speed", config=which(VY)),
+    }
+    node = EkfNode(bench.bus, EkfNodeConfig(sources=sources))
+    filtered = bench.listen(Odometry, "odometry/filtered", 10)
+    speeds = bench.node.create_publisher(TwistWithCovarianceStamped, "speed", 10)
+    fixes = bench.node.create_publisher(PoseWithCovarianceStamped, "fix", 10)
+    assert node.node.parameters.get("pose0_config").value == list(which(X, Y))
+    for _ in range(20):
+        pose = PoseWithCovariance(pose=pose_from_pose2(Pose2(2.0, -1.0, 0.0)), covariance=np.eye(6).ravel())
+        fixes.publish(PoseWithCovarianceStamped(header=header(bench.clock.now_ns, "odom"), pose=pose))
+        still = TwistWithCovariance(twist=twist_from_planar(0.0, 0.0), covariance=np.eye(6).ravel() * 0.1)
+        speeds.publish(
+            TwistWithCovarianceStamped(header=header(bench.clock.now_ns, "base_footprint"), twist=still)
+        )
+        bench.run(0.1)
+    position = filtered[-1].pose.pose.position
+    assert (position.x, position.y) == pytest.approx((2.0, -1.0), abs=0.8)
+    client = bench.node.create_client(SetEkfPose, "set_pose")
+    pose = PoseWithCovariance(pose=pose_from_pose2(Pose2(7.0, 3.0, 1.0)), covariance=np.eye(6).ravel() * 1e-4)
+    client.call_async(SetEkfPose.Request(pose=PoseWithCovarianceStamped(header=header(0, "odom"), pose=pose)))
+    bench.run(0.2)
+    assert filtered[-1].pose.pose.position.x == pytest.approx(7.0, abs=0.01)
+
+
+def test_a_source_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="no source is called 'gps0'"):
+        EkfNodeConfig(sources={"gps0": EkfSource(topic="gps", config=which(X))})

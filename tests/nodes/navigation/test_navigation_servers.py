@@ -11,11 +11,12 @@ import pytest
 from tests.nodes.conftest import Bench, Robot, map_of_room, open_room
 from twin.bridge.action_types import ComputePathToPose, FollowPath
 from twin.bridge.actions import ActionClient
-from twin.bridge.msgs import GoalStatus, OccupancyGrid, Path, SpeedLimit, new
+from twin.bridge.msgs import GoalStatus, MarkerArray, OccupancyGrid, Path, SpeedLimit, new
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import ClearEntireCostmap, GetMap, IsPathValid
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
+from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
@@ -407,3 +408,17 @@ def test_the_feedback_and_the_local_plan_tell_where_it_goes(bench: Bench, stack:
     ahead = path_array(plans[-1])
     assert ahead[0, 0] == pytest.approx(stack.robot.pose.x, abs=0.08)
     assert ahead[-1, :2] == pytest.approx([2.0, 0.0])
+
+
+def test_mppis_rollouts_are_shown_to_those_who_look(bench: Bench) -> None:
+    stack = Stack(bench, controllers={"FollowPath": MPPIConfig(batch_size=100, time_steps=30)})
+    sent = stack.plan(2.5, 1.5)
+    got = bench.listen(MarkerArray, "trajectories")
+    stack.drive(sent.result.path)
+    bench.run(1.0)
+    candidates, best = got[-1].markers
+    assert (candidates.ns, best.ns) == ("Candidate Trajectories", "Optimal Trajectory")
+    assert candidates.header.frame_id == "map"
+    assert len(candidates.points) == len(candidates.colors) == 100 // 5 * 30 // 3
+    first = best.points[0]
+    assert math.hypot(first.x - stack.robot.pose.x, first.y - stack.robot.pose.y) < 0.2

@@ -122,6 +122,18 @@ class ActionServer:
         Returns:
             False: the server stays, whatever there is to do.
         """
+        if self._running:
+            self._advance()
+        if self._queue and not self._running:
+            self._start(*self._queue.popleft())
+        while self._ended:
+            goal_id, ended = next(iter(self._ended.items()))
+            if self._clock.now_ns - ended.time_ns <= self._result_timeout_ns:
+                break
+            self._forget(goal_id)
+        return False
+
+    def _advance(self) -> None:
         for run in tuple(self._running):
             if run not in self._running:
                 continue
@@ -131,14 +143,6 @@ class ActionServer:
                 self._return(run, end.value)
             if run not in self._running:  # it ended itself, by destroying its node
                 tasks.close(run.generator)
-        if self._queue and not self._running:
-            self._start(*self._queue.popleft())
-        while self._ended:
-            goal_id, ended = next(iter(self._ended.items()))
-            if self._clock.now_ns - ended.time_ns <= self._result_timeout_ns:
-                break
-            self._forget(goal_id)
-        return False
 
     def publish_feedback(self, handle: GoalHandle, feedback: Any) -> None:
         """Publish feedback of a goal; nothing after the server's end.

@@ -63,7 +63,7 @@ def encode_odometry(message: Odometry) -> bytes:
 
 def decode_odometry(payload: bytes) -> Odometry:
     """Return an Odometry from little-endian CDR."""
-    stamp, (frame, child), at = _read_head(payload, 2)
+    stamp, (frame, child), at = _read_head(payload, 2, _ODOMETRY_NUMBERS.size)
     x, y, z, qx, qy, qz, qw, pose_covariance, *twist, twist_covariance = _ODOMETRY_NUMBERS.unpack_from(
         payload, at
     )
@@ -102,7 +102,7 @@ def encode_imu(message: Imu) -> bytes:
 
 def decode_imu(payload: bytes) -> Imu:
     """Return an Imu from little-endian CDR."""
-    stamp, (frame,), at = _read_head(payload, 1)
+    stamp, (frame,), at = _read_head(payload, 1, _IMU_NUMBERS.size)
     qx, qy, qz, qw, co, wx, wy, wz, cw, ax, ay, az, ca = _IMU_NUMBERS.unpack_from(payload, at)
     check_end(payload, at + _IMU_NUMBERS.size)
     return Imu(
@@ -212,10 +212,27 @@ def check_end(payload: bytes, at: int) -> None:
         raise ValueError(f"{len(payload) - at} bytes after the message")
 
 
-def _read_head(payload: bytes, texts: int) -> tuple[Time, list[str], int]:
-    """Read stamp and texts; return them and where the doubles start."""
-    stamp, at, found = Time(*_STAMP.unpack_from(payload, 4)), 12, []
+def _read_head(payload: bytes, texts: int, after: int) -> tuple[Time, tuple[str, ...], int]:
+    """Read stamp and texts, which `after` bytes follow; return them and where the doubles start."""
+    stamp, at = Time(*_STAMP.unpack_from(payload, 4)), len(payload) - after
+    if 0 < at - 12 <= _LONGEST_KNOWN:  # a publisher's texts do not change: they are read once
+        found, end = _known_texts(payload[12:at], texts)
+        if end == at:
+            return stamp, found, at
+    return stamp, *_read_texts(payload[12:], texts)
+
+
+_LONGEST_KNOWN = 256
+"""No more bytes of texts are kept, whatever is sent."""
+
+
+def _read_texts(block: bytes, texts: int) -> tuple[tuple[str, ...], int]:
+    """Read texts that begin 12 bytes into a payload; return them and where in it the doubles start."""
+    found, at = [], 0
     for _ in range(texts):
-        text, at = read_text(payload, at)
+        text, at = read_text(block, at)
         found.append(text)
-    return stamp, found, at + (4 - at) % 8
+    return tuple(found), 12 + at + -at % 8
+
+
+_known_texts = lru_cache(maxsize=256)(_read_texts)

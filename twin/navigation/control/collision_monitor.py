@@ -12,6 +12,8 @@ from twin.geometry import Array
 from twin.navigation._jit import jit
 
 ActionType = Literal["stop", "slowdown", "limit", "approach"]
+_ESCAPE_S = 0.3
+"""How far a command is looked ahead that may lead out of a collision."""
 INVALID_SOURCE = "invalid source"
 """What the action's polygon is called while a sensor is silent."""
 
@@ -110,6 +112,8 @@ class CollisionMonitor:
                 polygon.time_before_collision,
                 polygon.min_points,
             )
+            if time == 0.0 and self._escapes(corners, velocity, points):
+                return 1.0
             return 1.0 if time < 0.0 else min(1.0, time / polygon.time_before_collision)
         if time_to_collision(points, corners, 0.0, 0.0, 1.0, -1.0, polygon.min_points) < 0.0:
             return 1.0
@@ -121,6 +125,39 @@ class CollisionMonitor:
         linear = polygon.linear_limit / abs(v) if v else 1.0
         angular = polygon.angular_limit / abs(w) if w else 1.0
         return min(1.0, linear, angular)
+
+    def _escapes(self, corners: Array, velocity: tuple[float, float], points: Array) -> bool:
+        """Whether a command leads out of points that are in the polygon already: else the robot is caught."""
+        v, w = (float(value) for value in velocity)
+        before = count_inside(points, corners, 0.0, 0.0, 0.0)
+        turned = w * _ESCAPE_S
+        after = count_inside(
+            points,
+            corners,
+            v * _ESCAPE_S * math.cos(0.5 * turned),
+            v * _ESCAPE_S * math.sin(0.5 * turned),
+            turned,
+        )
+        return after < before
+
+
+@jit
+def count_inside(points: Array, corners: Array, x: float, y: float, yaw: float) -> int:
+    """Return how many points, shape (n, 2), are in a polygon, shape (m, 2), moved to a pose."""
+    c, s, inside, n = math.cos(yaw), math.sin(yaw), 0, corners.shape[0]
+    for k in range(points.shape[0]):
+        dx, dy = points[k, 0] - x, points[k, 1] - y
+        px, py = c * dx + s * dy, -s * dx + c * dy
+        odd, j = False, n - 1
+        for i in range(n):
+            if (corners[i, 1] > py) != (corners[j, 1] > py) and px < (corners[j, 0] - corners[i, 0]) * (
+                py - corners[i, 1]
+            ) / (corners[j, 1] - corners[i, 1]) + corners[i, 0]:
+                odd = not odd
+            j = i
+        if odd:
+            inside += 1
+    return inside
 
 
 @jit
@@ -141,26 +178,11 @@ def time_to_collision(
         min_points: How many points make a collision.
     """
     x, y, yaw, time = 0.0, 0.0, 0.0, -dt
-    n = corners.shape[0]
-    while True:
-        c, s, inside = math.cos(yaw), math.sin(yaw), 0
-        for k in range(points.shape[0]):
-            dx, dy = points[k, 0] - x, points[k, 1] - y
-            px, py = c * dx + s * dy, -s * dx + c * dy
-            odd, j = False, n - 1
-            for i in range(n):
-                if (corners[i, 1] > py) != (corners[j, 1] > py) and px < (corners[j, 0] - corners[i, 0]) * (
-                    py - corners[i, 1]
-                ) / (corners[j, 1] - corners[i, 1]) + corners[i, 0]:
-                    odd = not odd
-                j = i
-            if odd:
-                inside += 1
-        if inside >= min_points:
-            return max(time, 0.0)
+    while count_inside(points, corners, x, y, yaw) < min_points:
         time += dt
         if time > horizon + 1e-9:
             return -1.0
         x += v * dt * math.cos(yaw)
         y += v * dt * math.sin(yaw)
         yaw += w * dt
+    return max(time, 0.0)

@@ -111,7 +111,7 @@ class PathHandler:
         """Return what lies ahead of the robot at `pose`; moves on along the path."""
         last, reversing = self._segments[0]
         self._advance(pose, last)
-        if len(self._segments) > 1 and self._reached(pose, last):
+        while len(self._segments) > 1 and self._reached(pose, last, reversing):
             self._segments.pop(0)
             self._nearest = last
             last, reversing = self._segments[0]
@@ -133,12 +133,15 @@ class PathHandler:
         near = self._poses[self._nearest : end + 1]
         self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
 
-    def _reached(self, pose: Pose2, index: int) -> bool:
+    def _reached(self, pose: Pose2, index: int, reversing: bool) -> bool:
+        """Whether the robot is at a cusp: near to it, and turned as the path is there, or past it."""
         x, y, yaw = self._poses[index].tolist()
-        return (
-            math.hypot(pose.x - x, pose.y - y) <= self.config.inversion_xy_tolerance
-            and abs(wrap_angle(pose.yaw - yaw)) <= self.config.inversion_yaw_tolerance
-        )
+        dx, dy = x - pose.x, y - pose.y
+        if math.hypot(dx, dy) > self.config.inversion_xy_tolerance:
+            return False
+        ahead = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw)
+        past = ahead >= 0.0 if reversing else ahead <= 0.0
+        return past or abs(wrap_angle(pose.yaw - yaw)) <= self.config.inversion_yaw_tolerance
 
 
 def dense(path: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:

@@ -93,6 +93,10 @@ class RegulatedPurePursuitConfig:
     """[m/s²]"""
     min_distance_to_obstacle: float = -1.0
     """Shortest way that is checked for collisions, also where it takes longer; negative: none [m]."""
+    max_linear_decel: float = 0.0
+    """Of the robot: the way to a stop from the present speed is always checked; 0: it is not [m/s²]."""
+    reaction_time: float = 0.3
+    """Part of the way to a stop: age of what the costmap shows, and a command's way to the wheels [s]."""
 
 
 @dataclass(kw_only=True)
@@ -208,17 +212,20 @@ class RegulatedPurePursuit:
             v, w = 0.0, self._rotate(bearing, velocity[1], dt)
         else:
             curvature = 2.0 * y / (x * x + y * y) if x * x + y * y > 0.001 else 0.0
-            v = sign * self._regulate(curvature, costmap_pose or pose, local[-1], ahead.length, costmap)
+            v = sign * self._regulate(
+                curvature, costmap_pose or pose, local, ahead.length, costmap, velocity[0]
+            )
             if self._cancelling and config.use_cancel_deceleration:
                 v = sign * max(0.0, sign * velocity[0] - config.cancel_deceleration * dt)
             w = v * curvature
         self._stopped = self._cancelling and v == 0.0
         if costmap is None or not config.use_collision_detection:
             return v, w
+        least = self._way_to_stop(velocity[0])
         if config.turn_before_collision and v > 0.0:
             turn = self._rotate(bearing, velocity[1], dt)
-            return self._first_free(v, w, turn, costmap_pose or pose, distance, costmap)
-        self._check(costmap_pose or pose, v, w, distance, costmap)
+            return self._first_free(v, w, turn, costmap_pose or pose, distance, least, costmap)
+        self._check(costmap_pose or pose, v, w, distance, least, costmap)
         return v, w
 
     def _curvature_point(self, local: Array) -> tuple[float, float]:
@@ -247,7 +254,13 @@ class RegulatedPurePursuit:
         )
 
     def _regulate(
-        self, curvature: float, pose: Pose2, end: Array, length: float, costmap: Costmap | None
+        self,
+        curvature: float,
+        pose: Pose2,
+        local: Array,
+        length: float,
+        costmap: Costmap | None,
+        v_now: float,
     ) -> float:
         """Return the linear velocity: slower in turns, near obstacles and at the end."""
         config = self.config
@@ -255,26 +268,30 @@ class RegulatedPurePursuit:
         if config.use_regulated_linear_velocity_scaling and curvature != 0.0:
             v = min(v, limit * abs(1.0 / curvature) / config.regulated_linear_scaling_min_radius)
         if config.use_cost_regulated_linear_velocity_scaling and costmap is not None:
-            cost = costmap.cost_at(pose.x, pose.y)
-            if cost not in (NO_INFORMATION, FREE_SPACE):
-                decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
-                clearance = costmap.inscribed_radius - decay / costmap.cost_scaling_factor
-                if clearance < config.cost_scaling_dist:
-                    v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
+            clearance = self._clearance(pose, local, costmap, self._way_to_stop(v_now))
+            if clearance < config.cost_scaling_dist:
+                v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
         v = max(v, config.regulated_linear_scaling_min_speed)
         approach = config.approach_velocity_scaling_dist
         if length < approach:
-            remaining = math.hypot(end[0], end[1])
+            remaining = math.hypot(*local[-1])
             v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
         return min(v, limit)
 
     def _first_free(
-        self, v: float, w: float, turn: float, pose: Pose2, carrot_dist: float, costmap: Costmap
+        self,
+        v: float,
+        w: float,
+        turn: float,
+        pose: Pose2,
+        carrot_dist: float,
+        least: float,
+        costmap: Costmap,
     ) -> tuple[float, float]:
         """Return the command, or what may be done instead of it; raises NoValidControl if nothing may."""
         creep = self.config.creep_speed
         try:
-            self._check(pose, v, w, carrot_dist, costmap)
+            self._check(pose, v, w, carrot_dist, least, costmap)
         except NoValidControl:
             at = float(pose.x), float(pose.y), float(pose.yaw)
             if outline_cost(costmap.costs, self.footprint, *at, *costmap.frame) == LETHAL_OBSTACLE:
@@ -287,13 +304,36 @@ class RegulatedPurePursuit:
                 if abs(way[0]) < 0.01 and abs(way[1]) < 0.05:
                     continue  # standing still leads nowhere
                 with suppress(NoValidControl):
-                    self._check(pose, *way, carrot_dist, costmap)
+                    self._check(pose, *way, carrot_dist, least, costmap)
                     return way
             raise
         return v, w
 
-    def _check(self, pose: Pose2, v: float, w: float, carrot_dist: float, costmap: Costmap) -> None:
-        """Project the command up to the carrot, a cell at a time (nav2's CollisionChecker)."""
+    def _way_to_stop(self, v: float) -> float:
+        """Return how far the robot still drives at least [m]."""
+        config = self.config
+        if config.max_linear_decel <= 0.0:
+            return config.min_distance_to_obstacle
+        way = abs(v) * config.reaction_time + v * v / (2.0 * config.max_linear_decel)
+        return max(way, config.min_distance_to_obstacle)
+
+    def _clearance(self, pose: Pose2, local: Array, costmap: Costmap, way: float) -> float:
+        """Return how near the robot and the next `way` of its path come to an obstacle, from the costs."""
+        points = [(pose.x, pose.y)]
+        if way > 0.0:
+            near = local[np.hypot(local[:, 0], local[:, 1]) < way]
+            points += [tuple(point) for point in pose.apply(near[::2]).tolist()]
+        costs = [costmap.cost_at(x, y) for x, y in points]
+        cost = max((cost for cost in costs if cost not in (NO_INFORMATION, FREE_SPACE)), default=FREE_SPACE)
+        if cost == FREE_SPACE:
+            return math.inf
+        decay = math.log(cost / (INSCRIBED_INFLATED_OBSTACLE - 1))
+        return costmap.inscribed_radius - decay / costmap.cost_scaling_factor
+
+    def _check(
+        self, pose: Pose2, v: float, w: float, carrot_dist: float, least: float, costmap: Costmap
+    ) -> None:
+        """Project the command up to the carrot, a cell at a time (Nav2's CollisionChecker), or `least`."""
         if abs(v) < 0.01 and abs(w) > 0.01:
             step = 2.0 * math.asin(min(1.0, costmap.resolution / 2.0 / self._radius)) / abs(w)
         elif abs(v) >= 0.01:
@@ -301,9 +341,9 @@ class RegulatedPurePursuit:
         else:
             return
         allowed = self.config.max_allowed_time_to_collision_up_to_carrot
-        if self.config.min_distance_to_obstacle > 0.0 and abs(v) >= 0.01:
-            allowed = max(allowed, self.config.min_distance_to_obstacle / abs(v))
-            carrot_dist = max(carrot_dist, self.config.min_distance_to_obstacle)
+        if least > 0.0 and abs(v) >= 0.01:
+            allowed = max(allowed, least / abs(v))
+            carrot_dist = max(carrot_dist, least)
         hit = steps_to_collision(
             costmap.costs,
             self.footprint,

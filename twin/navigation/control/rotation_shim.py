@@ -42,7 +42,7 @@ class RotationShimConfig:
     rotate_to_goal_heading: bool = False
     """Whether the robot turns in place at the goal, too."""
     rotate_to_heading_once: bool = False
-    """Whether only the beginning of a path is turned to."""
+    """Whether a path to the same goal as the last one is not turned to."""
     closed_loop: bool = True
     """Whether the measured turn rate counts, not the last commanded one."""
     use_path_orientations: bool = False
@@ -136,8 +136,11 @@ class RotationShim:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
             NoValidControl: the primary controller finds no command.
         """
+        before = self._handler.path
         if self._handler.accept(path):
-            self._turning = self._aligned = self._at_goal = False
+            same = before is not None and len(before) > 0 and np.array_equal(before[-1], path[-1])
+            self._aligned &= same and self.config.rotate_to_heading_once
+            self._turning = self._at_goal = False
         angle = self._angle(pose, path)
         w = 0.0 if angle is None else self._turn_rate(angle, velocity[1], dt)
         # Where there is no room to turn the primary controller may know a way, as in Nav2.

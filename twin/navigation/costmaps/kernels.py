@@ -245,4 +245,4 @@ def escapes(
         last = _contact(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
         if last > first:
             return False
-    return last < 0.8 * first
+    return last == 0 or last < 0.8 * first  # none at all: only the outline's cells touch something

@@ -20,8 +20,8 @@ def travel_distances(passable: NDArray[np.bool_], distance: Array) -> None:
 
     Args:
         passable: Where the robot's centre may be, shape (h, w).
-        distance: Shape (h, w): what is finite is where the ways begin, after so much, no cell farther than
-            those beside it allow; written.
+        distance: Shape (h, w): what is finite is where the ways begin, after so much, each cell as near as
+            the ones beside it allow; written.
     """
     height, width = passable.shape
     size = height * width

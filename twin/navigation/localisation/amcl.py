@@ -27,10 +27,15 @@ from twin.navigation.localisation.particles import (
     systematic_resample,
 )
 from twin.navigation.localisation.surface_distance import SurfaceDistance
+from twin.navigation.localisation.unmapped import explained_share
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 
 _FIT_SIGMA = 0.1
 """Distance from the nearest surface at which a beam counts as explained by 0.6 [m]."""
+
+
+_BETTER = 0.25
+"""By so much more of the scan must be explained elsewhere before the robot is looked for there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +131,7 @@ class Amcl:
         self.estimate = self._estimated(odom, beams)
         self._updates += 1
         if self._updates % config.resample_interval == 0:
-            self._resample(beams, self.estimate.lost)
+            self._resample(beams, self.estimate)
         return self.estimate
 
     def rebase(self, odom: Pose2) -> None:
@@ -191,8 +196,9 @@ class Amcl:
         fit = math.nan
         if len(beams):
             distances = self._surfaces.at(pose.apply(beams.ends))
-            fit = float(np.mean(np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)))
-            self._confidence.update(fit)
+            shares = np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)
+            fit = float(np.mean(shares))
+            self._confidence.update(explained_share(shares, beams, pose, self._surfaces))
             self.hits.learn(distances)
         elif self.estimate is not None:
             # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.
@@ -207,7 +213,7 @@ class Amcl:
             lost=self._confidence.lost,
         )
 
-    def _resample(self, beams: Beams, lost: float) -> None:
+    def _resample(self, beams: Beams, estimate: Estimate) -> None:
         """Draw as many particles as the spread of the belief asks for (KLD sampling)."""
         config = self.config
         likely = self.weights * config.max_particles > 0.5  # would be drawn into the largest sample
@@ -218,10 +224,19 @@ class Amcl:
         noise = self._random.standard_normal((count, 3))
         self.particles = regularised(kept, clusters(kept), noise)
         self.weights = np.full(count, 1.0 / count)
-        fresh = round(lost * count)
+        fresh = round(estimate.lost * count)
         if fresh and len(beams):
-            replaced = np.linspace(0, count - 1, fresh).astype(np.int64)
-            self.particles[replaced] = self._where_it_fits(fresh, beams)
+            found = self._where_it_fits(fresh, beams)
+            # A map that is wrong here fits nowhere: only a clearly better place is worth a doubt.
+            found = found[self._fits(found, beams) > self._fits(np.array([estimate.pose]), beams) + _BETTER]
+            replaced = np.linspace(0, count - 1, len(found)).astype(np.int64)
+            self.particles[replaced] = found
+
+    def _fits(self, poses: Array, beams: Beams) -> Array:
+        """Return the share of a scan that the map explains at poses, shape (n, 3) -> (n,)."""
+        distances = [self._surfaces.at(Pose2(*pose).apply(beams.ends)) for pose in poses.tolist()]
+        residuals = np.array(distances).reshape(len(poses), -1) + self.hits.depth
+        return np.asarray(np.exp(-0.5 * (residuals / _FIT_SIGMA) ** 2).mean(axis=1))
 
     def _where_it_fits(self, count: int, beams: Beams) -> Array:
         """Return poses from all over the map that explain a scan, shape (count, 3).

@@ -28,7 +28,7 @@ _FLAT_VARIANCE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class EkfConfig:
-    """Parameters; names and defaults are robot_localization's, matrices by their diagonals."""
+    """Parameters; names and defaults are robot_localization's, matrices their diagonals, or whole by rows."""
 
     two_d_mode: bool = False
     """Whether z, roll, pitch and what moves along them stay zero."""
@@ -42,9 +42,12 @@ class EkfConfig:
 
     def __post_init__(self) -> None:
         for name in ("process_noise_covariance", "initial_estimate_covariance"):
-            values = getattr(self, name)
-            if len(values) != SIZE or not all(np.isfinite(values)) or min(values) < 0.0:
-                raise ValueError(f"ekf: {name} must be {SIZE} numbers that are not negative")
+            values = np.asarray(getattr(self, name), dtype=np.float64)
+            if len(values) not in (SIZE, SIZE * SIZE) or not np.isfinite(values).all():
+                raise ValueError(f"ekf: {name} must be {SIZE} numbers, or {SIZE}² of a matrix by rows")
+            matrix = _matrix(values)
+            if np.linalg.eigvalsh(matrix).min() < -1e-12 or np.abs(matrix - matrix.T).max() > 1e-12:
+                raise ValueError(f"ekf: {name} must be a covariance: symmetric, no variance negative")
 
 
 class Ekf:
@@ -53,16 +56,16 @@ class Ekf:
     def __init__(self, config: EkfConfig | None = None) -> None:
         self.config = config or EkfConfig()
         self.state: Array = np.zeros(SIZE)
-        self.covariance: Array = np.diag(self.config.initial_estimate_covariance)
+        self.covariance: Array = _matrix(self.config.initial_estimate_covariance)
         """Of the state, shape (15, 15)."""
-        self._process = np.diag(self.config.process_noise_covariance)
+        self._process = _matrix(self.config.process_noise_covariance)
         self._flatten()
 
     def set_pose(self, xyz_rpy: ArrayLike, covariance: ArrayLike) -> None:
         """Start again from a pose, shape (6,), and its covariance, shape (6, 6); the robot stands still."""
         self.state[:] = 0.0
         self.state[:6] = xyz_rpy
-        self.covariance = np.diag(self.config.initial_estimate_covariance)
+        self.covariance = _matrix(self.config.initial_estimate_covariance)
         self.covariance[:6, :6] = covariance
         self._flatten()
 
@@ -146,6 +149,12 @@ class Ekf:
         F[ANGLES, PITCH] += dt * np.array([along / cp**2, 0.0, along * tp / cp])
         F[VELOCITY, ACCELERATION] = dt * np.eye(3)
         return F
+
+
+def _matrix(values: ArrayLike) -> Array:
+    """Return a square matrix of its diagonal, or of all its numbers by rows."""
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.diag(numbers) if len(numbers) == SIZE else numbers.reshape(SIZE, SIZE).copy()
 
 
 def advanced(state: Array, dt: float) -> Array:

@@ -10,7 +10,7 @@ from twin.geometry import Array
 
 _LEAST_SIGMA = 0.02
 """Narrower hits are not believed: a grid is not finer than that [m]."""
-_WIDTH = 2.0
+_WIDTH = 1.4
 """Hits are taken as so much wider than they are measured: neighbouring beams share the map's faults."""
 _FIRST_GAIN, _GAIN = 0.5, 0.02
 _LEAST_HITS = 10

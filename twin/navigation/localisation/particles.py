@@ -151,10 +151,6 @@ def _shrunk_and_blurred(
     return moved
 
 
-def _wrapped(yaw: Array) -> Array:
-    return yaw - 2.0 * math.pi * np.round(yaw / (2.0 * math.pi))
-
-
 def mean_and_covariance(particles: Array, weights: Array) -> tuple[Pose2, Array]:
     """Return the weighted mean pose and the covariance, shape (3, 3), of x, y, yaw."""
     x, y, yaw, covariance = _moments(particles, weights)

@@ -10,7 +10,7 @@ import numpy as np
 
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.alignment import Alignment, Lines
-from twin.navigation.mapping.correlation import CorrelationGrid, Window
+from twin.navigation.mapping.correlation import Correlation, CorrelationGrid, Window
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.uncertainty import inverted
 from twin.navigation.mapping.visibility import contradicted
@@ -92,11 +92,30 @@ class Reference:
             believed: The pose that odometry tells; None: the guess.
         """
         coarse = self.grid.search(scan.points, guess, window, least)
-        if coarse is None:
-            return None
+        return None if coarse is None else self.refined(scan, coarse, believed or guess, prior)
+
+    def candidates(
+        self, scan: Scan, guess: Pose2, window: Window, least: float, sectors: int
+    ) -> list[Correlation]:
+        """Return what responds most in each of `sectors` parts of the window's angle; see `match`.
+
+        What responds most on the smeared grid need not be what fits best; this asks for several.
+        """
+        width = 2.0 * window.half_angle / sectors
+        narrow = replace(window, half_angle=0.5 * width)
+        found = []
+        for sector in range(sectors):
+            yaw = guess.yaw + (sector + 0.5) * width - window.half_angle
+            coarse = self.grid.search(scan.points, Pose2(guess.x, guess.y, yaw), narrow, least)
+            if coarse is not None:
+                found.append(coarse)
+        return found
+
+    def refined(self, scan: Scan, coarse: Correlation, believed: Pose2, prior: Array) -> Match | None:
+        """Return the match that alignment leads to from `coarse`; None if it leads far away. See `match`."""
         information = inverted(prior)
         fine = self.lines.align(
-            scan.points, scan.normals, coarse.pose, believed or guess, CORRELATED * information, DEVIATION
+            scan.points, scan.normals, coarse.pose, believed, CORRELATED * information, DEVIATION
         )
         if fine.pose.distance(coarse.pose) > 0.5:
             return None
@@ -108,22 +127,14 @@ class Reference:
             contradicted=contradicted(scan, fine.pose, self.scans, self.poses),
         )
 
-    def best_match(
-        self, scan: Scan, guess: Pose2, window: Window, prior: Array, least: float, sectors: int
-    ) -> Match | None:
-        """Return the match of the best score of the best in each of `sectors` parts of the window's angle.
+    def best(self, scan: Scan, coarse: Sequence[Correlation], believed: Pose2, prior: Array) -> Match | None:
+        """Return the match of the best score that alignment leads to; see `refined`."""
+        matches = [self.refined(scan, candidate, believed, prior) for candidate in coarse]
+        return max((match for match in matches if match is not None), key=_score, default=None)
 
-        What responds most on the smeared grid need not be what fits best; this asks for several. See `match`.
-        """
-        width = 2.0 * window.half_angle / sectors
-        narrow = replace(window, half_angle=0.5 * width)
-        best: Match | None = None
-        for sector in range(sectors):
-            yaw = guess.yaw + (sector + 0.5) * width - window.half_angle
-            match = self.match(scan, Pose2(guess.x, guess.y, yaw), narrow, prior, least, guess)
-            if match is not None and (best is None or match.score > best.score):
-                best = match
-        return best
+
+def _score(match: Match) -> float:
+    return match.score
 
 
 def _turned(vectors: Array, pose: Pose2) -> Array:

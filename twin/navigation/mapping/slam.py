@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -14,43 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 from twin.errors import MapError
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
-from twin.navigation.mapping.correlation import Window
-from twin.navigation.mapping.loop_closing import LoopCloser, spread
-from twin.navigation.mapping.matcher import Match, Reference, levels_for
-from twin.navigation.mapping.pose_graph import Edge, PoseGraph
+from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
+from twin.navigation.mapping.loop_acceptance import LoopAcceptance
+from twin.navigation.mapping.loop_closing import LoopCloser
+from twin.navigation.mapping.mapped_scans import MappedScans
+from twin.navigation.mapping.matcher import Match
+from twin.navigation.mapping.registration import Registration
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
 from twin.navigation.mapping.storage import SavedGraph, pack, unpack
-from twin.navigation.mapping.uncertainty import compounded, inverted, odometry_covariance, turned
+from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 __all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
 
 Mode = Literal["mapping", "localization"]
-
-REJECTED = 25.0
-"""A loop's edge that disagrees by more than this [sigma^2] after optimisation is taken out again."""
-DISAGREEING = 1.0
-"""Loops that disagree by less than this [sigma^2] wait for others before the graph is optimised."""
-MOST_WAITING = 10
-"""So many loops wait at most."""
-DOUBTFUL = 0.6
-"""Below this score a match is compared with others ..."""
-SECTORS = 8
-"""... in so many parts of a window that is twice as wide ..."""
-LOST = 0.3
-"""... and below this in all directions."""
-ALONE = 0.4
-"""If nothing fits near odometry's guess, a match in another direction counts from this score on."""
-EXPANDED = np.diag([1.0, 1.0, 25.0])
-"""By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip."""
-SLIPPED = np.diag([1.0, 1.0, 1e4])
-"""By so much it is larger if it certainly has."""
-
-START_COVARIANCE = np.diag([1.0, 1.0, 0.3])
-"""Of the pose at which a session is said to start: x, y [m^2], yaw [rad^2]."""
-START_WINDOW = (2.0, 1.0)
-"""How far from there the robot is looked for: x and y [m], yaw [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,15 +71,19 @@ class Slam:
         self.T_map_odom = Pose2(0.0, 0.0, 0.0)
         self.covariance: Array = np.zeros((3, 3))
         """Of x, y, yaw of the latest pose in the map frame, shape (3, 3)."""
-        self.loops_closed = 0
-        self._graph = PoseGraph()
-        self._scans: list[Scan] = []
-        self._stamps: list[int] = []
+        self._mapped = MappedScans(self.config)
         self._odom: Pose2 | None = None
         self._start: Pose2 | None = None
+        self._tracked = (Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0))
+        self._registration: Registration | None = None
         self._closer = LoopCloser(self.config)
-        self._waiting = 0
+        self._loops = LoopAcceptance()
         self._map = ScanMap(self.config.resolution, self.config.max_laser_range)
+
+    @property
+    def loops_closed(self) -> int:
+        """How many edges say that a place was seen again."""
+        return self._loops.accepted
 
     def process(
         self, odom: Pose2, ranges: ArrayLike, angles: ArrayLike, T_base_lidar: Pose2, stamp_ns: int
@@ -121,37 +102,50 @@ class Slam:
         """
         if self._odom is not None and not self._has_moved(odom):
             return None
-        config = self.config
-        scan = Scan.from_ranges(
-            ranges, angles, T_base_lidar, min_range=config.min_laser_range, max_range=config.max_laser_range
-        )
+        scan = self._scan(ranges, angles, T_base_lidar)
         if self._odom is None:
             return self._begin(odom, scan, stamp_ns)
         step = self._odom.inverse() @ odom
         if self.mode == "localization":
             return self._localise(odom, scan, step)
-        last = self._graph.pose(len(self._graph) - 1)
-        guess = last @ step
-        match = self._match(self._recent(guess), scan, guess, turned(odometry_covariance(step), last.yaw))
-        if match is None:
-            pose, relative = guess, odometry_covariance(step)
-        else:
-            pose, relative = match.pose, turned(match.covariance, -last.yaw)
-        self.covariance = compounded(self.covariance, last, last.inverse() @ pose, relative)
-        node = self._add(scan, pose, stamp_ns)
-        self._connect(node - 1, node, relative)
-        self._closer.steps.append(relative)
-        closed = config.do_loop_closing and self._close_loops(node)
-        return self._finish(odom, self._graph.pose(node), node, closed, match)
+        return self._take(odom, scan, step, stamp_ns)
+
+    def locate(
+        self, odom: Pose2, ranges: ArrayLike, angles: ArrayLike, T_base_lidar: Pose2
+    ) -> tuple[int, Pose2]:
+        """Return where a scan was taken that `process` did not take, for it was too near to the last one.
+
+        Odometry alone is off by some centimetres at most there; this is for those who want it exactly. See
+        `process` for the arguments.
+
+        Returns:
+            The last node, and the pose of the base in its frame, which stays right when the graph moves.
+
+        Raises:
+            MapError: no scan was taken yet, or the graph is not to grow.
+        """
+        if self._odom is None or self.mode != "mapping":
+            raise MapError("locate: there is no scan near by; valid is a call while mapping, after a scan")
+        node = len(self._mapped.graph) - 1
+        last, guess = self._mapped.graph.pose(node), self._guess(odom)
+        if self._registration is None:
+            self._registration = self._mapped.registration(self._mapped.recent(guess))
+        step = self._tracked[0].inverse() @ odom
+        scan = self._scan(ranges, angles, T_base_lidar)
+        match = self._registration.match(scan, guess, turned(odometry_covariance(step), guess.yaw))
+        pose = guess if match is None else match.pose
+        self._tracked = (odom, last.inverse() @ pose)
+        self.T_map_odom = pose @ odom.inverse()
+        return node, self._tracked[1]
 
     def to_bytes(self) -> bytes:
         """Return the pose graph with its scans and the parameters."""
         return pack(
             SavedGraph(
                 config=self.config,
-                graph=self._graph,
-                scans=self._scans,
-                stamps_ns=self._stamps,
+                graph=self._mapped.graph,
+                scans=self._mapped.scans,
+                stamps_ns=self._mapped.stamps_ns,
                 steps=self._closer.steps,
                 covariance=self.covariance,
             )
@@ -206,9 +200,9 @@ class Slam:
         saved = unpack(data, name)
         slam = Slam(config or saved.config)
         slam.mode = mode
-        slam._graph, slam._scans, slam._stamps = saved.graph, saved.scans, saved.stamps_ns
+        slam._mapped = MappedScans(slam.config, saved.graph, saved.scans, saved.stamps_ns)
         slam._closer.steps = saved.steps
-        slam.loops_closed = sum(edge.loop for edge in saved.graph.edges)
+        slam._loops.accepted = sum(edge.loop for edge in saved.graph.edges)
         slam.start_at(start or saved.graph.pose(0))
         return slam
 
@@ -222,14 +216,14 @@ class Slam:
 
     def map(self) -> OccupancyMap:
         """Return the occupancy map; only what is new or has moved is drawn."""
-        self._map.update(self._scans, self._graph.poses)
+        self._map.update(self._mapped.scans, self._mapped.graph.poses)
         return self._map.occupancy()
 
     def optimise(self) -> None:
         """Move the nodes to where they explain all that was measured best; done by itself at each loop."""
-        self._graph.optimise()
-        self._closer.forget()
-        self._waiting = 0
+        self._mapped.graph.optimise()
+        self._loops.forget()
+        self._moved()
 
     def entropy(self) -> float:
         """Return the differential entropy of the latest pose [nats]: 0.5 ln det(2 pi e covariance).
@@ -241,9 +235,9 @@ class Slam:
 
     def graph(self) -> GraphView:
         """Return nodes and edges."""
-        edges = self._graph.edges
+        edges = self._mapped.graph.edges
         return GraphView(
-            poses=self._graph.poses.copy(),
+            poses=self._mapped.graph.poses.copy(),
             edges=np.array([(edge.first, edge.second) for edge in edges], dtype=np.int64).reshape(-1, 2),
             loops=np.array([edge.loop for edge in edges], dtype=np.bool_),
         )
@@ -256,55 +250,69 @@ class Slam:
             or abs(step.yaw) >= self.config.minimum_travel_heading
         )
 
+    def _scan(self, ranges: ArrayLike, angles: ArrayLike, T_base_lidar: Pose2) -> Scan:
+        low, high = self.config.min_laser_range, self.config.max_laser_range
+        return Scan.from_ranges(ranges, angles, T_base_lidar, min_range=low, max_range=high)
+
+    def _guess(self, odom: Pose2) -> Pose2:
+        """Return where odometry leads from the last node, or from where a scan was located since then."""
+        before, relative = self._tracked
+        last = self._mapped.graph.pose(len(self._mapped.graph) - 1)
+        return last @ relative @ (before.inverse() @ odom)
+
     def _begin(self, odom: Pose2, scan: Scan, stamp_ns: int) -> SlamUpdate:
         """Take the first scan: of all, or of this session in a graph that was loaded."""
+        mapped = self._mapped
         if self._start is None:
-            node = self._add(scan, self.T_map_odom @ odom, stamp_ns)
-            return self._finish(odom, self._graph.pose(node), node, False, None)
-        match = self._match(self._near(self._start), scan, self._start, START_COVARIANCE, START_WINDOW)
-        pose = self._start if match is None else match.pose
-        self.covariance = START_COVARIANCE if match is None else match.covariance
-        node = self._near(pose, 1)[0]
+            node = mapped.add(scan, self.T_map_odom @ odom, stamp_ns)
+            return self._finish(odom, mapped.graph.pose(node), node, False, None)
+        pose, self.covariance, match = at_start(mapped, scan, self._start)
+        node = mapped.near(pose, 1)[0]
         if self.mode == "mapping":
-            nearest, node = node, self._add(scan, pose, stamp_ns)
-            self._connect(nearest, node, turned(self.covariance, -self._graph.pose(nearest).yaw))
+            nearest, node = node, mapped.add(scan, pose, stamp_ns)
+            mapped.connect(nearest, node, turned(self.covariance, -mapped.graph.pose(nearest).yaw))
             self._closer.steps.append(START_COVARIANCE)
             self._closer.forget()
         return self._finish(odom, pose, node, False, match)
+
+    def _take(self, odom: Pose2, scan: Scan, step: Pose2, stamp_ns: int) -> SlamUpdate:
+        """Add a scan to the map."""
+        mapped, graph = self._mapped, self._mapped.graph
+        last, guess = graph.pose(len(graph) - 1), self._guess(odom)
+        prior = odometry_covariance(step)
+        match = mapped.registration(mapped.recent(guess)).match(scan, guess, turned(prior, last.yaw))
+        pose = guess if match is None else match.pose
+        relative = prior if match is None else turned(match.covariance, -last.yaw)
+        self.covariance = compounded(self.covariance, last, last.inverse() @ pose, relative)
+        node = mapped.add(scan, pose, stamp_ns)
+        mapped.connect(node - 1, node, relative)
+        self._closer.steps.append(relative)
+        closed = self.config.do_loop_closing and self._loops.add(
+            graph, self._closer.search(graph, mapped.scans, node)
+        )
+        if closed:
+            self._closer.forget()
+            self.covariance = graph.marginals().of(node)
+        return self._finish(odom, graph.pose(node), node, closed, match)
 
     def _localise(self, odom: Pose2, scan: Scan, step: Pose2) -> SlamUpdate:
         assert self._odom is not None
         last = self.pose(self._odom)
         prior = compounded(self.covariance, last, step, odometry_covariance(step))
-        guess = last @ step
-        spread = 3.0 * math.sqrt(float(np.linalg.eigvalsh(prior[:2, :2])[-1]))
-        widest = 0.5 * self.config.loop_search_space_dimension
-        half = max(min(spread, widest), 0.5 * self.config.correlation_search_space_dimension)
-        match = self._match(
-            self._near(guess), scan, guess, prior, (half, self.config.coarse_search_angle_offset)
-        )
-        pose = guess if match is None else match.pose
-        self.covariance = prior if match is None else match.covariance
-        return self._finish(odom, pose, self._near(pose, 1)[0], False, match)
+        pose, self.covariance, match = while_driving(self._mapped, scan, last @ step, prior)
+        return self._finish(odom, pose, self._mapped.near(pose, 1)[0], False, match)
 
-    def _add(self, scan: Scan, pose: Pose2, stamp_ns: int) -> int:
-        self._scans.append(scan)
-        self._stamps.append(stamp_ns)
-        return self._graph.add_node(pose)
-
-    def _connect(self, first: int, second: int, covariance: Array) -> None:
-        self._graph.add_edge(
-            Edge(
-                first=first,
-                second=second,
-                pose=self._graph.pose(first).inverse() @ self._graph.pose(second),
-                information=inverted(covariance),
-                loop=False,
-            )
-        )
+    def _moved(self) -> None:
+        """The nodes have moved: so has the robot with the last of them."""
+        self._registration = None
+        self._closer.forget()
+        if self._odom is not None and self.mode == "mapping":
+            self.T_map_odom = self._guess(self._tracked[0]) @ self._tracked[0].inverse()
 
     def _finish(self, odom: Pose2, pose: Pose2, node: int, closed: bool, match: Match | None) -> SlamUpdate:
         self._odom = odom
+        self._tracked = (odom, Pose2(0.0, 0.0, 0.0))
+        self._registration = None
         self.T_map_odom = pose @ odom.inverse()
         return SlamUpdate(
             pose=pose,
@@ -314,95 +322,3 @@ class Slam:
             node=node,
             response=0.0 if match is None else match.inliers,
         )
-
-    def _recent(self, guess: Pose2) -> list[int]:
-        """Return the nodes just before, spread over the path."""
-        config = self.config
-        nodes = spread(self._graph.poses, range(len(self._graph) - 1, -1, -1), config.scan_buffer_size)
-        away = np.hypot(*(self._graph.poses[nodes, :2] - guess[:2]).T)
-        near = zip(nodes, (away < config.scan_buffer_maximum_scan_distance).tolist(), strict=True)
-        return [node for node, is_near in near if is_near]
-
-    def _near(self, guess: Pose2, most: int | None = None) -> list[int]:
-        """Return the nodes that most likely have seen what is seen at `guess`: near, looking the same way."""
-        offsets = self._graph.poses - guess
-        away = np.hypot(offsets[:, 0], offsets[:, 1]) + 1.0 - np.cos(offsets[:, 2])
-        return np.argsort(away, kind="stable")[: most or self.config.scan_buffer_size].tolist()
-
-    def _match(
-        self,
-        nodes: Sequence[int],
-        scan: Scan,
-        guess: Pose2,
-        prior: Array,
-        halves: tuple[float, float] | None = None,
-    ) -> Match | None:
-        """Match with the scans of some nodes, in a window of half widths [m, rad]; None: odometry's."""
-        config = self.config
-        half = 0.5 * config.correlation_search_space_dimension
-        width, angle = halves or (half, config.coarse_search_angle_offset)
-        if not nodes:
-            return None
-        reference = Reference.of(
-            [self._scans[node] for node in nodes],
-            self._graph.poses[list(nodes)],
-            resolution=config.correlation_search_space_resolution,
-            deviation=config.correlation_search_space_smear_deviation,
-            levels=levels_for(width, config.correlation_search_space_resolution),
-        )
-        window = Window(
-            half_width=width,
-            half_angle=angle,
-            distance_variance=config.distance_variance_penalty,
-            angle_variance=config.angle_variance_penalty,
-            minimum_distance_penalty=config.minimum_distance_penalty,
-            minimum_angle_penalty=config.minimum_angle_penalty,
-        )
-        least = config.link_match_minimum_response_fine
-        if reference is None:
-            return None
-        match = reference.match(scan, guess, window, prior, least)
-        if match is not None and match.score >= DOUBTFUL:
-            return match
-        # What responds most on the smeared grid need not fit best: ask for several.
-        wide = replace(window, half_angle=2.0 * angle)
-        match = _better(match, reference.best_match(scan, guess, wide, EXPANDED * prior, least, SECTORS))
-        if match is not None and match.score >= LOST:
-            return match
-        # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
-        wide = replace(window, half_angle=math.pi)
-        other = reference.best_match(scan, guess, wide, SLIPPED * prior, least, 4 * SECTORS)
-        enough = ALONE if match is None else DOUBTFUL
-        return other if other is not None and other.score >= enough else match
-
-    def _close_loops(self, node: int) -> bool:
-        edges = self._closer.search(self._graph, self._scans, node)
-        if not edges:
-            return False
-        for edge in edges:
-            self._graph.add_edge(edge)
-        self._waiting += len(edges)
-        worst = max(self._graph.squared_error(edge) for edge in edges)
-        if worst < DISAGREEING and self._waiting < MOST_WAITING:
-            return False
-        before = self._graph.poses.copy()
-        self._graph.optimise(5, math.inf)
-        self._graph.optimise()
-        self._waiting = 0
-        wrong = [edge for edge in edges if self._graph.squared_error(edge) > REJECTED]
-        if wrong:
-            self._graph.poses[:] = before
-            self._graph.edges = [edge for edge in self._graph.edges if edge not in wrong]
-            if len(wrong) == len(edges):
-                return False
-            self._graph.optimise()
-        self._closer.forget()
-        self.loops_closed += len(edges) - len(wrong)
-        self.covariance = self._graph.marginals().of(node)
-        return True
-
-
-def _better(first: Match | None, second: Match | None) -> Match | None:
-    if first is None or second is None:
-        return first or second
-    return second if second.score > first.score + 0.02 else first

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
 
-from twin.navigation.warm_up import warm_up_behaviors
 from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
@@ -14,6 +13,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Empty, Twist, duration, new, ns
 from twin.bridge.types import ActionType
 from twin.navigation import recovery
+from twin.navigation.warm_up import warm_up_behaviors
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 

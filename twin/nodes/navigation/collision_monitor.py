@@ -12,6 +12,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import CollisionMonitorState, LaserScan, Range, Twist, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
+from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
 from twin.geometry import Array
 from twin.navigation.control.collision_monitor import (
     INVALID_SOURCE,
@@ -26,6 +27,8 @@ from twin.nodes.navigation.scan_input import ScanInput
 from twin.nodes.node_parameters import declare_config
 
 _ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
+_FIRST_PERIOD_S = 0.02
+"""After a pause in the commands, in which the drive came to rest."""
 _RANGE_STEP = np.radians(1.0)
 
 
@@ -39,6 +42,7 @@ class CollisionMonitorNode:
         footprint: Array,
         config: CollisionMonitorConfig | None = None,
         *,
+        brakes: VelocitySmootherConfig | None = None,
         cmd_vel_in: str = "cmd_vel_smoothed",
         cmd_vel_out: str = "cmd_vel",
         scan_topics: tuple[str, ...] = ("scan",),
@@ -54,6 +58,8 @@ class CollisionMonitorNode:
         self._polygon = ""
         self._scans: dict[str, LaserScan | None] = dict.fromkeys(scan_topics)
         self._ranges: dict[str, Range | None] = dict.fromkeys(range_topics)
+        self._brakes = VelocitySmoother(brakes) if brakes else None
+        self._commanded_ns: int | None = None
         self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
         self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
         for topic in scan_topics:
@@ -89,7 +95,19 @@ class CollisionMonitorNode:
         action = self.monitor.process(velocity, self._points()) if self._enabled else Action(velocity)
         if action.polygon_name != self._polygon:
             self._tell(action)
-        self._publisher.publish(twist_from_planar(*action.velocity))
+        self._publisher.publish(twist_from_planar(*self._braked(action.velocity)))
+
+    def _braked(self, velocity: tuple[float, float]) -> tuple[float, float]:
+        """Return what the drive can do of it on the same curve: each of its axes brakes by itself."""
+        before, self._commanded_ns = self._commanded_ns, self.node.now_ns
+        if self._brakes is None:
+            return velocity
+        dt = 0.0 if before is None else (self.node.now_ns - before) * 1e-9
+        if before is None or dt > self._brakes.config.velocity_timeout:
+            self._brakes.reset()
+            dt = _FIRST_PERIOD_S
+        self._brakes.set_command(*velocity)
+        return self._brakes.update(dt)
 
     def _tell(self, action: Action) -> None:
         self._polygon = action.polygon_name

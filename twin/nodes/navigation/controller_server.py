@@ -121,7 +121,7 @@ class ControllerServerNode:
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._velocity = (0.0, 0.0)
         self._preempted: _Task | None = None
-        """What the next goal goes on from, if it comes before this one is over."""
+        """What was followed until another path came, which is no new chance: its patience is used up, too."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._lookahead = node.create_publisher(PointStamped, "lookahead_point", 1)
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
@@ -161,12 +161,6 @@ class ControllerServerNode:
         finished = stop = False
         try:
             task = self._task(handle.request)
-            if self._preempted is not None:
-                # A path that is planned anew all the time is no news about progress, nor about valid control.
-                task.last_valid_ns = self._preempted.last_valid_ns
-                if task.progress_checker == self._preempted.progress_checker:  # of the same parameters
-                    task.progress_checker = self._preempted.progress_checker
-            self._preempted = task
             due = self.node.now_ns
             while True:
                 if handle.is_cancel_requested and task.controller.cancel():
@@ -202,15 +196,17 @@ class ControllerServerNode:
         handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
         handler.accept(path)
         controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
-        return _Task(
+        before = self._preempted
+        self._preempted = task = _Task(
             path=path,
             controller=controller,
             goal_checker=create_goal_checker(goal_checker),
-            progress_checker=create_progress_checker(progress),
+            progress_checker=before.progress_checker if before else create_progress_checker(progress),
             handler=handler,
-            last_valid_ns=self.node.now_ns,
+            last_valid_ns=before.last_valid_ns if before else self.node.now_ns,
             current_ns=self.node.now_ns,
         )
+        return task
 
     def _control(self, task: _Task, handle: GoalHandle) -> bool:
         """Command the base once; return whether the goal is reached."""

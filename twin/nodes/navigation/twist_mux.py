@@ -6,35 +6,44 @@ from collections.abc import Callable, Sequence
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Twist
+from twin.bridge.topics import Publisher
 from twin.controllers.twist_mux import MuxInput, TwistMux
+
+_WHEELS = "cmd_vel"
 
 DEFAULT_INPUTS = (
     MuxInput(name="navigation", topic="cmd_vel_smoothed", priority=10),
-    MuxInput(name="docking", topic="cmd_vel_docking", priority=20),
+    MuxInput(name="docking", topic="cmd_vel_docking", priority=20, guarded=False),
     MuxInput(name="teleop", topic="cmd_vel_teleop", priority=100),
 )
 
 
 class TwistMuxNode:
-    """Subscribes to every input's topic and publishes `cmd_vel`, or what comes before it."""
+    """Subscribes to every input's topic and publishes `cmd_vel`, or what comes before it.
+
+    Docking goes past a collision monitor behind it: it is meant to come near to things, and looks at them.
+    """
 
     def __init__(
         self,
         bus: Bus,
         *,
         inputs: Sequence[MuxInput] = DEFAULT_INPUTS,
-        output: str = "cmd_vel",
+        output: str = _WHEELS,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("twist_mux", namespace)
         self.mux = TwistMux(inputs)
-        self._publisher = self.node.create_publisher(Twist, output, 10)
+        guarded = direct = self.node.create_publisher(Twist, output, 10)
+        if output != _WHEELS and not all(source.guarded for source in inputs):
+            direct = self.node.create_publisher(Twist, _WHEELS, 10)
         for source in inputs:
-            self.node.create_subscription(Twist, source.topic, self._callback(source.name), 10)
+            publisher = guarded if source.guarded else direct
+            self.node.create_subscription(Twist, source.topic, self._callback(source.name, publisher), 10)
 
-    def _callback(self, name: str) -> Callable[[Twist], None]:
+    def _callback(self, name: str, publisher: Publisher[Twist]) -> Callable[[Twist], None]:
         def on_twist(message: Twist) -> None:
             if self.mux.accept(name, self.node.now_ns * 1e-9):
-                self._publisher.publish(message)
+                publisher.publish(message)
 
         return on_twist

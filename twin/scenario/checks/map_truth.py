@@ -106,7 +106,7 @@ class MapTruth:
         return covered
 
     def _bordering(self) -> tuple[Array, Array]:
-        """Return points of the surfaces beside the floor, and others a cell before them, both (n, 2)."""
+        """Return points of the surfaces beside the floor, and one a cell before each, shape (n, 2)."""
         outlines = [_outline(solid) for solid in self._solids]
         edges, out = (np.concatenate(parts) for parts in zip(*outlines, strict=True))
         fronts = edges + _BESIDE * out
@@ -128,7 +128,7 @@ def _on_surface(solid: Rectangle, points: Array) -> Array:
 
 
 def _off_squares(offsets: Array, grid: OccupancyMap) -> Array:
-    """Return how far points `offsets` off cells' centres, shape (n, 2), are from the cells, shape (n,)."""
+    """Return how far points, at `offsets` (n, 2) from cells' centres, are from those cells, shape (n,)."""
     along = Pose2(0.0, 0.0, -grid.origin.yaw).apply(offsets)
     return np.hypot(*np.maximum(np.abs(along) - grid.resolution / 2.0, 0.0).T)
 

@@ -1,0 +1,102 @@
+"""Finding where a scan was taken among scans whose poses are known, in wider windows the worse it fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.geometry import Array, Pose2
+from twin.navigation.mapping.config import SlamConfig
+from twin.navigation.mapping.correlation import Window
+from twin.navigation.mapping.matcher import Match, Reference, levels_for
+from twin.navigation.mapping.scan import Scan
+
+DOUBTFUL = 0.6
+"""Below this score a match is compared with others ..."""
+SECTORS = 8
+"""... in so many parts of a window that is twice as wide ..."""
+LOST = 0.3
+"""... and below this in all directions."""
+ALONE = 0.4
+"""If nothing fits near odometry's guess, a match in another direction counts from this score on."""
+GAIN = 0.2
+"""Far from where odometry leads, a match must have a score that is better by this: corridors look alike."""
+TURNED = np.diag([1.0, 1.0, 25.0])
+"""By so much odometry's covariance is larger if it may have slipped: it is mostly turns that slip ..."""
+SLIPPED = np.diag([25.0, 25.0, 25.0])
+"""... but wheels may spin or count the wrong way, too."""
+LOST_PRIOR = np.diag([1.0, 1.0, 1e4])
+"""By so much it is larger if it certainly has slipped."""
+
+
+class Registration:
+    """Scans at known poses, in which others are looked for."""
+
+    def __init__(
+        self, config: SlamConfig, scans: Sequence[Scan], poses: Array, half_width: float | None = None
+    ) -> None:
+        """Take scans and their poses, shape (n, 3).
+
+        Args:
+            config: Of the search.
+            scans: At least one.
+            poses: x [m], y [m], yaw [rad] of each in the map frame.
+            half_width: Of the window that is searched [m]; None: what the parameters say.
+        """
+        self._least = config.link_match_minimum_response_fine
+        half = half_width or 0.5 * config.correlation_search_space_dimension
+        self._window = Window(
+            half_width=half,
+            half_angle=config.coarse_search_angle_offset,
+            distance_variance=config.distance_variance_penalty,
+            angle_variance=config.angle_variance_penalty,
+            minimum_distance_penalty=config.minimum_distance_penalty,
+            minimum_angle_penalty=config.minimum_angle_penalty,
+        )
+        self._reference = Reference.of(
+            scans,
+            poses,
+            resolution=config.correlation_search_space_resolution,
+            deviation=config.correlation_search_space_smear_deviation,
+            levels=levels_for(half, config.correlation_search_space_resolution),
+        )
+
+    def match(self, scan: Scan, guess: Pose2, prior: Array, half_angle: float | None = None) -> Match | None:
+        """Return where `scan` was taken; None: it fits nowhere.
+
+        Args:
+            scan: In the frame of its base.
+            guess: Of the pose of its base in the map frame.
+            prior: Covariance of the guess in the map frame, shape (3, 3).
+            half_angle: Of the window that is searched [rad]; None: what the parameters say.
+        """
+        reference, least = self._reference, self._least
+        if reference is None:
+            return None
+        window = replace(self._window, half_angle=half_angle or self._window.half_angle)
+        match = reference.match(scan, guess, window, prior, least)
+        if match is not None and match.score >= DOUBTFUL:
+            return match
+        # What responds most on the smeared grid need not fit best: ask for several.
+        wide = replace(window, half_angle=2.0 * window.half_angle)
+        candidates = reference.candidates(scan, guess, wide, least, SECTORS)
+        match = _better(match, reference.best(scan, candidates, guess, TURNED * prior), 0.02)
+        if match is None or match.score < DOUBTFUL:
+            match = _better(match, reference.best(scan, candidates, guess, SLIPPED * prior), GAIN)
+        if match is not None and match.score >= LOST:
+            return match
+        # Odometry has slipped, or what is seen is new. Corridors look alike both ways: be sure.
+        wide = replace(window, half_angle=math.pi)
+        candidates = reference.candidates(scan, guess, wide, least, 4 * SECTORS)
+        other = reference.best(scan, candidates, guess, LOST_PRIOR * prior)
+        enough = ALONE if match is None else DOUBTFUL
+        return other if other is not None and other.score >= enough else match
+
+
+def _better(first: Match | None, second: Match | None, gain: float) -> Match | None:
+    if first is None or second is None:
+        return first or second
+    return second if second.score > first.score + gain else first
