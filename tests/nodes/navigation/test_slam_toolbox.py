@@ -192,6 +192,18 @@ def test_bad_files_and_requests_are_refused_in_words(bench: Bench, tmp_path: Pat
         )
 
 
+def test_an_initial_pose_is_refused_while_mapping(bench: Bench) -> None:
+    mapper = Mapper(bench)
+    logs = bench.logs()
+    mapper.drive(1.0)
+    pose = PoseWithCovariance(pose=pose_from_pose2(Pose2(1.0, 1.0, 0.0)), covariance=np.zeros(36))
+    message = PoseWithCovarianceStamped(header=header(0, "map"), pose=pose)
+    bench.node.create_publisher(PoseWithCovarianceStamped, "/initialpose", 10).publish(message)
+    mapper.drive(1.0)
+    assert mapper.error() < 0.2
+    assert "initialpose refused: a robot that maps knows where it is" in logs
+
+
 def test_a_pause_leaves_scans_unread_but_the_transform_alive(bench: Bench) -> None:
     mapper = Mapper(bench)
     mapper.drive(1.0)
