@@ -16,6 +16,8 @@ from twin.errors import MapError
 from twin.navigation.mapping.slam import Slam
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
+pytestmark = pytest.mark.xdist_group("slam")
+
 LOGS = Path(__file__).parents[4] / "shared" / "data" / "slam"
 
 

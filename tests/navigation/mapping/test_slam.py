@@ -13,6 +13,8 @@ from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Slam, SlamConfig, SlamUpdate
 from twin.navigation.maps.occupancy_map import OCCUPIED
 
+pytestmark = pytest.mark.xdist_group("slam")
+
 CONFIG = SlamConfig(minimum_travel_distance=0.3, minimum_travel_heading=0.3, max_laser_range=12.0)
 HEADING_DRIFT, SCALE = 0.01, 1.03
 
