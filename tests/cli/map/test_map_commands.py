@@ -96,7 +96,7 @@ def test_a_scenarios_arena_is_rendered(invoke: Invoke) -> None:
     [
         (("--height", "nan"), "height nan; valid is a number of metres"),
         (("--margin", "inf"), "margin inf; valid is a number of metres"),
-        (("--margin", "1e6"), "valid are 400000000 at most"),
+        (("--margin", "1e6"), "valid are at most 400000000"),
         (("--resolution", "nan"), "--resolution"),
     ],
 )
