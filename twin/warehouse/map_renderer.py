@@ -8,9 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
+from twin.navigation.maps.resampling import MOST_CELLS
 from twin.warehouse.arena import Arena
 from twin.warehouse.footprint import Rectangle
 
@@ -32,11 +34,27 @@ def render(
         resolution: Edge of a cell [m].
         height: Of the lidar's plane above the floor [m].
         margin: Around the hall [m].
+
+    Raises:
+        MapError: a length is not finite, or the map would be too big.
     """
+    for name, value in (("height", height), ("margin", margin)):
+        if not math.isfinite(value):
+            raise MapError(f"{name} {value}; valid is a number of metres")
     hall = arena.file.hall
     x0, y0 = hall.x[0] - margin, hall.y[0] - margin
     columns = round((hall.x[1] + margin - x0) / resolution)
     rows = round((hall.y[1] + margin - y0) / resolution)
+    if columns * rows > MOST_CELLS:
+        raise MapError(
+<<<<<<< HEAD
+            f"cells of {resolution:g} m and a margin of {margin:g} m make {columns} x {rows} cells; "
+            f"valid are {MOST_CELLS} at most"
+=======
+            f"cells of {resolution:g} m and a margin of {margin:g} m are {columns} x {rows} cells; "
+            f"valid are at most {MOST_CELLS}"
+>>>>>>> review
+        )
     xs = x0 + (np.arange(columns) + 0.5) * resolution
     ys = y0 + (np.arange(rows) + 0.5) * resolution
     grid = np.full((rows, columns), UNKNOWN, dtype=np.int8)

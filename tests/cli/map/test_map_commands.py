@@ -91,6 +91,22 @@ def test_a_scenarios_arena_is_rendered(invoke: Invoke) -> None:
     assert (code, "there is nothing to draw" in err) == (2, True)
 
 
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--height", "nan"), "height nan; valid is a number of metres"),
+        (("--margin", "inf"), "margin inf; valid is a number of metres"),
+        (("--margin", "1e6"), "valid are at most 400000000"),
+        (("--resolution", "nan"), "--resolution"),
+    ],
+)
+def test_a_rendering_of_no_size_is_refused(invoke: Invoke, option: tuple[str, str], words: str) -> None:
+    code, _, err = invoke("map", "render", "warehouse", "-o", "new.yaml", *option)
+    assert code == 2
+    assert words in err
+    assert not Path("new.yaml").exists()
+
+
 def test_zones_are_drawn_erased_and_shown(invoke: Invoke) -> None:
     keepout = ("map", "zone", "keepout", "keepout.yaml")
     _, out, _ = invoke(
@@ -116,6 +132,7 @@ def test_zones_are_drawn_erased_and_shown(invoke: Invoke) -> None:
         (("new.yaml", "--rectangle", "0,0,1,1"), "--map MAP"),
         (("new.yaml", "--map", "warehouse"), "give a zone"),
         (("new.yaml", "--map", "warehouse", "--rectangle", "0,0,1"), "must be 4 numbers"),
+        (("new.yaml", "--map", "warehouse", "--circle", "nan,0,1"), "must be 3 numbers"),
         (("new.yaml", "--map", "warehouse", "--polygon", "0,0,1,1"), "three points or more"),
         (("new.yaml", "--map", "warehouse", "--circle", "0,0,-1"), "valid is a positive number"),
         (("new.yaml", "--map", "warehouse", "--circle", "99,0,1"), "no cell of the mask"),

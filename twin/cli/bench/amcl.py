@@ -22,7 +22,7 @@ def amcl(
     distance: Annotated[float, typer.Option(min=5.0, help="Metres to track over.")] = 500.0,
     starts: Annotated[int, typer.Option(min=1, help="Global localisations.")] = 100,
     kidnaps: Annotated[int, typer.Option(min=1, help="Times to carry the robot away.")] = 30,
-    seed: Annotated[int, typer.Option(help="Of goals, places and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of goals, places and noise.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Track while driving to random goals, localise from anywhere, recover from being carried away.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,6 +83,8 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
     try:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
+        numbers = []
+    if not all(math.isfinite(number) for number in numbers):
         numbers = []
     if len(numbers) != count if count else len(numbers) < 6 or len(numbers) % 2:
         wanted = f"{count} numbers" if count else "three points or more, each an x and a y"

@@ -24,7 +24,8 @@ from twin.navigation.control.progress_checker import (
     ProgressCheckerConfig,
     SimpleProgressChecker,
 )
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit, RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit
+from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShim, RotationShimConfig
 
 ControllerConfig = RegulatedPurePursuitConfig | MPPIConfig | DWBConfig | RotationShimConfig

@@ -12,7 +12,7 @@ from twin.navigation.control.controller import Controller
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, Costmap, footprint_cost
 

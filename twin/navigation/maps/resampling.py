@@ -12,7 +12,8 @@ from twin.navigation.maps.occupancy_map import OccupancyMap
 
 _TOUCH = 1e-6
 """A cell that another one only touches, by this share of itself, does not lie under it."""
-_MOST_CELLS = 400_000_000
+MOST_CELLS = 400_000_000
+"""A bigger map is a slip of the pen: 20 000 x 20 000 cells are a square kilometre at 5 cm."""
 
 
 def resampled(occupancy: OccupancyMap, resolution: float) -> OccupancyMap:
@@ -26,9 +27,9 @@ def resampled(occupancy: OccupancyMap, resolution: float) -> OccupancyMap:
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise MapError(f"resolution {resolution}; valid is a positive number of metres")
     ratio = resolution / occupancy.resolution
-    if occupancy.width * occupancy.height / ratio**2 > _MOST_CELLS:
+    if occupancy.width * occupancy.height / ratio**2 > MOST_CELLS:
         raise MapError(
-            f"resolution {resolution:g} m makes more than {_MOST_CELLS} cells; valid is a coarser one"
+            f"resolution {resolution:g} m makes more than {MOST_CELLS} cells; valid is a coarser one"
         )
     data = _coarser(_coarser(occupancy.data, ratio).T, ratio).T
     return OccupancyMap(data=data, resolution=resolution, origin=occupancy.origin)

@@ -24,7 +24,7 @@ from twin.navigation.control.plugins import (
     create_progress_checker,
 )
 from twin.navigation.control.progress_checker import ProgressChecker, ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.failures import ControlFailure, NoValidControl
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode

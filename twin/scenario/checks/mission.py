@@ -11,15 +11,7 @@ from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import Seconds
 
 
-class MissionSucceededConfig(CheckConfig):
-    """The mission ends, and says that it succeeded."""
-
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return MissionSucceeded(kind)
-
-
-class MissionSucceeded(Check):
+class _MissionCheck(Check):
     """Keeps the first tick at which the mission is done."""
 
     def __init__(self, name: str) -> None:
@@ -31,16 +23,31 @@ class MissionSucceeded(Check):
         if self._last is None or not self._last.mission_done:
             self._last = observation
 
+    def _unfinished(self) -> str:
+        """Return why nothing is known of the mission's end; empty if it has ended."""
+        if self._last is None:
+            return "the run made no step"
+        if not self._last.mission_done:
+            return f"the mission was not done when the run ended, in state '{self._last.mission_state}'"
+        return ""
+
+
+class MissionSucceededConfig(CheckConfig):
+    """The mission ends, and says that it succeeded."""
+
+    def build(self, kind: str, context: CheckContext) -> Check:
+        """Return the fold."""
+        return MissionSucceeded(kind)
+
+
+class MissionSucceeded(_MissionCheck):
+    """Passes if it says that it succeeded."""
+
     def result(self) -> CheckResult:
         """Return the outcome so far."""
-        last = self._last
+        last, reason = self._last, self._unfinished()
         passed = last is not None and last.mission_done and last.mission_succeeded is True
-        reason = ""
-        if last is None:
-            reason = "the run made no step"
-        elif not last.mission_done:
-            reason = f"the mission was not done when the run ended, in state '{last.mission_state}'"
-        elif not passed:
+        if last is not None and not reason and not passed:
             reason = last.mission_reason or f"the mission failed in state '{last.mission_state}'"
         at_s = None if last is None else last.time_s
         return CheckResult(
@@ -59,31 +66,21 @@ class MissionFailedConfig(CheckConfig):
         return MissionFailed(kind, self)
 
 
-class MissionFailed(Check):
-    """Keeps the first tick at which the mission is done."""
+class MissionFailed(_MissionCheck):
+    """Passes if it says that it failed, for the reason that is asked for."""
 
     def __init__(self, name: str, config: MissionFailedConfig) -> None:
         super().__init__(name)
         self._pattern = config.reason
-        self._last: Observation | None = None
-
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        if self._last is None or not self._last.mission_done:
-            self._last = observation
 
     def result(self) -> CheckResult:
         """Return the outcome so far."""
-        last = self._last
-        reason = ""
-        if last is None:
-            reason = "the run made no step"
-        elif not last.mission_done:
-            reason = f"the mission was not done when the run ended, in state '{last.mission_state}'"
-        elif last.mission_succeeded:
-            reason = "the mission succeeded"
-        elif not fnmatchcase(last.mission_reason, self._pattern):
-            reason = f"the mission failed, but not for '{self._pattern}': {last.mission_reason}"
+        last, reason = self._last, self._unfinished()
+        if last is not None and not reason:
+            if last.mission_succeeded:
+                reason = "the mission succeeded"
+            elif not fnmatchcase(last.mission_reason, self._pattern):
+                reason = f"the mission failed, but not for '{self._pattern}': {last.mission_reason}"
         at_s = None if last is None else last.time_s
         return CheckResult(
             name=self.name, passed=not reason, value=not reason, limit=True, unit="", at_s=at_s, reason=reason
@@ -101,18 +98,12 @@ class TimeLimitConfig(CheckConfig):
         return TimeLimit(kind, self)
 
 
-class TimeLimit(Check):
-    """Keeps the time at which the mission is done."""
+class TimeLimit(_MissionCheck):
+    """Passes if it is done in time."""
 
     def __init__(self, name: str, config: TimeLimitConfig) -> None:
         super().__init__(name)
         self._limit = config.limit
-        self._last: Observation | None = None
-
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        if self._last is None or not self._last.mission_done:
-            self._last = observation
 
     def result(self) -> CheckResult:
         """Return the outcome so far."""

@@ -1,4 +1,4 @@
-"""A leaf that is an action of a server (Nav2's BtActionNode, BtCancelActionNode)."""
+"""A leaf that is an action of a server (Nav2's BtActionNode)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from typing import Any, ClassVar
 
 from twin.bridge.actions import ClientGoal
 from twin.bridge.msgs import GoalStatus
-from twin.bridge.services import Future
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeNode
-from twin.navigation.behavior_trees.ports import Port, inputs, outputs
+from twin.navigation.behavior_trees.ports import inputs, outputs
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 
 ACTION_PORTS = inputs(server_name="string", server_timeout="unsigned")
@@ -123,30 +122,3 @@ class ActionNode(NavigatorNode):
     def _put_error(self, code: int, message: str) -> None:
         self.put("error_code_id", code)
         self.put("error_msg", message)
-
-
-class CancelNode(NavigatorNode):
-    """Cancels every goal of an action, whoever sent it; succeeds when the server has answered."""
-
-    ACTION: ClassVar[ActionType]
-    SERVER: ClassVar[str]
-    PORTS: ClassVar[tuple[Port, ...]] = ACTION_PORTS
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._client = self.context.action_client(self.ACTION, self.get("server_name") or self.SERVER)
-        self._asked: Future | None = None
-
-    def tick(self) -> Status:
-        """Ask, and wait for the answer."""
-        self.set_status(Status.RUNNING)
-        if self._asked is None:
-            self._asked = self._client.cancel_all()
-        if not self._asked.done:
-            return Status.RUNNING
-        error, self._asked = self._asked.error, None
-        return Status.SUCCESS if error is None else Status.FAILURE
-
-    def halt(self) -> None:
-        """Wait no more."""
-        self._asked = None

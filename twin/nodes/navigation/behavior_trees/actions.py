@@ -6,14 +6,12 @@ from typing import Any, ClassVar
 
 from twin.bridge import action_types
 from twin.bridge.msgs import Path, Point, duration, new
-from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import Status
 from twin.navigation.behavior_trees.ports import inputs, outputs
 from twin.nodes.navigation.behavior_trees.action_node import (
     ACTION_PORTS,
     ERROR_PORTS,
     ActionNode,
-    CancelNode,
 )
 from twin.nodes.navigation.behavior_trees.context import fill
 
@@ -314,23 +312,3 @@ class UndockRobot(ActionNode):
             dock_type=self.get("dock_type"),
             max_undocking_time=self.get("max_undocking_time"),
         )
-
-
-def _cancel(name: str, action: ActionType, server: str) -> type[CancelNode]:
-    doc = f"Cancels `{server}`."
-    return type(name, (CancelNode,), {"ACTION": action, "SERVER": server, "__doc__": doc})
-
-
-CANCEL_NODES = {
-    name: _cancel(name, action, server)
-    for name, action, server in (
-        ("CancelControl", action_types.FollowPath, "follow_path"),
-        ("CancelBackUp", action_types.BackUp, "backup"),
-        ("CancelSpin", action_types.Spin, "spin"),
-        ("CancelWait", action_types.Wait, "wait"),
-        ("CancelDriveOnHeading", action_types.DriveOnHeading, "drive_on_heading"),
-        ("CancelAssistedTeleop", action_types.AssistedTeleop, "assisted_teleop"),
-        ("CancelDock", action_types.DockRobot, "dock_robot"),
-        ("CancelUndock", action_types.UndockRobot, "undock_robot"),
-    )
-}

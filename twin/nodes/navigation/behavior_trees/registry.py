@@ -13,6 +13,7 @@ from twin.nodes.navigation.behavior_trees import (
     services,
     state_conditions,
 )
+from twin.nodes.navigation.behavior_trees.cancelling import CANCEL_NODES
 from twin.nodes.navigation.behavior_trees.selectors import SELECTORS
 
 _CLASSES: tuple[type[TreeNode], ...] = (
@@ -76,7 +77,7 @@ _OTHER_NAMES: dict[str, type[TreeNode]] = {
 NAVIGATOR_NODES: Registry = {
     **BASIC_NODES,
     **{cls.__name__: cls for cls in _CLASSES},
-    **actions.CANCEL_NODES,
+    **CANCEL_NODES,
     **SELECTORS,
     **_OTHER_NAMES,
 }
