@@ -6,10 +6,14 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.processes import free_endpoint
 
 os.environ["PYTHONPATH"] = str(Path(__file__).parents[1])
+
+settings.register_profile("twin", deadline=None)  # a busy machine is no fault of an example
+settings.load_profile("twin")
 
 
 @pytest.fixture
