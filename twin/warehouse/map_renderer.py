@@ -47,13 +47,8 @@ def render(
     rows = round((hall.y[1] + margin - y0) / resolution)
     if columns * rows > MOST_CELLS:
         raise MapError(
-<<<<<<< HEAD
-            f"cells of {resolution:g} m and a margin of {margin:g} m make {columns} x {rows} cells; "
-            f"valid are {MOST_CELLS} at most"
-=======
             f"cells of {resolution:g} m and a margin of {margin:g} m are {columns} x {rows} cells; "
             f"valid are at most {MOST_CELLS}"
->>>>>>> review
         )
     xs = x0 + (np.arange(columns) + 0.5) * resolution
     ys = y0 + (np.arange(rows) + 0.5) * resolution
