@@ -13,6 +13,8 @@ from twin.runtime import run
 from twin.runtime.build import build
 from twin.scenario.schema import Scenario, load
 
+pytestmark = pytest.mark.xdist_group("explored")
+
 ROOM = """\
 name: room
 seed: 3

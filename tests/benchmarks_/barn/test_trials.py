@@ -14,6 +14,8 @@ from twin.benchmarks.barn.trials import run_world
 from twin.benchmarks.barn.worlds import BarnWorld
 from twin.cli.bench.barn import world_ids
 
+pytestmark = pytest.mark.xdist_group("barn")
+
 
 def test_a_slalom_is_driven_in_time_without_touching_and_the_same_twice(
     slalom: BarnWorld, tmp_path: Path

@@ -28,6 +28,8 @@ from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 
+pytestmark = pytest.mark.xdist_group("mppi")
+
 
 def box(size: float, aside: float) -> tuple[float, float, float, float]:
     """A square in the middle of the hall, so far to the left of the line y = 2."""

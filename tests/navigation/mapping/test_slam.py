@@ -13,6 +13,8 @@ from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Slam, SlamConfig, SlamUpdate
 from twin.navigation.maps.occupancy_map import OCCUPIED
 
+pytestmark = pytest.mark.xdist_group("slam")
+
 CONFIG = SlamConfig(minimum_travel_distance=0.3, minimum_travel_heading=0.3, max_laser_range=12.0)
 HEADING_DRIFT, SCALE = 0.01, 1.03
 
@@ -114,6 +116,60 @@ def test_a_slip_of_a_hundred_degrees_is_found():
     slam = Slam(CONFIG)
     true, update = drive(slam, truth, odometry)[-1]
     assert update.pose.distance(truth[0].inverse() @ true) < 0.1
+
+
+def located(slam: Slam, truth: list[Pose2], odometry: list[Pose2]) -> list[Pose2]:
+    """The pose of every scan, taken or not, as it is at the end."""
+    random = np.random.default_rng(4)
+    nodes = []
+    for number, (true, odom) in enumerate(zip(truth, odometry, strict=True)):
+        ranges = scan(true, random)
+        update = slam.process(odom, ranges, ANGLES, LIDAR, number)
+        nodes.append(
+            slam.locate(odom, ranges, ANGLES, LIDAR)
+            if update is None
+            else (update.node, Pose2(0.0, 0.0, 0.0))
+        )
+    return [Pose2(*slam.graph().poses[node].tolist()) @ relative for node, relative in nodes]
+
+
+def test_scans_between_those_that_are_taken_are_located():
+    truth = ring(0.75)
+    random = np.random.default_rng(6)
+    jitter = [
+        Pose2(*(0.03 * random.standard_normal(2)).tolist(), 0.02 * random.standard_normal()) for _ in truth
+    ]
+    odometry = [pose @ off for pose, off in zip(drifting(truth, 0.01, 1.02), jitter, strict=True)]
+    slam = Slam(CONFIG)
+    poses = located(slam, truth, odometry)
+    assert len(slam.graph().poses) < 0.7 * len(truth)
+    origin = poses[0] @ truth[0].inverse()
+    assert max(pose.distance(origin @ true) for pose, true in zip(poses, truth, strict=True)) < 0.08
+
+
+def test_wheels_that_count_the_wrong_way_are_not_believed():
+    there = ring(0.25)[:60]
+    truth = there + there[:20:-1]
+    forward = drifting(there, 0.0, 1.0)
+    back = [forward[-1] @ Pose2(0.1 * step, 0.0, 0.0) for step in range(1, len(truth) - len(there) + 1)]
+    poses = located(Slam(CONFIG), truth, forward + back)
+    origin = poses[0] @ truth[0].inverse()
+    assert forward[0].distance(back[-1]) > 9.0
+    assert max(pose.distance(origin @ true) for pose, true in zip(poses, truth, strict=True)) < 0.4
+
+
+def test_there_is_nothing_to_locate_in_before_the_first_scan():
+    with pytest.raises(MapError, match="valid is a call while mapping, after a scan"):
+        Slam(CONFIG).locate(Pose2(0.0, 0.0, 0.0), np.ones(len(ANGLES)), ANGLES, LIDAR)
+
+
+def test_optimising_moves_the_robot_with_its_last_scan(drive_round, tmp_path: Path):
+    slam, _taken, truth = drive_round
+    slam.save(tmp_path / "flat.posegraph")
+    more = Slam.load(tmp_path / "flat.posegraph", start=truth[0].inverse() @ truth[-1])
+    drive(more, truth[-1:], [Pose2(0.0, 0.0, 0.0)])
+    more.optimise()
+    assert more.pose(Pose2(0.0, 0.0, 0.0)) == pytest.approx(Pose2(*more.graph().poses[-1].tolist()))
 
 
 def test_scans_that_see_nothing_leave_odometry(drive_round):

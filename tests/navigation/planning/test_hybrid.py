@@ -19,6 +19,8 @@ from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
 from twin.navigation.planning.planner import path_length
 
+pytestmark = pytest.mark.xdist_group("hybrid")
+
 FOOTPRINT = ((0.45, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.45, -0.2))
 RADIUS = 0.5
 

@@ -37,6 +37,8 @@ from twin.navigation.mapping.slam import SlamConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 
+pytestmark = pytest.mark.xdist_group("slam")
+
 START = Pose2(-2.0, -1.0, 0.0)
 
 

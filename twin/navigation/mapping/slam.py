@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from twin.errors import MapError
 from twin.geometry import Array, Pose2
@@ -23,40 +22,12 @@ from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
 from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
+from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 __all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
 
 Mode = Literal["mapping", "localization"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlamUpdate:
-    """Where the robot is, after a scan was taken."""
-
-    pose: Pose2
-    """Of the base in the map frame."""
-    covariance: Array
-    """Of x, y, yaw in the map frame, shape (3, 3)."""
-    T_map_odom: Pose2
-    """What to publish as the transform map -> odom."""
-    loop_closed: bool
-    """Whether the whole graph has moved."""
-    node: int
-    """Of the scan in the graph; in localization mode the nearest node of the graph."""
-    response: float
-    """Part of the scan's points that lie on what was seen before, 0..1; 0 if only odometry was believed."""
-
-
-class GraphView(NamedTuple):
-    """The graph, to be shown."""
-
-    poses: Array
-    """Of the nodes in the map frame: x [m], y [m], yaw [rad], shape (n, 3)."""
-    edges: NDArray[np.int64]
-    """Pairs of nodes, shape (m, 2)."""
-    loops: NDArray[np.bool_]
-    """Which edges close loops, shape (m,)."""
 
 
 class Slam:
@@ -228,7 +199,8 @@ class Slam:
     def entropy(self) -> float:
         """Return the differential entropy of the latest pose [nats]: 0.5 ln det(2 pi e covariance).
 
-        gmapping's `/entropy`, that of its particles' weights, tells the same: how sure the pose is.
+        gmapping's `/entropy` is that of its particles' weights, which there are none of here; it, too, falls
+        when a loop closes. It is of the pose, not of the map.
         """
         spread = 2.0 * math.pi * math.e * (self.covariance + 1e-12 * np.eye(3))
         return 0.5 * float(np.linalg.slogdet(spread)[1])
