@@ -28,7 +28,7 @@ from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 
-pytestmark = pytest.mark.xdist_group("mppi")
+pytestmark = pytest.mark.xdist_group("planning")
 
 
 def box(size: float, aside: float) -> tuple[float, float, float, float]:

@@ -32,7 +32,7 @@ from twin.navigation.failures import InvalidPath, NoValidControl
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import with_headings
 
-pytestmark = pytest.mark.xdist_group("mppi")
+pytestmark = pytest.mark.xdist_group("planning")
 
 DT = 0.06
 FOOTPRINT = rectangle(0.42, 0.33)

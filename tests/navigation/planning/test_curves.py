@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from twin.navigation.planning.curves import advance, shortest_curve
 
-pytestmark = pytest.mark.xdist_group("hybrid")
+pytestmark = pytest.mark.xdist_group("planning")
 
 COORDINATE = st.floats(-6.0, 6.0)
 ANGLE = st.floats(-math.pi, math.pi)

@@ -19,7 +19,7 @@ from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
 from twin.navigation.planning.planner import path_length
 
-pytestmark = pytest.mark.xdist_group("hybrid")
+pytestmark = pytest.mark.xdist_group("planning")
 
 FOOTPRINT = ((0.45, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.45, -0.2))
 RADIUS = 0.5

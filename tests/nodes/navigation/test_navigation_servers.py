@@ -410,6 +410,7 @@ def test_the_feedback_and_the_local_plan_tell_where_it_goes(bench: Bench, stack:
     assert ahead[-1, :2] == pytest.approx([2.0, 0.0])
 
 
+@pytest.mark.xdist_group("planning")
 def test_mppis_rollouts_are_shown_to_those_who_look(bench: Bench) -> None:
     stack = Stack(bench, controllers={"FollowPath": MPPIConfig(batch_size=100, time_steps=30)})
     sent = stack.plan(2.5, 1.5)

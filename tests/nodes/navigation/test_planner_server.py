@@ -21,7 +21,7 @@ from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.planner_server import PlannerServerConfig, PlannerServerNode
 from twin.nodes.navigation.smoother_server import SmootherServerNode
 
-pytestmark = pytest.mark.xdist_group("hybrid")
+pytestmark = pytest.mark.xdist_group("planning")
 
 HALF = 0.15
 FOOTPRINT = ((HALF, HALF), (-HALF, HALF), (-HALF, -HALF), (HALF, -HALF))
