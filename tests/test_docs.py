@@ -52,6 +52,7 @@ NOT_RUN = {
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"twin bench slam .*": "needs logs that are not shipped: tests/cli/bench has its own",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
+    r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
     r"twin bench .*": "needs ../shared/data: tests/benchmarks_ has small ones",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
 }
