@@ -162,6 +162,18 @@ class Condition(MissionLeaf):
         return Status.SUCCESS if self._test() else Status.FAILURE
 
 
+class WaitUntil(MissionLeaf):
+    """Runs until `test` holds."""
+
+    def __init__(self, name: str, test: Callable[[], bool]) -> None:
+        super().__init__(name)
+        self._test = test
+
+    def update(self) -> Status:
+        """Ask."""
+        return Status.SUCCESS if self._test() else Status.RUNNING
+
+
 class Do(MissionLeaf):
     """Does something that is over at once; a returned text is the reason why it failed."""
 

@@ -14,7 +14,7 @@ from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import Status, TreeNode
-from twin.nodes.mission_leaves import CallAction, Do, sequence
+from twin.nodes.mission_leaves import CallAction, Do, WaitUntil, sequence
 
 
 class MissionNode:
@@ -68,6 +68,8 @@ class ActionStep:
     """Of the action."""
     goal: Callable[[], Any]
     """Makes the goal message when its turn comes."""
+    ready: Callable[[], bool] | None = None
+    """What the step waits for."""
 
 
 class ActionSequenceNode(MissionNode):
@@ -82,8 +84,10 @@ class ActionSequenceNode(MissionNode):
         for step in steps:
             if step.name not in clients:
                 clients[step.name] = ActionClient(self.node, step.action_type, step.name)
+            leaves.append(Do(f"State[{step.label}]", partial(self.enter, step.label)))
+            if step.ready is not None:
+                leaves.append(WaitUntil(f"Ready[{step.label}]", step.ready))
             leaves += [
-                Do(f"State[{step.label}]", partial(self.enter, step.label)),
                 CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
             ]
         self.run(sequence("Behaviors", leaves), period_ns)

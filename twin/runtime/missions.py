@@ -128,7 +128,10 @@ def build_mission(
 def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
     """Return the action of one step of a behaviour mission."""
     action, label, goal = _goal(step.config, stack)
-    return ActionStep(label, action, step.kind, lambda: goal)
+    if action is not NavigateToPose:
+        return ActionStep(label, action, step.kind, lambda: goal)
+    # A goal for a robot that nobody has localised yet is refused.
+    return ActionStep(label, action, step.kind, lambda: goal, lambda: stack.robot_pose.in_map() is not None)
 
 
 def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:

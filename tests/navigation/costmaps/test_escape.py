@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from twin.navigation.costmaps.kernels import escapes, outline_cost
+from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 
 CORNERS = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
 
@@ -42,3 +43,11 @@ def test_an_outline_that_grazes_a_cell_which_no_sample_of_the_inside_hits(v: flo
     frame = (-0.995, -1.0, 0.05)
     assert outline_cost(costs, corners, 0.0, 0.0, 0.0, *frame) == 254
     assert escapes(costs, corners, 0.0, 0.0, 0.0, v, 0.0, 0.05, 20, *frame) is expected
+
+
+def test_what_is_known_of_a_map_is_marked_without_a_ray_and_cleared_by_one() -> None:
+    layers = LayeredCostmap(config=CostmapConfig(rolling_window=True, width=4.0, height=4.0))
+    layers.mark(np.array([[-1.02, 0.02], [50.0, 0.0]]))
+    assert layers.costmap.cost_at(-1.02, 0.02) == 254
+    layers.update([[-1.5, 0.03]], (0.0, 0.0))
+    assert layers.costmap.cost_at(-1.02, 0.02) < 254

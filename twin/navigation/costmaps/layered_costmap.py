@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.errors import MapError
-from twin.geometry import Pose2
+from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import FREE_SPACE, NO_INFORMATION, Costmap
 from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.navigation.costmaps.filters import KeepoutFilter
@@ -171,6 +171,14 @@ class LayeredCostmap:
     def clear(self) -> None:
         """Forget every obstacle that the static map and the masks do not hold (clear_entirely)."""
         self._forget(everything(self.shape), outside=False)
+
+    def mark(self, points: Array) -> None:
+        """Mark what is known from elsewhere, a map for instance; a ray through it clears it as ever.
+
+        Args:
+            points: Shape (n, 2), in the costmap's frame [m].
+        """
+        self._touch(self._obstacles.mark(points, self._grid.frame))
 
     def clear_area(self, x: float, y: float, size: float, *, outside: bool = False) -> None:
         """Forget obstacles in a square about a point, or everywhere else.

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.costmap import NO_INFORMATION
+from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION
 from twin.navigation.costmaps.kernels import Cells, trace_scan
 from twin.navigation.costmaps.window import NOTHING, Window, differing, everything, shifted
 
@@ -45,6 +45,19 @@ class ObstacleLayer:
         lowest, highest, nearest, farthest = (float(value) for value in ranges)
         trace_scan(self.cells, points, *sensor, lowest, highest, nearest, farthest, *frame)
         return differing(before, self.cells[around.slices], around)
+
+    def mark(self, points: Array, frame: tuple[float, float, float]) -> Window:
+        """Mark cells as lethal without a ray to them; return where that may matter.
+
+        Args:
+            points: Shape (n, 2), in the costmap's frame [m]; those off the grid are left out.
+            frame: Origin x, y and resolution of the grid [m].
+        """
+        columns, rows = np.floor((points - frame[:2]) / frame[2]).astype(np.int64).T
+        height, width = self.cells.shape
+        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        self.cells[rows[inside], columns[inside]] = LETHAL_OBSTACLE
+        return everything(self.cells.shape)
 
     def clear_polygon(self, corners: Array, frame: tuple[float, float, float]) -> Window:
         """Free the cells whose centres lie in a convex polygon, shape (n, 2) [m]; return what changed.

@@ -15,7 +15,7 @@ from twin.navigation.scan_watch import RepeatedScan
 class InputWatchConfig:
     """What no healthy robot does."""
 
-    max_speed: float = 10.0
+    max_speed: float = 3.0
     """Odometry that is faster than this has jumped [m/s]."""
     max_turn_rate: float = 15.0
     """The same of turning [rad/s]."""

@@ -14,6 +14,7 @@ from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.maps.occupancy_map import OCCUPIED
 from twin.navigation.warm_up import warm_up_costmap, warm_up_ranges
 from twin.nodes.navigation.costmap_filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, polygon_msg
@@ -60,7 +61,7 @@ class CostmapNodeConfig:
 
 
 class CostmapNode:
-    """`/<name>/<name>`: takes `map` (unless rolling), scans and ranges; publishes `<name>/costmap`."""
+    """`/<name>/<name>`: takes `map`, scans and ranges; publishes `<name>/costmap`."""
 
     def __init__(
         self, bus: Bus, robot_pose: RobotPose, config: CostmapNodeConfig, *, namespace: str = ""
@@ -80,12 +81,13 @@ class CostmapNode:
         self._publisher = node.create_publisher(OccupancyGrid, f"{own}/costmap", LATCHED)
         self._raw_publisher = node.create_publisher(CostmapMessage, f"{own}/costmap_raw", LATCHED)
         self._footprint_publisher = node.create_publisher(PolygonStamped, f"{own}/published_footprint", 1)
-        if not config.layers.rolling_window:
-            node.create_subscription(OccupancyGrid, f"{namespace}/map", self._on_map, LATCHED)
+        self._known = np.zeros((0, 2))
+        on_map = self._on_known_map if config.layers.rolling_window else self._on_map
+        node.create_subscription(OccupancyGrid, f"{namespace}/map", on_map, LATCHED)
         node.create_subscription(LaserScan, f"{namespace}/{config.scan_topic}", self._on_scan, SENSOR_DATA)
         for topic in config.range_topics:
             node.create_subscription(Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA)
-        CostmapServices(node, config.name, config.frame, robot_pose, lambda: self._layers)
+        CostmapServices(node, config.name, config.frame, robot_pose, lambda: self._layers, self._mark_known)
         self._keepout: KeepoutFilterPart | None = None
         if config.keepout_filter_info_topic:
             info = f"{namespace}/{config.keepout_filter_info_topic}"
@@ -115,6 +117,23 @@ class CostmapNode:
             self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
         except MapError as error:
             self.node.get_logger().error(f"map refused: {error}")
+
+    def _on_known_map(self, message: OccupancyGrid) -> None:
+        try:
+            grid = occupancy_map(message)
+        except MapError as error:
+            self.node.get_logger().error(f"map refused: {error}")
+            return
+        self._known = grid.cell_to_world(np.argwhere(grid.data == OCCUPIED)[:, ::-1])
+
+    def _mark_known(self) -> None:
+        """Put into a local costmap that has forgotten everything what the map shows.
+
+        A lidar that is blind to the rear would not see it before the robot has turned into it.
+        """
+        T_frame_map = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.map)
+        if self._layers is not None and len(self._known) and T_frame_map is not None:
+            self._layers.mark(T_frame_map.apply(self._known))
 
     def _on_scan(self, message: LaserScan) -> None:
         if self._input.accept(message, self.node.now_ns):

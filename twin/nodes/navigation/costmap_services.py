@@ -27,9 +27,26 @@ class CostmapServices:
     """`clear_entirely_<name>`, `clear_around_`, `clear_around_pose_`, `clear_except_`, `get_cost_`."""
 
     def __init__(
-        self, node: Node, name: str, frame: str, pose: RobotPose, layers: Callable[[], LayeredCostmap | None]
+        self,
+        node: Node,
+        name: str,
+        frame: str,
+        pose: RobotPose,
+        layers: Callable[[], LayeredCostmap | None],
+        cleared: Callable[[], None],
     ) -> None:
+        """Create the services.
+
+        Args:
+            node: The costmap's.
+            name: Of the costmap.
+            frame: Of the costmap.
+            pose: What the robot believes about its pose.
+            layers: The costmap as it is now; None before there is a map.
+            cleared: Called after everything was forgotten.
+        """
         self._node, self._frame, self._pose, self._layers = node, frame, pose, layers
+        self._cleared = cleared
         node.create_service(ClearEntireCostmap, f"clear_entirely_{name}", self._clear_entirely)
         node.create_service(ClearCostmapAroundRobot, f"clear_around_{name}", self._clear_around)
         node.create_service(ClearCostmapAroundPose, f"clear_around_pose_{name}", self._clear_around_pose)
@@ -41,6 +58,7 @@ class CostmapServices:
         layers = self._layers()
         if layers is not None:
             layers.clear()
+            self._cleared()
         return new(ClearEntireCostmap.Response)
 
     def _clear_around(self, request: Any) -> Any:

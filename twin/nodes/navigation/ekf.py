@@ -112,7 +112,11 @@ class EkfNode:
     def _listen(self, name: str, source: EkfSource) -> None:
         kind = KINDS[name.rstrip("0123456789")]
         reader = SourceReader(
-            source, self._buffer, GyroBias(), world=self.config.world_frame, base=self.config.base_link_frame
+            source,
+            self._buffer,
+            GyroBias(),
+            world_frame=self.config.world_frame,
+            base=self.config.base_link_frame,
         )
         self._readers.append(reader)
 

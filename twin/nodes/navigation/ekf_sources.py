@@ -76,12 +76,12 @@ class SourceReader:
     """Reads the messages of one source into measurements in the filter's frames."""
 
     def __init__(
-        self, source: EkfSource, buffer: TransformBuffer, bias: GyroBias, *, world: str, base: str
+        self, source: EkfSource, buffer: TransformBuffer, bias: GyroBias, *, world_frame: str, base: str
     ) -> None:
         self.source = source
         self.bias = bias
         self._buffer = buffer
-        self._world, self._base = world, base
+        self._world_frame, self._base = world_frame, base
         self._first: Pose3 | None = None
         self._before: tuple[int, Pose3] | None = None
 
@@ -109,7 +109,7 @@ class SourceReader:
         self._first = self._before = None
 
     def _pose(self, message: PoseWithCovariance, frame: str, stamp_ns: int) -> Iterator[Measurement]:
-        if any(self.source.config[:6]) and (T := self._transform(self._world, frame)) is not None:
+        if any(self.source.config[:6]) and (T := self._transform(self._world_frame, frame)) is not None:
             pose, R = T @ pose3_from_pose(message.pose), matrix_from_quat_wxyz(T.quat_wxyz)
             yield from self._located(pose, _turned(message.covariance, R), stamp_ns, states.X)
 

@@ -199,16 +199,16 @@ class PlannerServerNode:
 
     def _in_map(self, stamped: Any) -> Pose2:
         """Return a stamped pose in the map frame."""
-        pose, frame, world = (
+        pose, frame, map_frame = (
             pose2_from_pose(stamped.pose),
             stamped.header.frame_id,
             self._robot_pose.frames.map,
         )
-        if frame in ("", world):
+        if frame in ("", map_frame):
             return pose
-        T_map_frame = self._robot_pose.relative(world, frame)
+        T_map_frame = self._robot_pose.relative(map_frame, frame)
         if T_map_frame is None:
-            raise NoPose(f"frame {frame!r} has no transform to {world!r}")
+            raise NoPose(f"frame {frame!r} has no transform to {map_frame!r}")
         return T_map_frame @ pose
 
     def _on_is_path_valid(self, request: Any) -> Any:
