@@ -51,6 +51,7 @@ SHOTS = {
         base="kinematic",
         joints=(("tilt", -0.2), ("swivel", 0.4), ("periscope", 0.15)),
     ),
+    "jackal": Shot(lookat=(0.0, 0.0, 0.1), distance=1.15),
     "test_robot": Shot(lookat=(1.0, 4.0, 0.0), distance=15.0, elevation=-40.0, base="fixed"),
     "warehouse_bot": Shot(
         lookat=(0.1, 0.0, 0.7),
