@@ -176,7 +176,7 @@ def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke
     assert ElementTree.parse(folder / "junit.xml").getroot().get("failures") == "0"
     (call,) = runtime.calls
     assert call["scenario"].checks[0].energy.max == 2.0
-    assert (call["record"], call["pace"], call["network"], call["progress"]) == (False, None, None, None)
+    assert (call["record"], call["pace"], call["network"]) == (False, None, None)
 
 
 def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

@@ -10,16 +10,18 @@ from types import FrameType
 
 EXIT_CODE = 130
 """As shells count: 128 + SIGINT."""
+_interrupts: list[int] = []
 
 
 @contextmanager
 def ends_on_interrupt() -> Iterator[None]:
     """Exit with 130 when Ctrl-C ends the block, whatever became of the KeyboardInterrupt on its way."""
-    interrupts: list[int] = []
+    _interrupts.clear()
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        interrupts.append(number)
-        raise KeyboardInterrupt
+        _interrupts.append(number)
+        if not _is_callback_of_c(frame):
+            raise KeyboardInterrupt
 
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, on_signal)
@@ -29,13 +31,28 @@ def ends_on_interrupt() -> Iterator[None]:
         sys.exit(EXIT_CODE)
     except Exception:
         # Modules in C turn an interrupt while they are imported into an ImportError, or worse.
-        if not interrupts:
+        if not _interrupts:
             raise
         sys.exit(EXIT_CODE)
     finally:
         # CPython: an interrupt inside of an exec, as of a namedtuple, lets the process die of SIGINT in the
         # end although it was handled; the next exec makes it forget (run_eval_code_obj in pythonrun.c).
         exec("")
+
+
+def _is_callback_of_c(frame: FrameType | None) -> bool:
+    """Whether LLVM, at work for numba, has called Python: it would print the KeyboardInterrupt and go on."""
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").startswith("llvmlite"):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def raise_swallowed() -> None:
+    """Raise KeyboardInterrupt if there was a Ctrl-C at a moment that could not raise it."""
+    if _interrupts:
+        raise KeyboardInterrupt
 
 
 def sigterm_is_ctrl_c() -> None:

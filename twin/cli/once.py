@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
 from twin.cli.folders import make_folder, run_folder
-from twin.cli.interrupted import sigterm_is_ctrl_c
+from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
@@ -44,7 +44,13 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
 
         folder = folder or run_folder(name)
-        with run_progress(name) as progress:
+        with run_progress(name) as bar:
+
+            def progress(now: runtime.Progress) -> None:
+                raise_swallowed()
+                if bar is not None:
+                    bar(now)
+
             verdict = runtime.run(
                 scenario,
                 out=folder,

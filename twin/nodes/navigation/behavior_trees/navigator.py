@@ -22,6 +22,8 @@ from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 SHIPPED = FilePath(__file__).parent / "trees"
 
 _UNKNOWN, _FAILED_TO_LOAD, _TF_ERROR = 0, 1, 2
+_POSE_PATIENCE_NS = 2_000_000_000
+"""How long a goal waits for a robot that is not localised yet [ns]."""
 """Added to 9000 for navigate_to_pose, to 9100 for navigate_through_poses."""
 
 
@@ -116,6 +118,9 @@ class Navigator:
     # Execution
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
+        patience = self._context.now_ns() + _POSE_PATIENCE_NS
+        while self._context.pose() is None and self._context.now_ns() < patience:
+            yield  # the first scan may be on its way
         refused = self._begin(handle)
         if refused is not None:
             handle.abort()
