@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -43,9 +44,9 @@ class MissionLeaf(TreeNode):
         """Start."""
         return
 
+    @abstractmethod
     def update(self) -> Status:
         """Look how it is doing."""
-        raise NotImplementedError
 
     def tick(self) -> Status:
         """Begin if it does not run, and look."""

@@ -12,7 +12,7 @@ from twin.benchmarks.amcl.world import Bench, Places, Wanderer, opened
 from twin.bridge.services import Client
 from twin.bridge.srvs import Empty
 
-_RIGHT_XY, _RIGHT_YAW = 0.2, math.radians(5.0)
+_RIGHT_XY, _RIGHT_YAW = 0.15, math.radians(5.0)
 _GLOBAL_S, _KIDNAPPED_S, _BEFORE_S = 10.0, 20.0, 5.0
 _SETTLE_S = 0.5
 
@@ -23,7 +23,7 @@ class Relocation:
 
     trials: int
     right: int
-    """How many knew at the end, within 20 cm and 5 degrees, where they were."""
+    """How many knew at the end, within 15 cm and 5 degrees, where they were."""
     median_s: float
     """Time until they knew for good, of those [s]; also the next two."""
     p95_s: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 from twin.bridge.actions import ClientGoal
@@ -44,9 +45,9 @@ class ActionNode(NavigatorNode):
         self._sent: ClientGoal | None = None
         self._sent_ns = 0
 
+    @abstractmethod
     def make_goal(self) -> Any | None:
         """Return the goal; None if there is nothing to do, and the node fails."""
-        raise NotImplementedError
 
     def updated_goal(self) -> Any | None:
         """Return a goal to go on with instead, while the last one is being executed."""
