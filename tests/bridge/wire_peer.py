@@ -44,7 +44,7 @@ def attachment(sequence: int, gid: bytes = b"g" * 16) -> bytes:
 
 
 def matched(session: zenoh.Session, key: str) -> zenoh.Publisher:
-    """A publisher that somebody hears."""
-    publisher = session.declare_publisher(key)
+    """A publisher that somebody hears, and that waits where Zenoh's default would drop samples."""
+    publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
     wait_for(lambda: publisher.matching_status.matching)
     return publisher

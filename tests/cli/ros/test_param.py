@@ -167,7 +167,7 @@ def test_a_parameter_is_deleted_if_the_node_allows_it(twin_here: Twin) -> None:
     ("arguments", "message"),
     [
         (
-            ("get", "/setings", "wheels", "--timeout", "0.1"),
+            ("get", "/setings", "wheels", "--timeout", "2"),
             "Node not found: /setings; did you mean '/settings'?",
         ),
         (("get", "/settings", "whels"), "/settings has no parameter 'whels'; did you mean 'wheels'?"),

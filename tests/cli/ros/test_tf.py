@@ -26,7 +26,7 @@ GRAPH = "some_transforms.py"
 
 
 def test_tree(twin: Twin) -> None:
-    done = twin("tf", "tree", "-t", "0.5")
+    done = twin("tf", "tree", "-t", "2")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0] == "odom"

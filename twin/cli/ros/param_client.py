@@ -11,6 +11,7 @@ from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError, nearest
 
 if TYPE_CHECKING:
+    from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
 
 _WAIT_S = 5.0
@@ -34,8 +35,11 @@ def node_names(process: LiveBus, hidden: bool) -> list[str]:
     """Return the full names of all nodes, sorted."""
     from twin.bridge.graph import Graph
 
-    nodes = Graph.snapshot(process.bus).nodes
-    return sorted({node.full_name for node in nodes if hidden or not node.name.startswith("_")})
+    return _names(Graph.snapshot(process.bus), hidden)
+
+
+def _names(graph: Graph, hidden: bool) -> list[str]:
+    return sorted({node.full_name for node in graph.nodes if hidden or not node.name.startswith("_")})
 
 
 def find_node(process: LiveBus, name: str, hidden: bool, timeout_s: float) -> str:
@@ -51,9 +55,10 @@ def find_node(process: LiveBus, name: str, hidden: bool, timeout_s: float) -> st
     try:
         if process.spin(lambda: any(node.full_name == wanted for node in graph.nodes), timeout_s):
             return wanted
+        # Of what was watched: Zenoh answers nothing to a query right after watching has ended.
+        known = _names(graph, hidden)
     finally:
         graph.close()
-    known = node_names(process, hidden)
     hint = nearest(wanted, known) if known else "there are no nodes"
     raise BridgeError(f"Node not found: {wanted}; {hint}")
 
