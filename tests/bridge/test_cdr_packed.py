@@ -14,6 +14,7 @@ from twin.bridge.msgs import (
     Header,
     Imu,
     JointState,
+    LaserScan,
     Odometry,
     Path,
     Point,
@@ -43,7 +44,10 @@ def arrays(length: int) -> st.SearchStrategy[Any]:
 
 
 lists = st.lists(numbers, max_size=5).map(lambda values: np.array(values, dtype=np.float64))
+floats = st.floats(width=32, allow_nan=False)
+float_lists = st.lists(floats, max_size=5).map(lambda values: np.array(values, dtype=np.float32))
 messages = st.one_of(
+    st.builds(LaserScan, headers, *[floats] * 7, float_lists, float_lists),
     st.builds(
         Odometry,
         headers,
@@ -90,3 +94,10 @@ def test_a_covariance_of_the_wrong_size_is_refused() -> None:
     )
     with pytest.raises(BridgeError, match="orientation_covariance has 8 elements; valid: exactly 9"):
         codec(Imu).encode(message)
+
+
+def test_a_scan_of_double_numbers_is_sent_in_single_precision() -> None:
+    ranges = np.array([0.1, 2.5])
+    message = LaserScan(Header(Time(0, 0), "lidar"), *[0.0] * 7, ranges, np.zeros(0))
+    decoded = codec(LaserScan).decode(codec(LaserScan).encode(message))
+    np.testing.assert_array_equal(decoded.ranges, ranges.astype(np.float32))

@@ -118,8 +118,9 @@ class Run:
         """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
-        bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
-        self._obstacles.update(bases)
+        if self._obstacles.active:
+            bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
+            self._obstacles.update(bases)
         self._faults.update()
 
     def step(self) -> None:

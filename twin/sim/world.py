@@ -161,10 +161,9 @@ class World:
         Raises:
             ScenarioError: The scene has no such placed body.
         """
-        placed = [body.name for body in self.scene.placed]
-        if name not in placed:
-            raise ScenarioError(f"no placed body '{name}' in the scene; {nearest(name, placed)}")
-        mocap_id = self.model.body(name).mocapid[0]
+        mocap_id = self._placed.get(name)
+        if mocap_id is None:
+            raise ScenarioError(f"no placed body '{name}' in the scene; {nearest(name, self._placed)}")
         self.data.mocap_pos[mocap_id] = T_world_body.xyz
         self.data.mocap_quat[mocap_id] = T_world_body.quat_wxyz
 
@@ -208,6 +207,7 @@ class World:
         self._index = {names[i]: i for i in ids}
         self._body_names = tuple(self._index)
         self._body_ids = np.array(ids, dtype=np.intp)
+        self._placed = {body.name: int(self.model.body(body.name).mocapid[0]) for body in self.scene.placed}
 
     def _geom_owners(self) -> tuple[list[str], list[int]]:
         """Return for each geom the name of its body or static, and its robot (-1: none, -2: the floor)."""

@@ -24,6 +24,7 @@ from twin.bridge.cdr.packed import (
     read_text,
 )
 from twin.bridge.cdr.path import decode_path, encode_path
+from twin.bridge.cdr.scan import decode_scan, encode_scan
 from twin.bridge.cdr.wide import decode_wide, encode_wide, is_wide
 from twin.bridge.messages.from_values import checked
 from twin.bridge.msgs import (
@@ -31,6 +32,7 @@ from twin.bridge.msgs import (
     Header,
     Imu,
     JointState,
+    LaserScan,
     Odometry,
     Path,
     Point,
@@ -253,6 +255,7 @@ _FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {
     TFMessage.__msgtype__: (_encode_tf, _decode_tf),
     PoseArray.__msgtype__: (_encode_poses, _decode_poses),
     Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
+    LaserScan.__msgtype__: (encode_scan, _little_endian(LaserScan, decode_scan)),
     Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
     Path.__msgtype__: (encode_path, _little_endian(Path, decode_path)),
     JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),

@@ -145,8 +145,14 @@ class CollisionMonitor:
 def count_inside(points: Array, corners: Array, x: float, y: float, yaw: float) -> int:
     """Return how many points, shape (n, 2), are in a polygon, shape (m, 2), moved to a pose."""
     c, s, inside, n = math.cos(yaw), math.sin(yaw), 0, corners.shape[0]
+    reach = 0.0  # squared; most points are farther away than any corner
+    for i in range(n):
+        reach = max(reach, corners[i, 0] ** 2 + corners[i, 1] ** 2)
+    reach *= 1.0 + 1e-9
     for k in range(points.shape[0]):
         dx, dy = points[k, 0] - x, points[k, 1] - y
+        if dx * dx + dy * dy > reach:
+            continue
         px, py = c * dx + s * dy, -s * dx + c * dy
         odd, j = False, n - 1
         for i in range(n):

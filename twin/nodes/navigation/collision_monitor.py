@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import CollisionMonitorState, LaserScan, Range, Twist, new, ns
+from twin.bridge.msgs import CollisionMonitorState, Header, LaserScan, Range, Twist, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
-from twin.geometry import Array
+from twin.geometry import Array, Pose2
 from twin.navigation.control.collision_monitor import (
     INVALID_SOURCE,
     Action,
@@ -30,6 +32,17 @@ _ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
 _FIRST_PERIOD_S = 0.02
 """After a pause in the commands, in which the drive came to rest."""
 _RANGE_STEP = np.radians(1.0)
+
+
+@dataclass
+class _Reading:
+    """What a sensor saw: several commands pass between two of them."""
+
+    header: Header
+    points: Array
+    """In the sensor's frame, shape (n, 2) [m]."""
+    T_odom_sensor: Pose2 | None = None
+    """When it was measured; None until transforms tell."""
 
 
 class CollisionMonitorNode:
@@ -56,16 +69,15 @@ class CollisionMonitorNode:
         self._robot_pose = robot_pose
         self._enabled = True
         self._polygon = ""
-        self._scans: dict[str, LaserScan | None] = dict.fromkeys(scan_topics)
-        self._ranges: dict[str, Range | None] = dict.fromkeys(range_topics)
+        self._readings: dict[str, _Reading | None] = dict.fromkeys((*scan_topics, *range_topics))
         self._brakes = VelocitySmoother(brakes) if brakes else None
         self._commanded_ns: int | None = None
         self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
         self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
         for topic in scan_topics:
-            node.create_subscription(LaserScan, topic, self._keep(self._scans, topic), SENSOR_DATA)
+            node.create_subscription(LaserScan, topic, self._keep(topic), SENSOR_DATA)
         for topic in range_topics:
-            node.create_subscription(Range, topic, self._keep(self._ranges, topic), SENSOR_DATA)
+            node.create_subscription(Range, topic, self._keep(topic), SENSOR_DATA)
         node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10)
         node.create_service(Toggle, "collision_monitor/toggle", self._on_toggle)
 
@@ -77,19 +89,23 @@ class CollisionMonitorNode:
         text = f"Collision monitor toggled {'on' if self._enabled else 'off'} successfully"
         return new(Toggle.Response, success=True, message=text)
 
-    def _keep(self, kept: dict[str, Any], topic: str) -> Callable[[Any], None]:
+    def _keep(self, topic: str) -> Callable[[Any], None]:
         scans = ScanInput(self._robot_pose, self.node.now_ns)
 
         def on_message(message: Any) -> None:
-            # A lidar that broke or froze is as good as silent.
-            if not isinstance(message, LaserScan) or scans.accept(message, self.node.now_ns):
-                kept[topic] = message
+            if isinstance(message, Range):
+                points = _arc(message)
+            elif scans.accept(message, self.node.now_ns):
+                points = scan_points(message, np.nan)
+            else:
+                return  # a lidar that broke or froze is as good as silent
+            self._readings[topic] = _Reading(message.header, points[np.isfinite(points).all(axis=1)])
 
         return on_message
 
     def _on_twist(self, message: Twist) -> None:
         velocity = (message.linear.x, message.angular.z)
-        if not np.isfinite(velocity).all():
+        if not all(map(math.isfinite, velocity)):
             self._publisher.publish(message)  # refused, and said, by who drives
             return
         action = self.monitor.process(velocity, self._points()) if self._enabled else Action(velocity)
@@ -125,23 +141,21 @@ class CollisionMonitorNode:
         here = self._robot_pose.in_odom()
         timeout = self.monitor.config.source_timeout_ns
         found = []
-        for message in (*self._scans.values(), *self._ranges.values()):
-            fresh = message is not None and (
-                timeout == 0 or self.node.now_ns - ns(message.header.stamp) <= timeout
-            )
-            T_odom_sensor = (
-                self._robot_pose.at_stamp(self._robot_pose.frames.odom, message.header)
-                if fresh and message is not None
-                else None
-            )
-            if here is None or message is None or T_odom_sensor is None:
-                if timeout:
-                    return None
-                continue
-            local = scan_points(message, np.nan) if isinstance(message, LaserScan) else _arc(message)
-            local = local[np.isfinite(local).all(axis=1)]
-            found.append((here.inverse() @ T_odom_sensor).apply(local))
+        for reading in self._readings.values():
+            T_odom_sensor = self._measured_from(reading, timeout)
+            if here is not None and reading is not None and T_odom_sensor is not None:
+                found.append((here.inverse() @ T_odom_sensor).apply(reading.points))
+            elif timeout:
+                return None
         return np.concatenate(found) if found else np.zeros((0, 2))
+
+    def _measured_from(self, reading: _Reading | None, timeout_ns: int) -> Pose2 | None:
+        """Return where the sensor was, in `odom`; None if the reading is too old or no transform tells."""
+        if reading is None or (timeout_ns and self.node.now_ns - ns(reading.header.stamp) > timeout_ns):
+            return None
+        if reading.T_odom_sensor is None:
+            reading.T_odom_sensor = self._robot_pose.at_stamp(self._robot_pose.frames.odom, reading.header)
+        return reading.T_odom_sensor
 
 
 def _arc(message: Range) -> Array:
