@@ -27,6 +27,7 @@ from twin.bridge.msgs import (
     TwistWithCovariance,
     Vector3,
 )
+from twin.bridge.srvs import IsPathValid
 from twin.errors import BridgeError
 
 numbers = st.floats(allow_nan=False)
@@ -44,6 +45,11 @@ def arrays(length: int) -> st.SearchStrategy[Any]:
 
 
 lists = st.lists(numbers, max_size=5).map(lambda values: np.array(values, dtype=np.float64))
+paths = st.builds(
+    Path,
+    headers,
+    st.lists(st.builds(PoseStamped, headers, st.builds(Pose, points, quaternions)), max_size=4),
+)
 floats = st.floats(width=32, allow_nan=False)
 float_lists = st.lists(floats, max_size=5).map(lambda values: np.array(values, dtype=np.float32))
 messages = st.one_of(
@@ -56,11 +62,8 @@ messages = st.one_of(
         st.builds(TwistWithCovariance, st.builds(Twist, vectors, vectors), arrays(36)),
     ),
     st.builds(Imu, headers, quaternions, arrays(9), vectors, arrays(9), vectors, arrays(9)),
-    st.builds(
-        Path,
-        headers,
-        st.lists(st.builds(PoseStamped, headers, st.builds(Pose, points, quaternions)), max_size=4),
-    ),
+    paths,
+    st.builds(IsPathValid.Request, paths),
     st.builds(JointState, headers, st.lists(texts, max_size=4), lists, lists, lists),
 )
 

@@ -130,13 +130,24 @@ class Publisher(Endpoint, Generic[M]):
 class Subscription(Endpoint, Generic[M]):
     """Calls back, in its node's spin, for every message on a topic; keeps the last `depth` between spins."""
 
-    def __init__(self, node: Node, cls: type[M], name: str, callback: Callable[[M], Any], qos: QoS) -> None:
+    def __init__(
+        self,
+        node: Node,
+        cls: type[M],
+        name: str,
+        callback: Callable[[M], Any],
+        qos: QoS,
+        *,
+        wanted: Callable[[bytes], bool] | None = None,
+    ) -> None:
+        """Hear a topic; a payload for which `wanted` returns False is not decoded."""
         self.codec = codec(cls)
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
         self._origin: zenoh.Sample | Attachment | None = None
         self._callback = callback
+        self._wanted = wanted
         self._pending: deque[list[Any]] = deque()
         self._inbox = node.inbox
         self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
@@ -182,6 +193,8 @@ class Subscription(Endpoint, Generic[M]):
                 self.dropped += 1
                 return
         payload, self._origin = data
+        if self._wanted is not None and not self._wanted(payload):
+            return
         if external:
             try:
                 message = self.codec.decode(payload)

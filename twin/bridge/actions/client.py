@@ -10,13 +10,18 @@ import xxhash
 from twin.bridge.actions.goal import uuid_msg
 from twin.bridge.actions.states import ACTIVE
 from twin.bridge.msgs import GoalInfo, GoalStatus, GoalStatusArray, stamp
-from twin.bridge.qos import LATCHED
+from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.services import Future
 from twin.bridge.srvs import CancelGoal
+from twin.bridge.topics import Subscription
 from twin.bridge.types import ActionType
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
+
+
+_GOAL_ID = slice(4, 20)
+"""Where it is in a feedback message: after CDR's encapsulation header."""
 
 
 class ClientGoal:
@@ -79,8 +84,18 @@ class ActionClient:
         self._send = node.create_client(action_type.SendGoal, f"{base}/send_goal")
         self._cancel = node.create_client(CancelGoal, f"{base}/cancel_goal")
         self._result = node.create_client(action_type.GetResult, f"{base}/get_result")
-        self._subscriptions = (
-            node.create_subscription(action_type.FeedbackMessage, f"{base}/feedback", self._on_feedback),
+        feedback = node.resolve_name(f"{base}/feedback")
+        self._subscriptions: tuple[Subscription[Any], ...] = (
+            node.add_endpoint(
+                Subscription(
+                    node,
+                    action_type.FeedbackMessage,
+                    feedback,
+                    self._on_feedback,
+                    as_qos(10),
+                    wanted=self._wants_feedback,
+                )
+            ),
             node.create_subscription(GoalStatusArray, f"{base}/status", self._on_status, LATCHED),
         )
 
@@ -175,6 +190,11 @@ class ActionClient:
         goal.error = error
         goal.done = True
         self._goals.pop(goal.goal_id, None)
+
+    def _wants_feedback(self, payload: bytes) -> bool:
+        """Whether somebody waits for it: every client hears that of all clients' goals."""
+        _, callback = self._goals.get(payload[_GOAL_ID], (None, None))
+        return callback is not None
 
     def _on_feedback(self, message: Any) -> None:
         _, callback = self._goals.get(bytes(message.goal_id.uuid), (None, None))

@@ -9,8 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
+from operator import attrgetter
 from struct import Struct, pack, unpack_from
 from typing import Any, Generic, TypeVar
+
+from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
 from twin.bridge.cdr.packed import (
@@ -77,7 +80,7 @@ class Codec(Generic[M]):
 def codec(cls: type[M]) -> Codec[M]:
     """Return the codec of a message class; rosbags generates its code now, not in the loop."""
     general = general_codec(cls)
-    fast = _FAST.get(general.msgtype)
+    fast = _FAST.get(general.msgtype) or _of_only_a_path(cls)
     if fast is None:
         return general
     encode, decode = fast
@@ -247,6 +250,18 @@ def _little_endian(cls: type[M], decode: Callable[[bytes], M]) -> Callable[[byte
         return decode(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).decode(payload)
 
     return either
+
+
+def _of_only_a_path(cls: Any) -> tuple[Callable[[Any], bytes], Callable[[bytes], Any]] | None:
+    """Return the codec of a message that has a path and nothing else, as requests to check one: its bytes."""
+    definition = types.store.fielddefs.get(cls.__msgtype__)
+    match definition and definition[1]:
+        case [(name, (Nodetype.NAME, Path.__msgtype__))]:
+            field = attrgetter(name)
+            return lambda message: encode_path(field(message)), _little_endian(
+                cls, lambda payload: cls(decode_path(payload))
+            )
+    return None
 
 
 _FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {

@@ -37,11 +37,22 @@ def decode_scan(payload: bytes) -> LaserScan:
     _, sec, nanosec, _ = _HEAD.unpack_from(payload)
     frame, at = read_text(payload, 12)
     at += -at % 4
-    numbers = _NUMBERS.unpack_from(payload, at)
+    start, end, increment, between, duration, nearest, farthest = _NUMBERS.unpack_from(payload, at)
     ranges, at = _read_floats(payload, at + _NUMBERS.size)
     intensities, at = _read_floats(payload, at)
     check_end(payload, at)
-    return LaserScan(Header(Time(sec, nanosec), frame), *numbers, ranges, intensities)
+    return LaserScan(
+        Header(Time(sec, nanosec), frame),
+        start,
+        end,
+        increment,
+        between,
+        duration,
+        nearest,
+        farthest,
+        ranges,
+        intensities,
+    )
 
 
 def _floats(values: NDArray[np.float32]) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import MarkerArray, Odometry, Path, Point, PointStamped, SpeedLimit, Twist, header, new
+from twin.bridge.topics import Publisher
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker, GoalCheckerConfig, PositionGoalCheckerConfig
@@ -127,6 +128,8 @@ class ControllerServerNode:
         self._plan = node.create_publisher(Path, "transformed_global_plan", 1)
         self._optimal = node.create_publisher(Path, "optimal_path", 1)
         self._trajectories = node.create_publisher(MarkerArray, "trajectories", 1)
+        self._watched_at = -1
+        self._wanted: list[Publisher[Any]] = []
         node.create_subscription(Odometry, "odom", self._on_odom, 1)
         node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
         ActionServer(node, FollowPath, "follow_path", self._execute)
@@ -266,12 +269,22 @@ class ControllerServerNode:
         if controller.carrot is not None:
             x, y = controller.carrot
             self._lookahead.publish(PointStamped(header=header(now, frame), point=Point(x=x, y=y, z=0.0)))
-        if self._plan.has_subscribers:
+        wanted = self._watched(now)
+        if self._plan in wanted:
             self._plan.publish(path_msg(ahead, frame, now))
-        if self._optimal.has_subscribers and (trajectory := controller.trajectory) is not None:
+        if self._optimal in wanted and (trajectory := controller.trajectory) is not None:
             self._optimal.publish(path_msg(trajectory, frame, now))
-        if self._trajectories.has_subscribers and (candidates := controller.candidates) is not None:
+        if self._trajectories in wanted and (candidates := controller.candidates) is not None:
             self._trajectories.publish(trajectory_markers(candidates, controller.trajectory, frame, now))
+
+    def _watched(self, now_ns: int) -> Sequence[Publisher[Any]]:
+        """Return what somebody looks at, as of this second: to ask costs as much as to command."""
+        second = now_ns // 1_000_000_000
+        if second != self._watched_at:
+            self._watched_at = second
+            shown = (self._plan, self._optimal, self._trajectories)
+            self._wanted = [publisher for publisher in shown if publisher.has_subscribers]
+        return self._wanted
 
 
 def _chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:
