@@ -105,7 +105,8 @@ class Odometry:
         Integrated as white noise it makes the pose as unsure as `covariance` says.
         """
         place, turn = (grown / self._dt**2 for grown in self._grown)
-        return np.diag([place + _AT_REST, place + _AT_REST, turn + _AT_REST])
+        place, turn = place + _AT_REST, turn + _AT_REST
+        return np.array([[place, 0.0, 0.0], [0.0, place, 0.0], [0.0, 0.0, turn]])
 
     @property
     def covariance(self) -> Array:

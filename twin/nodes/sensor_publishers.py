@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Bool, Header, Imu, LaserScan, Quaternion, Range, Vector3, stamp
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Publisher
+from twin.geometry import Array
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
 
 
@@ -46,7 +48,12 @@ def _laser_scan(spec: LidarSpec, header: Header, reading: Any) -> LaserScan:
 
 _NO_ORIENTATION = np.array([-1.0] + [0.0] * 8)
 """REP-145: this sensor gives no orientation."""
-_IDENTITY = np.eye(3).ravel()
+
+
+@lru_cache
+def _isotropic(stddev: float) -> Array:
+    """Return the covariance of three axes of equal noise, row by row, shape (9,)."""
+    return (np.eye(3) * stddev**2).ravel()
 
 
 def _imu(spec: ImuSpec, header: Header, reading: Any) -> Imu:
@@ -56,9 +63,9 @@ def _imu(spec: ImuSpec, header: Header, reading: Any) -> Imu:
         orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
         orientation_covariance=_NO_ORIENTATION,
         angular_velocity=Vector3(*gyro),
-        angular_velocity_covariance=_IDENTITY * spec.gyro_noise_stddev**2,
+        angular_velocity_covariance=_isotropic(spec.gyro_noise_stddev),
         linear_acceleration=Vector3(*accel),
-        linear_acceleration_covariance=_IDENTITY * spec.accel_noise_stddev**2,
+        linear_acceleration_covariance=_isotropic(spec.accel_noise_stddev),
     )
 
 
