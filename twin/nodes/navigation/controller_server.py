@@ -27,6 +27,7 @@ from twin.navigation.control.plugins import (
 from twin.navigation.control.progress_checker import ProgressChecker, ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.failures import ControlFailure, NoValidControl
+from twin.navigation.warm_up import warm_up_maneuver
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -127,6 +128,8 @@ class ControllerServerNode:
         self._maneuver = Maneuver(
             footprint=np.array(footprint, dtype=np.float64, order="C"), config=self.config.maneuver
         )
+        if self.config.maneuver.reach:
+            warm_up_maneuver()
         self._velocity = (0.0, 0.0)
         self._preempted: _Task | None = None
         """What was followed until another path came, which is no new chance: its patience is used up, too."""
