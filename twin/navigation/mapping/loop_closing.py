@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,17 @@ UNSURE_SCORE = 0.45
 DISTINCT = 0.15
 """... and one that is by this better than in any other place in the window."""
 AGREEING = 3
-"""So many matches must agree."""
+"""So many matches must agree ..."""
+AGREEING_FAR = 5
+"""... and so many if they say that the path has drifted by more than its covariance tells."""
+FAR = 3.0
+"""A place that is not where it is expected is looked for again in a window larger by this factor ..."""
+FARTHER = (1.0, 0.1)
+"""... and so much: x and y [m], yaw [rad]. Steady drift is more than the covariance of its steps tells ..."""
+FARTHEST = 5.0
+"""... but no farther away than this [m]."""
+FAR_RESPONSE = 0.5
+"""The correlative match there must be as good as this."""
 REMEMBERED = 12
 """A match waits for others to agree for so many scans."""
 GATE = 20.0
@@ -41,7 +51,8 @@ SPREAD = 0.2
 @dataclass(frozen=True, kw_only=True)
 class _Candidate:
     edge: Edge
-    sure: bool
+    needed: int
+    """So many must agree."""
 
 
 class LoopCloser:
@@ -70,7 +81,7 @@ class LoopCloser:
             candidate = self._try(graph, scans, node, place)
             if candidate is None:
                 continue
-            if candidate.sure:
+            if candidate.needed == 1:
                 found.append(candidate.edge)
             else:
                 self._waiting.append(candidate)
@@ -116,9 +127,42 @@ class LoopCloser:
         return base
 
     def _try(self, graph: PoseGraph, scans: Sequence[Scan], node: int, place: int) -> _Candidate | None:
-        config = self.config
+        """Return the edge that matching finds where it is expected, else in a larger window."""
         position, heading = self._spread(graph, place, node)
-        half = min(3.0 * position + 0.2, 0.5 * config.loop_search_space_dimension)
+        covariance = self.covariance(graph, place, node)
+        prior = turned(covariance, graph.pose(place).yaw) + np.diag([1e-4, 1e-4, 1e-5])
+        near = Window(half_width=3.0 * position + 0.2, half_angle=3.0 * heading + 0.05)
+        least = self.config.loop_match_minimum_response_coarse
+        match = self._match(graph, scans, node, place, near, prior, least, position < SURE)
+        if match is not None:
+            moved = difference(graph.pose(node), match.pose)
+            if moved @ np.linalg.solve(prior + match.covariance, moved) <= GATE:
+                needed = 1 if position < SURE else AGREEING
+                return _Candidate(edge=_edge(place, node, graph.pose(place), match), needed=needed)
+        half = min(FAR * near.half_width + FARTHER[0], FARTHEST)
+        if half <= near.half_width:
+            return None
+        far = Window(half_width=half, half_angle=near.half_angle + FARTHER[1])
+        match = self._match(graph, scans, node, place, far, FAR**2 * prior, FAR_RESPONSE, False)
+        if match is None:
+            return None
+        return _Candidate(edge=_edge(place, node, graph.pose(place), match), needed=AGREEING_FAR)
+
+    def _match(
+        self,
+        graph: PoseGraph,
+        scans: Sequence[Scan],
+        node: int,
+        place: int,
+        window: Window,
+        prior: Array,
+        least: float,
+        sure: bool,
+    ) -> Match | None:
+        """Return where a node's scan fits at a place; unless `sure`, only if it does so nowhere else."""
+        config = self.config
+        half = min(window.half_width, 0.5 * config.loop_search_space_dimension)
+        window = replace(window, half_width=half, half_angle=min(window.half_angle, math.pi))
         members = self._members(graph, place, node)
         reference = Reference.of(
             [scans[member] for member in members],
@@ -129,22 +173,14 @@ class LoopCloser:
         )
         if reference is None:
             return None
-        here, there = graph.pose(place), graph.pose(node)
-        relative = self.covariance(graph, place, node)
-        prior = turned(relative, here.yaw) + np.diag([1e-4, 1e-4, 1e-5])
-        window = Window(half_width=half, half_angle=min(3.0 * heading + 0.05, math.pi))
-        least = config.loop_match_minimum_response_coarse
+        guess = graph.pose(node)
         # Where the place is was not measured by odometry here: a weak prior, that only holds along corridors.
-        match = reference.match(scans[node], there, window, 9.0 * prior, least)
+        match = reference.match(scans[node], guess, window, 9.0 * prior, least)
         if match is None or match.inliers < config.loop_match_minimum_response_fine:
             return None
-        moved = difference(there, match.pose)
-        if moved @ np.linalg.solve(prior + match.covariance, moved) > GATE:
+        if not sure and self._ambiguous(reference, scans[node], match, guess, window, 9.0 * prior):
             return None
-        sure = position < SURE
-        if not sure and self._ambiguous(reference, scans[node], match, there, window, 9.0 * prior):
-            return None
-        return _Candidate(edge=_edge(place, node, here, match), sure=sure)
+        return match
 
     def _ambiguous(
         self, reference: Reference, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array
@@ -173,7 +209,7 @@ class LoopCloser:
             return []
         latest = self._waiting[-1]
         agreeing = [other for other in self._waiting if self._agree(graph, latest.edge, other.edge)]
-        if len({other.edge.second for other in agreeing}) < AGREEING:
+        if len({other.edge.second for other in agreeing}) < latest.needed:
             return []
         self._waiting = [waiting for waiting in self._waiting if waiting not in agreeing]
         return [other.edge for other in agreeing]
