@@ -23,11 +23,13 @@ SURE = 0.25
 UNSURE_SCORE = 0.45
 """Such a match must have this score ..."""
 DISTINCT = 0.15
-"""... and one that is by this better than in any other place in the window."""
+"""... and one that is by this better than in any other place in the window ..."""
+WEAK_INLIERS, WEAK_SCORE, WEAK_DISTINCT = 0.4, 0.3, 0.05
+"""... or at least these, and more matches must agree."""
 AGREEING = 3
 """So many matches must agree ..."""
 AGREEING_FAR = 5
-"""... and so many if they say that the path has drifted by more than its covariance tells."""
+"""... and so many weak ones, or if they say that the path has drifted by more than its covariance tells."""
 FAR = 3.0
 """A place that is not where it is expected is looked for again in a window larger by this factor ..."""
 FARTHER = (1.0, 0.1)
@@ -133,20 +135,20 @@ class LoopCloser:
         prior = turned(covariance, graph.pose(place).yaw) + np.diag([1e-4, 1e-4, 1e-5])
         near = Window(half_width=3.0 * position + 0.2, half_angle=3.0 * heading + 0.05)
         least = self.config.loop_match_minimum_response_coarse
-        match = self._match(graph, scans, node, place, near, prior, least, position < SURE)
-        if match is not None:
-            moved = difference(graph.pose(node), match.pose)
-            if moved @ np.linalg.solve(prior + match.covariance, moved) <= GATE:
-                needed = 1 if position < SURE else AGREEING
-                return _Candidate(edge=_edge(place, node, graph.pose(place), match), needed=needed)
+        expected = self._match(graph, scans, node, place, near, prior, least, position < SURE)
+        if expected is not None:
+            moved = difference(graph.pose(node), expected[0].pose)
+            if moved @ np.linalg.solve(prior + expected[0].covariance, moved) <= GATE:
+                return _Candidate(edge=_edge(place, node, graph.pose(place), expected[0]), needed=expected[1])
         half = min(FAR * near.half_width + FARTHER[0], FARTHEST)
         if half <= near.half_width:
             return None
         far = Window(half_width=half, half_angle=near.half_angle + FARTHER[1])
-        match = self._match(graph, scans, node, place, far, FAR**2 * prior, FAR_RESPONSE, False)
-        if match is None:
+        elsewhere = self._match(graph, scans, node, place, far, FAR**2 * prior, FAR_RESPONSE, False)
+        if elsewhere is None:
             return None
-        return _Candidate(edge=_edge(place, node, graph.pose(place), match), needed=AGREEING_FAR)
+        edge = _edge(place, node, graph.pose(place), elsewhere[0])
+        return _Candidate(edge=edge, needed=AGREEING_FAR)
 
     def _match(
         self,
@@ -158,8 +160,8 @@ class LoopCloser:
         prior: Array,
         least: float,
         sure: bool,
-    ) -> Match | None:
-        """Return where a node's scan fits at a place; unless `sure`, only if it does so nowhere else."""
+    ) -> tuple[Match, int] | None:
+        """Return where a node's scan fits at a place, and how many must agree: one if `sure` of the place."""
         config = self.config
         half = min(window.half_width, 0.5 * config.loop_search_space_dimension)
         window = replace(window, half_width=half, half_angle=min(window.half_angle, math.pi))
@@ -176,20 +178,19 @@ class LoopCloser:
         guess = graph.pose(node)
         # Where the place is was not measured by odometry here: a weak prior, that only holds along corridors.
         match = reference.match(scans[node], guess, window, 9.0 * prior, least)
-        if match is None or match.inliers < config.loop_match_minimum_response_fine:
+        if match is None:
             return None
-        if not sure and self._ambiguous(reference, scans[node], match, guess, window, 9.0 * prior):
+        fits = match.inliers >= config.loop_match_minimum_response_fine
+        if sure:
+            return (match, 1) if fits else None
+        if match.inliers < WEAK_INLIERS or match.score < WEAK_SCORE:
             return None
-        return match
-
-    def _ambiguous(
-        self, reference: Reference, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array
-    ) -> bool:
-        """Return whether a scan fits badly, or elsewhere in the window as well."""
-        if match.score < UNSURE_SCORE:
-            return True
-        rival = reference.rival(scan, match, guess, window, prior)
-        return rival is not None and rival.score > match.score - DISTINCT
+        rival = reference.rival(scans[node], match, guess, window, 9.0 * prior)
+        margin = 1.0 if rival is None else match.score - rival.score
+        if margin < WEAK_DISTINCT:
+            return None
+        strong = fits and match.score >= UNSURE_SCORE and margin >= DISTINCT
+        return match, AGREEING if strong else AGREEING_FAR
 
     def _members(self, graph: PoseGraph, place: int, node: int) -> list[int]:
         """Return nodes before and after a place, spread over the path, without those just before `node`."""
