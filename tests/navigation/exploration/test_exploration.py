@@ -73,15 +73,6 @@ def test_the_view_of_a_frontier_lies_before_it_on_known_ground_and_looks_at_it()
     assert abs(view.yaw) < 0.1
 
 
-def test_a_goal_is_moved_back_from_a_shelf_to_have_more_room_but_not_the_second_time() -> None:
-    data = corridor()
-    data[1:7, 33:37] = data[14:-1, 33:37] = 100  # a passage 0.7 m wide before the frontier
-    seen = FrontierMap(grid(data), at(10, 20), CONFIG)
-    (frontier,) = [frontier for frontier in seen.frontiers if frontier.target[0] > at(0, 30)[0]]
-    assert seen.view_of(frontier, standoff=0.5).x < at(0, 33)[0]
-    assert seen.view_of(frontier, standoff=0.0).x == pytest.approx(at(0, 39)[0], abs=0.11)
-
-
 def test_the_robot_may_stand_on_unknown_ground() -> None:
     data = corridor()
     data[8:13, 18:23] = -1  # the lidar does not see the floor below the robot

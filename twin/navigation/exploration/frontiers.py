@@ -15,8 +15,6 @@ from twin.navigation.exploration.wavefront import travel_distances, way_back
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 
 _EIGHT = np.ones((3, 3), dtype=np.int8)
-STEP_BACK = 1.0
-"""A goal is moved back for more room by at most this [m]."""
 _FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
@@ -30,8 +28,6 @@ class FrontierConfig:
     """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn [m]."""
     inscribed_radius: float = 0.3
     """Unknown cells this near to obstacles are none that matter [m]."""
-    goal_margin: float = 0.2
-    """Where a step back allows it, goals keep this much more: a robot stops near its goal, not at it [m]."""
     view_distance: float = 2.0
     """A frontier in a passage too narrow to turn in is looked at from outside, so far away at most [m]."""
     lethal_threshold: int = 65
@@ -97,7 +93,6 @@ class FrontierMap:
             travel_distances(roomy, self._distance)
         self.reachable: NDArray[np.bool_] = np.isfinite(self._distance)
         """Cells that the robot's centre can get to on known ground, shape (h, w)."""
-        self._spacious = self.reachable & (clearance > config.robot_radius + config.goal_margin)
         passages = clearance > config.inscribed_radius
         travel_distances(~unknown & passages, self._distance)
         wanted = unknown & passages & ~self._near(leave_out, around)
@@ -107,11 +102,6 @@ class FrontierMap:
     def view_of(self, frontier: Frontier, standoff: float) -> Pose2:
         """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it."""
         row, column = self._stand(frontier.gate, standoff)
-        if standoff > 0.0:
-            back = way_back(self._distance, self._spacious, row, column, 0.0)
-            steps = self._distance[row, column] - self._distance[back]
-            if self._spacious[back] and steps * self._grid.resolution <= STEP_BACK:
-                row, column = back
         x, y = self._grid.cell_to_world((column, row))
         yaw = math.atan2(frontier.target[1] - y, frontier.target[0] - x)
         return Pose2(float(x), float(y), yaw)
