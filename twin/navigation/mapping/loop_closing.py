@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,9 +23,21 @@ SURE = 0.25
 UNSURE_SCORE = 0.45
 """Such a match must have this score ..."""
 DISTINCT = 0.15
-"""... and one that is by this better than in any other place in the window."""
+"""... and one that is by this better than in any other place in the window ..."""
+WEAK_INLIERS, WEAK_SCORE, WEAK_DISTINCT = 0.4, 0.3, 0.05
+"""... or at least these, and more matches must agree."""
 AGREEING = 3
-"""So many matches must agree."""
+"""So many matches must agree ..."""
+AGREEING_FAR = 5
+"""... and so many weak ones, or if they say that the path has drifted by more than its covariance tells."""
+FAR = 3.0
+"""A place that is not where it is expected is looked for again in a window larger by this factor ..."""
+FARTHER = (1.0, 0.1)
+"""... and so much: x and y [m], yaw [rad]. Steady drift is more than the covariance of its steps tells ..."""
+FARTHEST = 5.0
+"""... but no farther away than this [m]."""
+FAR_RESPONSE = 0.5
+"""The correlative match there must be as good as this."""
 REMEMBERED = 12
 """A match waits for others to agree for so many scans."""
 GATE = 20.0
@@ -41,7 +53,8 @@ SPREAD = 0.2
 @dataclass(frozen=True, kw_only=True)
 class _Candidate:
     edge: Edge
-    sure: bool
+    needed: int
+    """So many must agree."""
 
 
 class LoopCloser:
@@ -70,7 +83,7 @@ class LoopCloser:
             candidate = self._try(graph, scans, node, place)
             if candidate is None:
                 continue
-            if candidate.sure:
+            if candidate.needed == 1:
                 found.append(candidate.edge)
             else:
                 self._waiting.append(candidate)
@@ -116,9 +129,42 @@ class LoopCloser:
         return base
 
     def _try(self, graph: PoseGraph, scans: Sequence[Scan], node: int, place: int) -> _Candidate | None:
-        config = self.config
+        """Return the edge that matching finds where it is expected, else in a larger window."""
         position, heading = self._spread(graph, place, node)
-        half = min(3.0 * position + 0.2, 0.5 * config.loop_search_space_dimension)
+        covariance = self.covariance(graph, place, node)
+        prior = turned(covariance, graph.pose(place).yaw) + np.diag([1e-4, 1e-4, 1e-5])
+        near = Window(half_width=3.0 * position + 0.2, half_angle=3.0 * heading + 0.05)
+        least = self.config.loop_match_minimum_response_coarse
+        expected = self._match(graph, scans, node, place, near, prior, least, position < SURE)
+        if expected is not None:
+            moved = difference(graph.pose(node), expected[0].pose)
+            if moved @ np.linalg.solve(prior + expected[0].covariance, moved) <= GATE:
+                return _Candidate(edge=_edge(place, node, graph.pose(place), expected[0]), needed=expected[1])
+        half = min(FAR * near.half_width + FARTHER[0], FARTHEST)
+        if half <= near.half_width:
+            return None
+        far = Window(half_width=half, half_angle=near.half_angle + FARTHER[1])
+        elsewhere = self._match(graph, scans, node, place, far, FAR**2 * prior, FAR_RESPONSE, False)
+        if elsewhere is None:
+            return None
+        edge = _edge(place, node, graph.pose(place), elsewhere[0])
+        return _Candidate(edge=edge, needed=AGREEING_FAR)
+
+    def _match(
+        self,
+        graph: PoseGraph,
+        scans: Sequence[Scan],
+        node: int,
+        place: int,
+        window: Window,
+        prior: Array,
+        least: float,
+        sure: bool,
+    ) -> tuple[Match, int] | None:
+        """Return where a node's scan fits at a place, and how many must agree: one if `sure` of the place."""
+        config = self.config
+        half = min(window.half_width, 0.5 * config.loop_search_space_dimension)
+        window = replace(window, half_width=half, half_angle=min(window.half_angle, math.pi))
         members = self._members(graph, place, node)
         reference = Reference.of(
             [scans[member] for member in members],
@@ -129,31 +175,22 @@ class LoopCloser:
         )
         if reference is None:
             return None
-        here, there = graph.pose(place), graph.pose(node)
-        relative = self.covariance(graph, place, node)
-        prior = turned(relative, here.yaw) + np.diag([1e-4, 1e-4, 1e-5])
-        window = Window(half_width=half, half_angle=min(3.0 * heading + 0.05, math.pi))
-        least = config.loop_match_minimum_response_coarse
+        guess = graph.pose(node)
         # Where the place is was not measured by odometry here: a weak prior, that only holds along corridors.
-        match = reference.match(scans[node], there, window, 9.0 * prior, least)
-        if match is None or match.inliers < config.loop_match_minimum_response_fine:
+        match = reference.match(scans[node], guess, window, 9.0 * prior, least)
+        if match is None:
             return None
-        moved = difference(there, match.pose)
-        if moved @ np.linalg.solve(prior + match.covariance, moved) > GATE:
+        fits = match.inliers >= config.loop_match_minimum_response_fine
+        if sure:
+            return (match, 1) if fits else None
+        if match.inliers < WEAK_INLIERS or match.score < WEAK_SCORE:
             return None
-        sure = position < SURE
-        if not sure and self._ambiguous(reference, scans[node], match, there, window, 9.0 * prior):
+        rival = reference.rival(scans[node], match, guess, window, 9.0 * prior)
+        margin = 1.0 if rival is None else match.score - rival.score
+        if margin < WEAK_DISTINCT:
             return None
-        return _Candidate(edge=_edge(place, node, here, match), sure=sure)
-
-    def _ambiguous(
-        self, reference: Reference, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array
-    ) -> bool:
-        """Return whether a scan fits badly, or elsewhere in the window as well."""
-        if match.score < UNSURE_SCORE:
-            return True
-        rival = reference.rival(scan, match, guess, window, prior)
-        return rival is not None and rival.score > match.score - DISTINCT
+        strong = fits and match.score >= UNSURE_SCORE and margin >= DISTINCT
+        return match, AGREEING if strong else AGREEING_FAR
 
     def _members(self, graph: PoseGraph, place: int, node: int) -> list[int]:
         """Return nodes before and after a place, spread over the path, without those just before `node`."""
@@ -173,7 +210,7 @@ class LoopCloser:
             return []
         latest = self._waiting[-1]
         agreeing = [other for other in self._waiting if self._agree(graph, latest.edge, other.edge)]
-        if len({other.edge.second for other in agreeing}) < AGREEING:
+        if len({other.edge.second for other in agreeing}) < latest.needed:
             return []
         self._waiting = [waiting for waiting in self._waiting if waiting not in agreeing]
         return [other.edge for other in agreeing]

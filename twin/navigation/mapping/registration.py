@@ -10,9 +10,10 @@ import numpy as np
 
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
-from twin.navigation.mapping.correlation import Window
+from twin.navigation.mapping.correlation import Correlation, Window
 from twin.navigation.mapping.matcher import Match, Reference, levels_for
 from twin.navigation.mapping.scan import Scan
+from twin.navigation.mapping.uncertainty import difference
 
 DOUBTFUL = 0.6
 """Below this score a match is compared with others ..."""
@@ -30,6 +31,12 @@ SLIPPED = np.diag([25.0, 25.0, 25.0])
 """... but wheels may spin or count the wrong way, too."""
 LOST_PRIOR = np.diag([1.0, 1.0, 1e4])
 """By so much it is larger if it certainly has slipped."""
+AGREED = 9.0
+"""Squared difference [sigma^2] from which a match and odometry contradict each other."""
+HOME = 0.1
+"""A match that contradicts odometry must have a score that is better by this than one that does not."""
+HELD = 0.2
+"""Scans hold a position all round if they tell this much in one direction for 1 in the best one."""
 
 
 class Registration:
@@ -77,7 +84,7 @@ class Registration:
         if reference is None:
             return None
         window = replace(self._window, half_angle=half_angle or self._window.half_angle)
-        match = reference.match(scan, guess, window, prior, least)
+        match = self._near_home(scan, reference.match(scan, guess, window, prior, least), guess, prior)
         if match is not None and match.score >= DOUBTFUL:
             return match
         # What responds most on the smeared grid need not fit best: ask for several.
@@ -93,7 +100,57 @@ class Registration:
         candidates = reference.candidates(scan, guess, wide, least, 4 * SECTORS)
         other = reference.best(scan, candidates, guess, LOST_PRIOR * prior)
         enough = ALONE if match is None else DOUBTFUL
-        return other if other is not None and other.score >= enough else match
+        if other is None or other.score < enough or (_reversed(other, guess) and _looseness(other) > 0.0):
+            return match
+        return other
+
+    def _near_home(self, scan: Scan, match: Match | None, guess: Pose2, prior: Array) -> Match | None:
+        """Return the match that odometry's guess itself leads to if `match` is far away and hardly better."""
+        if match is None or self._reference is None or contradiction(match, guess, prior) <= AGREED:
+            return match
+        home = self._reference.refined(scan, Correlation(pose=guess, response=match.response), guess, prior)
+        if home is None or contradiction(home, guess, prior) > AGREED:
+            return match
+        return _better(home, match, HOME)
+
+
+def contradiction(match: Match, guess: Pose2, prior: Array) -> float:
+    """Return the squared difference [sigma^2] of a match and odometry's guess with covariance `prior`."""
+    moved = difference(guess, match.pose)
+    return float(moved @ np.linalg.solve(prior + match.covariance, moved))
+
+
+def doubted(match: Match, guess: Pose2, prior: Array) -> Array:
+    """Return the covariance of a match, shape (3, 3), wider towards a guess that contradicts it.
+
+    Either may be wrong then: the scans, most of all where few points fit or along a corridor, where next to
+    nothing holds them (Zhang et al., On degeneracy of optimization-based state estimation problems, ICRA
+    2016), or the wheels. The wider covariance lets loops that are closed later decide.
+
+    Args:
+        match: In the map frame.
+        guess: Where odometry leads to, in the map frame.
+        prior: Covariance of the guess in the map frame, shape (3, 3).
+    """
+    square = contradiction(match, guess, prior)
+    if square <= AGREED:
+        return match.covariance
+    moved = difference(guess, match.pose)
+    if match.score >= DOUBTFUL:  # walls hold the heading, in corridors too
+        moved[2] = 0.0
+    doubt = min(max(1.0 - match.score, _looseness(match)), 1.0) * (1.0 - AGREED / square)
+    return match.covariance + doubt * np.outer(moved, moved)
+
+
+def _looseness(match: Match) -> float:
+    """Return how loosely scans hold a position in their worst direction: 0 well, 1 not at all."""
+    spread = np.linalg.eigvalsh(match.covariance[:2, :2])
+    return 1.0 - min(float(spread[0] / spread[1]) / HELD, 1.0)
+
+
+def _reversed(match: Match, guess: Pose2) -> bool:
+    """Return whether a match looks the other way than odometry: along a corridor both ways fit."""
+    return abs(float(difference(guess, match.pose)[2])) > 0.5 * math.pi
 
 
 def _better(first: Match | None, second: Match | None, gain: float) -> Match | None:

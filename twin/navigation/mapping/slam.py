@@ -17,7 +17,7 @@ from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
 from twin.navigation.mapping.mapped_scans import MappedScans
 from twin.navigation.mapping.matcher import Match
-from twin.navigation.mapping.registration import Registration
+from twin.navigation.mapping.registration import Registration, doubted
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
 from twin.navigation.mapping.storage import SavedGraph, pack, unpack
@@ -251,10 +251,10 @@ class Slam:
         """Add a scan to the map."""
         mapped, graph = self._mapped, self._mapped.graph
         last, guess = graph.pose(len(graph) - 1), self._guess(odom)
-        prior = odometry_covariance(step)
-        match = mapped.registration(mapped.recent(guess)).match(scan, guess, turned(prior, last.yaw))
+        prior = turned(odometry_covariance(step), last.yaw)
+        match = mapped.registration(mapped.recent(guess)).match(scan, guess, prior)
         pose = guess if match is None else match.pose
-        relative = prior if match is None else turned(match.covariance, -last.yaw)
+        relative = turned(prior if match is None else doubted(match, guess, prior), -last.yaw)
         self.covariance = compounded(self.covariance, last, last.inverse() @ pose, relative)
         node = mapped.add(scan, pose, stamp_ns)
         mapped.connect(node - 1, node, relative)
