@@ -15,6 +15,7 @@ import numpy as np
 from twin.geometry import Pose2
 from twin.navigation.control.collision_monitor import time_to_collision
 from twin.navigation.control.controller import Controller
+from twin.navigation.control.maneuver import find_maneuver
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
@@ -56,6 +57,13 @@ def warm_up_planning() -> None:
     """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
     costmap = _costmap().costmap
     SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, _START, _GOAL), costmap)
+
+
+@cache
+def warm_up_maneuver() -> None:
+    """Look for a way on to a path."""
+    path = np.array([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
+    find_maneuver(_costmap().costmap, _costmap().config.polygon, Pose2(1.0, 1.0, 0.0), path)
 
 
 @cache

@@ -34,9 +34,8 @@ class RandomGoalsConfig:
     max_failed: int = 0
     """How many goals may be given up; one more ends the mission."""
     retries: int = 3
-    """How often a goal that the navigator gives up is sent again: somebody may stand on it."""
-    retry_after_ns: int = 5_000_000_000
-    """How long is waited before that [ns]."""
+    """How often a goal that the navigator gives up is sent again, after another one: who stands on it now
+    has gone by then."""
 
 
 class RandomGoalsNode(MissionNode):
@@ -59,10 +58,12 @@ class RandomGoalsNode(MissionNode):
         self._map: OccupancyMap | None = None
         self._places: Array | None = None
         self._goal: ClientGoal | None = None
-        self._again: tuple[Pose2, int] | None = None
-        """The goal to send again, and when."""
+        self._tries: dict[Pose2, int] = {}
+        """How often those goals were sent that are neither reached nor given up for good."""
+        self._put_off: list[Pose2] = []
         self._place = Pose2(0.0, 0.0, 0.0)
-        self._tries = 0
+        self._returning = False
+        """Whether the last goal had been put off."""
         self._at: tuple[float, float] | None = None
         self.driven = 0.0
         """By odometry, so far [m]."""
@@ -91,45 +92,48 @@ class RandomGoalsNode(MissionNode):
             return
         if self._goal is not None and not self._settle(self._goal):
             return
-        if self._again is not None:
-            if self.node.now_ns >= self._again[1]:
-                self._send(self._again[0])
-            return
         if self.driven >= self._config.distance:
             self.finish(succeeded=True)
             return
         if self._places is None:
             self._places = open_places(self._map, robot, self._config.clearance)
-        goal = self._draw(robot)
+        goal = self._next(robot)
         if goal is None:
             self.note("the map has no free place that far away from the robot")
             self.finish(succeeded=False)
             return
-        self._tries = 0
         self._send(goal)
 
+    def _next(self, robot: Pose2) -> Pose2 | None:
+        """Return a goal that was put off, or after such a one a new one."""
+        self._returning = bool(self._put_off) and not self._returning
+        return self._put_off.pop(0) if self._returning else self._draw(robot)
+
     def _send(self, goal: Pose2) -> None:
-        self._again, self._place = None, goal
-        self._tries += 1
+        self._place = goal
+        self._tries[goal] = self._tries.get(goal, 0) + 1
         self.enter(f"goal {self.reached + self.failed + 1}: ({goal.x:.2f}, {goal.y:.2f})")
         target = pose_stamped(goal, self._robot_pose.frames.map, self.node.now_ns)
         self._goal = self._navigate.send_goal(new(NavigateToPose.Goal, pose=target))
 
     def _settle(self, goal: ClientGoal) -> bool:
-        """Return whether the next goal may be drawn."""
+        """Return whether the next goal may be sent."""
         if goal.accepted is not False and not goal.done:
             return False
         self._goal = None
+        tries = self._tries[self._place]
         if goal.succeeded:
             self.reached += 1
+        elif tries <= self._config.retries:
+            self._put_off.append(self._place)
+            self._returning = True  # first another one
             return True
-        if self._tries <= self._config.retries:
-            self._again = self._place, self.node.now_ns + self._config.retry_after_ns
-            return True
-        self.failed += 1
-        self.note(getattr(goal.result, "error_msg", "") or goal.error or "the goal was given up")
-        if self.failed > self._config.max_failed:
-            self.finish(succeeded=False)
+        else:
+            self.failed += 1
+            self.note(getattr(goal.result, "error_msg", "") or goal.error or "the goal was given up")
+            if self.failed > self._config.max_failed:
+                self.finish(succeeded=False)
+        del self._tries[self._place]
         return not self.done
 
     def _draw(self, robot: Pose2) -> Pose2 | None:

@@ -13,6 +13,7 @@ from twin.navigation.control.goal_checker import (
     PositionGoalCheckerConfig,
     StoppedGoalCheckerConfig,
 )
+from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
     GoalCriticConfig,
@@ -63,6 +64,7 @@ def controller_server_config(
         goal_checkers=checkers,
         progress_checkers={"progress_checker": _progress_checker(overrides)},
         controller_period_ns=period_ns,
+        maneuver=ManeuverConfig() if overrides.get("maneuvers", True) else ManeuverConfig(reach=0.0),
         failure_tolerance_ns=_PATIENCE_NS if tolerance is None else round(tolerance * 1e9),
     )
 

@@ -12,6 +12,7 @@ from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.commitment import CommitmentConfig
+from twin.navigation.planning.goal_access import GoalAccessConfig
 from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
@@ -46,6 +47,7 @@ class NavigationParameters:
     planner: PlannerPluginConfig
     planner_server: PlannerServerConfig
     commitment: CommitmentConfig
+    goal_access: GoalAccessConfig
     controller_server: ControllerServerConfig
     path_smoother: SmootherServerConfig
     behaviors: BehaviorConfig
@@ -123,6 +125,7 @@ def navigation_parameters(
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
+        goal_access=overridden(GoalAccessConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),

@@ -73,6 +73,7 @@ def build_navigation(
         config=parameters.planner,
         server=parameters.planner_server,
         commitment=parameters.commitment,
+        goal_access=parameters.goal_access,
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)

@@ -137,7 +137,7 @@ class RandomGoals(StrictModel):
     max_failed: Annotated[int, NotNegative] = 0
     """How many goals may be given up; one more ends the mission."""
     retries: Annotated[int, NotNegative] = 3
-    """How often a goal that the navigator gives up is sent again, 5 s later: somebody may stand on it."""
+    """How often a goal that the navigator gives up is sent again, after another one."""
 
 
 class VelocityStep(StrictModel):

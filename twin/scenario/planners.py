@@ -8,12 +8,20 @@ from pydantic import Field, model_validator
 
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres
+from twin.strict_yaml import Metres, Seconds
 
 _AtLeastOne = Field(ge=1.0)
 
 _SERVER = frozenset(
-    {"plugin", "compute_alternatives", "tolerance", "allow_unknown", "commitment_cost", "commitment_width"}
+    {
+        "plugin",
+        "compute_alternatives",
+        "tolerance",
+        "allow_unknown",
+        "commitment_cost",
+        "commitment_width",
+        "goal_patience",
+    }
 )
 _KEYS = {
     "grid_based": frozenset({"cost_factor"}),
@@ -51,6 +59,8 @@ class PlannerParameters(ParameterGroup):
     """Added to the cost of each cell off the last path, so that routes are not changed lightly."""
     commitment_width: Annotated[Metres, Positive] | None = None
     """To each side of the last path that counts as on it [m]."""
+    goal_patience: Annotated[Seconds, NotNegative] | None = None
+    """How long somebody may stand on the goal when the robot is near, until it is given up [s]."""
     cost_factor: Annotated[float, NotNegative] | None = None
     """`grid_based`: a metre at cost 252 counts as 1 + cost_factor metres of free space."""
     w_euc_cost: Annotated[float, Positive] | None = None

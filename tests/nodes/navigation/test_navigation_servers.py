@@ -16,6 +16,7 @@ from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import ClearEntireCostmap, GetMap, IsPathValid
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
+from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
@@ -328,6 +329,50 @@ def test_it_stops_before_what_blocks_its_path(bench: Bench, stack: Stack) -> Non
     assert "no valid control for 0.3 s: collision in" in goal.result.error_msg
     assert stack.robot.pose.x < 1.0 - HALF
     assert stack.robot.commands[-1] == (0.0, 0.0)
+
+
+def beside_a_box(bench: Bench, reach: float) -> tuple[Stack, Any]:
+    """Follow a path around a box that stands before the robot's nose, too near to turn."""
+    stack = Stack(bench, failure_tolerance_ns=4_000_000_000, maneuver=ManeuverConfig(reach=reach))
+    stack.room.add_box(0.18, -0.6, 0.8, 0.13)
+    bench.run(0.5)
+    path = np.array([[0.0, 0.0, 1.57], [0.0, 0.45, 0.0], [2.0, 0.45, 0.0]])
+    return stack, stack.drive(path)
+
+
+def test_a_blocked_robot_maneuvers_and_goes_on(bench: Bench) -> None:
+    stack, goal = beside_a_box(bench, reach=1.5)
+    said = bench.logs()
+    bench.until(lambda: goal.done, 30.0)
+    assert goal.succeeded, goal.result.error_msg
+    assert any(text.startswith("maneuvering: collision in") for text in said)
+    assert min(v for v, _ in stack.robot.commands) < -0.05, "it backs up"
+
+
+def test_without_maneuvers_it_leaves_that_to_recoveries(bench: Bench) -> None:
+    stack, goal = beside_a_box(bench, reach=0.0)
+    bench.until(lambda: goal.done, 30.0)
+    assert goal.result.error_code == 104
+    assert min(v for v, _ in stack.robot.commands) >= 0.0
+
+
+def test_a_goal_that_something_stands_on_is_planned_to_until_the_robot_waits_before_it(
+    bench: Bench, stack: Stack
+) -> None:
+    walls = stack.room.segments
+    stack.room.add_box(2.3, -0.2, 2.6, 0.2)
+    bench.run(0.5)
+    hoped = stack.plan(2.4, 0.0)
+    assert hoped.succeeded, hoped.result.error_msg
+    assert not stack.is_valid(hoped.result.path), "it is looked after, though"
+    bench.run(5.0)
+    given_up = stack.plan(2.4, 0.0)
+    assert given_up.result.error_code == 206
+    assert "something has stood at the goal (2.40, 0.00) for 5 s" in given_up.result.error_msg
+    stack.room.segments = walls
+    bench.run(0.5)
+    assert stack.plan(2.4, 0.0).succeeded
+    assert stack.is_valid(hoped.result.path)
 
 
 @pytest.mark.parametrize(

@@ -71,6 +71,7 @@ class LayeredCostmap:
         self._keepout: Cells | None = None
         self._master = self._static.copy()
         self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._known: Costmap | None = None
         self._dirty = everything(self.shape)
         self._all_costs_stale = True
 
@@ -86,6 +87,20 @@ class LayeredCostmap:
         if not self._dirty.empty:
             self._refresh()
         return self._grid
+
+    @property
+    def known(self) -> Costmap:
+        """What the map and the masks say without anything that a sensor has seen; kept until one changes."""
+        if self._known is None:
+            master, keepout = self._static, self._keepout
+            if keepout is not None and self.config.keepout_before_inflation:
+                master = raised(master, keepout)
+            costs = np.empty_like(self._static)
+            self._inflation.write(costs, master, everything(self.shape))
+            if keepout is not None:
+                costs = raised(costs, keepout)
+            self._known = self._wrap(costs, self._grid.origin)
+        return self._known
 
     def update(self, scan_points: ArrayLike, sensor_origin: ArrayLike, robot: Pose2 | None = None) -> None:
         """Clear along the rays of a scan and mark its points.
@@ -145,6 +160,7 @@ class LayeredCostmap:
         if not same:
             self._keepout = layer
             self._stale()
+            self._known = None
 
     def move_to(self, x: float, y: float) -> None:
         """Centre a rolling window on a point [m], by whole cells; what leaves it is forgotten.
@@ -166,6 +182,7 @@ class LayeredCostmap:
         self._keepout = None  # the mask stays where it is: whoever has it lays it anew
         origin = (old[0] + dx * self._resolution, old[1] + dy * self._resolution)
         self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._known = None
         self._stale()
 
     def clear(self) -> None:

@@ -16,6 +16,7 @@ from twin.bridge.msgs import MarkerArray, Odometry, Path, Point, PointStamped, S
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker, GoalCheckerConfig, PositionGoalCheckerConfig
+from twin.navigation.control.maneuver import Maneuver, ManeuverConfig
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.plugins import (
     ControllerConfig,
@@ -26,6 +27,7 @@ from twin.navigation.control.plugins import (
 from twin.navigation.control.progress_checker import ProgressChecker, ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.failures import ControlFailure, NoValidControl
+from twin.navigation.warm_up import warm_up_maneuver
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -63,6 +65,8 @@ class ControllerServerConfig:
     """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
     costmap_update_timeout_ns: int = 5_000_000_000
     """How long the robot stands and waits for a local costmap that is not current; Nav2: 0.3 s [ns]."""
+    maneuver: ManeuverConfig = field(default_factory=ManeuverConfig)
+    """How a robot that stands blocked gets free; Nav2 leaves that to recoveries."""
     min_x_velocity_threshold: float = 0.0001
     """Measured speeds below this count as none [m/s]."""
     min_theta_velocity_threshold: float = 0.0001
@@ -83,6 +87,8 @@ class _Task:
     last_valid_ns: int
     current_ns: int
     """When the costmap was current last."""
+    searched_ns: int
+    """When a way out was looked for last, or something was valid."""
     waiting: bool = False
     """Whether the robot stands because it is not."""
 
@@ -119,6 +125,11 @@ class ControllerServerNode:
         for kind in ("controller", "goal_checker", "progress_checker"):
             node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
+        self._maneuver = Maneuver(
+            footprint=np.array(footprint, dtype=np.float64, order="C"), config=self.config.maneuver
+        )
+        if self.config.maneuver.reach:
+            warm_up_maneuver()
         self._velocity = (0.0, 0.0)
         self._preempted: _Task | None = None
         """What was followed until another path came, which is no new chance: its patience is used up, too."""
@@ -134,6 +145,7 @@ class ControllerServerNode:
     def _reconfigure(self, config: ControllerServerConfig) -> None:
         """Go on with other parameters: the checkers from the next goal on, the rest at once."""
         before, self.config = self.config, config
+        self._maneuver.config = config.maneuver
         for name, plugin in config.controllers.items():
             if plugin != before.controllers[name]:
                 self.controllers[name].configure(plugin)
@@ -183,6 +195,7 @@ class ControllerServerNode:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
             if finished:
                 self._preempted = None
+                self._maneuver.drop()
                 for controller in self.controllers.values():
                     controller.reset()
 
@@ -205,6 +218,7 @@ class ControllerServerNode:
             handler=handler,
             last_valid_ns=before.last_valid_ns if before else self.node.now_ns,
             current_ns=self.node.now_ns,
+            searched_ns=before.searched_ns if before else self.node.now_ns,
         )
         return task
 
@@ -222,23 +236,39 @@ class ControllerServerNode:
             return False
         if not task.progress_checker.check(in_map, self.node.now_ns):
             raise _Abort(_FAILED_TO_MAKE_PROGRESS, "failed to make progress")
-        dt = self.config.controller_period_ns * 1e-9
-        try:
-            command = task.controller.compute_velocity(
-                in_map, self._velocity, task.path, self._costmap.costmap, dt, costmap_pose=in_odom
-            )
-            task.last_valid_ns = self.node.now_ns
-        except NoValidControl as failure:
-            self._be_patient(task, failure)
-            command = (0.0, 0.0)
-        except ControlFailure as failure:
-            raise _Abort(failure.error_code, str(failure)) from failure
+        command = self._command(task, in_map, in_odom, ahead.poses)
         self._publisher.publish(twist_from_planar(*command))
         self._show(task.controller, ahead.poses)
         handle.publish_feedback(
             new(FollowPath.Feedback, distance_to_goal=in_map.distance(goal), speed=abs(self._velocity[0]))
         )
         return False
+
+    def _command(self, task: _Task, in_map: Pose2, in_odom: Pose2, ahead: Array) -> tuple[float, float]:
+        """Return the controller's command; that of a maneuver where it has had none for a while."""
+        costmap, dt, now = self._costmap.costmap, self.config.controller_period_ns * 1e-9, self.node.now_ns
+        if self._maneuver.active and costmap is not None:
+            maneuvered = self._maneuver.command(in_odom, self._velocity, costmap, dt)
+            if maneuvered is not None:
+                task.last_valid_ns = task.searched_ns = now
+                return maneuvered
+        try:
+            command = task.controller.compute_velocity(
+                in_map, self._velocity, task.path, costmap, dt, costmap_pose=in_odom
+            )
+        except NoValidControl as failure:
+            self._be_patient(task, failure)
+            if costmap is not None and now - task.searched_ns >= self.config.maneuver.wait * 1e9:
+                task.searched_ns = now
+                to_costmap = in_odom @ in_map.inverse()
+                path = np.array([to_costmap @ Pose2(*pose) for pose in ahead.tolist()])
+                if self._maneuver.begin(costmap, in_odom, path):
+                    self.node.get_logger().info(f"maneuvering: {failure}")
+            return 0.0, 0.0
+        except ControlFailure as failure:
+            raise _Abort(failure.error_code, str(failure)) from failure
+        task.last_valid_ns = task.searched_ns = now
+        return command
 
     def _is_costmap_current(self, task: _Task) -> bool:
         """Return whether to drive on by the costmap; raises _Abort if it has been out of date for long."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Costmap as CostmapMessage
-from twin.bridge.msgs import LaserScan, OccupancyGrid, PolygonStamped, Range
+from twin.bridge.msgs import LaserScan, OccupancyGrid, PolygonStamped, Range, ns
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.errors import MapError
 from twin.geometry import Array
@@ -74,6 +74,8 @@ class CostmapNode:
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scan: LaserScan | None = None
+        """One that has come since the last update."""
+        self._last_scan: LaserScan | None = None
         self._input = ScanInput(robot_pose, node.now_ns)
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
@@ -87,7 +89,9 @@ class CostmapNode:
         node.create_subscription(LaserScan, f"{namespace}/{config.scan_topic}", self._on_scan, SENSOR_DATA)
         for topic in config.range_topics:
             node.create_subscription(Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA)
-        CostmapServices(node, config.name, config.frame, robot_pose, lambda: self._layers, self._mark_known)
+        CostmapServices(
+            node, config.name, config.frame, robot_pose, lambda: self._layers, self._after_clearing
+        )
         self._keepout: KeepoutFilterPart | None = None
         if config.keepout_filter_info_topic:
             info = f"{namespace}/{config.keepout_filter_info_topic}"
@@ -105,6 +109,11 @@ class CostmapNode:
     def costmap(self) -> Costmap | None:
         """The master grid; None until the map is there."""
         return self._layers.costmap if self._layers else None
+
+    @property
+    def known(self) -> Costmap | None:
+        """What the map and the masks alone say; None until the map is there."""
+        return self._layers.known if self._layers else None
 
     @property
     def fault(self) -> str:
@@ -126,14 +135,22 @@ class CostmapNode:
             return
         self._known = grid.cell_to_world(np.argwhere(grid.data == OCCUPIED)[:, ::-1])
 
-    def _mark_known(self) -> None:
-        """Put into a local costmap that has forgotten everything what the map shows.
+    def _after_clearing(self, everything: bool) -> None:
+        """Take the present scan again: what is seen now is there, whatever was to be forgotten.
 
-        A lidar that is blind to the rear would not see it before the robot has turned into it.
+        Nav2's servers wait for the next scan instead. A local costmap that has forgotten everything is told
+        what the map shows, too: a lidar that is blind to the rear would not see it before the robot has
+        turned into it.
         """
+        layers = self._layers
+        if layers is None:
+            return
         T_frame_map = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.map)
-        if self._layers is not None and len(self._known) and T_frame_map is not None:
-            self._layers.mark(T_frame_map.apply(self._known))
+        if everything and len(self._known) and T_frame_map is not None:
+            layers.mark(T_frame_map.apply(self._known))
+        scan = self._last_scan
+        if scan is not None and self.node.now_ns - ns(scan.header.stamp) <= self.config.update_period_ns:
+            self._take_scan(layers, scan)
 
     def _on_scan(self, message: LaserScan) -> None:
         if self._input.accept(message, self.node.now_ns):
@@ -148,7 +165,9 @@ class CostmapNode:
             if robot is None:
                 return
             layers.move_to(robot.x, robot.y)
-        self._take_scan(layers)
+        if self._scan is not None:
+            self._last_scan, self._scan = self._scan, None
+            self._take_scan(layers, self._last_scan)
         for message in self._ranges:
             self._take_range(layers, message)
         self._ranges.clear()
@@ -160,10 +179,7 @@ class CostmapNode:
             placed = robot.apply(self._polygon)
             self._footprint_publisher.publish(polygon_msg(placed, self.config.frame, self.node.now_ns))
 
-    def _take_scan(self, layers: LayeredCostmap) -> None:
-        scan, self._scan = self._scan, None
-        if scan is None:
-            return
+    def _take_scan(self, layers: LayeredCostmap, scan: LaserScan) -> None:
         T_frame_lidar = self._robot_pose.at_stamp(self.config.frame, scan.header)
         if T_frame_lidar is None:
             return

@@ -33,7 +33,7 @@ class CostmapServices:
         frame: str,
         pose: RobotPose,
         layers: Callable[[], LayeredCostmap | None],
-        cleared: Callable[[], None],
+        cleared: Callable[[bool], None],
     ) -> None:
         """Create the services.
 
@@ -43,7 +43,7 @@ class CostmapServices:
             frame: Of the costmap.
             pose: What the robot believes about its pose.
             layers: The costmap as it is now; None before there is a map.
-            cleared: Called after everything was forgotten.
+            cleared: Called after something was forgotten, with whether that was everything.
         """
         self._node, self._frame, self._pose, self._layers = node, frame, pose, layers
         self._cleared = cleared
@@ -58,7 +58,7 @@ class CostmapServices:
         layers = self._layers()
         if layers is not None:
             layers.clear()
-            self._cleared()
+            self._cleared(True)
         return new(ClearEntireCostmap.Response)
 
     def _clear_around(self, request: Any) -> Any:
@@ -89,6 +89,7 @@ class CostmapServices:
             self._node.get_logger().error("nothing cleared: there is no map yet, or no transform to the pose")
         else:
             layers.clear_area(pose.x, pose.y, float(size), outside=outside)
+            self._cleared(False)
 
     def _get_cost(self, request: Any) -> Any:
         """Answer the cost at a point, or the worst under the footprint's outline; -1 off the costmap."""

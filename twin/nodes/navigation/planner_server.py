@@ -19,6 +19,7 @@ from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INF
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.commitment import CommitmentConfig, committed
+from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
 from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
@@ -53,6 +54,7 @@ class PlannerParameters:
     server: PlannerServerConfig
     planner: PlannerPluginConfig
     commitment: CommitmentConfig
+    goal_access: GoalAccessConfig
     smoother: SmootherConfig
 
 
@@ -73,6 +75,7 @@ class PlannerServerNode:
         server: PlannerServerConfig | None = None,
         smoother: SmootherConfig | None = None,
         commitment: CommitmentConfig | None = None,
+        goal_access: GoalAccessConfig | None = None,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("planner_server", namespace)
@@ -96,14 +99,16 @@ class PlannerServerNode:
             server=server or PlannerServerConfig(),
             planner=self._configs[DEFAULT_ID],
             commitment=commitment or CommitmentConfig(),
+            goal_access=goal_access or GoalAccessConfig(),
             smoother=smoother or SmootherConfig(),
         )
+        self._access = GoalAccess(footprint=costmap.config.layers.polygon)
         self._apply(parameters)
         declare_config(
             self.node,
             parameters,
             self._apply,
-            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "server": ""},
+            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "goal_access": "", "server": ""},
         )
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
@@ -118,6 +123,7 @@ class PlannerServerNode:
         """Plan the next path with these parameters."""
         self._server = parameters.server
         self._commitment = parameters.commitment
+        self._access.config = parameters.goal_access
         self._smoother = SimpleSmoother(config=parameters.smoother)
         if parameters.planner != self._configs[DEFAULT_ID]:
             self._configs[DEFAULT_ID] = parameters.planner
@@ -163,7 +169,7 @@ class PlannerServerNode:
         return new(result, path=path, planning_time=duration(0))
 
     def _leg(self, name: str, start: Pose2, goal: Pose2) -> Array:
-        costmap, planner = self._known_costmap(), self._planners[name]
+        costmap, planner = self._open_costmap(start, goal), self._planners[name]
         if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
             costmap = committed(costmap, self._last[1], self._commitment)
         tried = self._tried_before(start, goal)
@@ -184,10 +190,11 @@ class PlannerServerNode:
             self._tried = []
         return self._tried
 
-    def _known_costmap(self) -> Costmap:
-        if self._costmap.costmap is None:
+    def _open_costmap(self, start: Pose2, goal: Pose2) -> Costmap:
+        costmap, known = self._costmap.costmap, self._costmap.known
+        if costmap is None or known is None:
             raise NoPose("no plan without map")
-        return self._costmap.costmap
+        return self._access.open_to(goal, start, costmap, known, self.node.now_ns)
 
     def _start(self, request: Any) -> Pose2:
         if request.use_start:
@@ -213,12 +220,15 @@ class PlannerServerNode:
 
     def _on_is_path_valid(self, request: Any) -> Any:
         """Answer whether the rest of a path, from the pose nearest to the robot on, is free."""
-        path, costmap, robot = path_array(request.path), self._costmap.costmap, self._robot_pose.in_map()
-        if not len(path) or costmap is None or robot is None:
+        path, robot = path_array(request.path), self._robot_pose.in_map()
+        costmap, known = self._costmap.costmap, self._costmap.known
+        if not len(path) or costmap is None or known is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
         away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
         nearest = int(np.argmin(away))
-        if away[nearest] > self._server.path_distance:
+        if away[nearest] > self._server.path_distance or self._access.is_lost(
+            Pose2(*path[-1].tolist()), robot, costmap, known
+        ):
             return new(IsPathValid.Response, is_valid=False)
         columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
         height, width = costmap.costs.shape

@@ -127,8 +127,10 @@ class FollowPath(ActionNode):
     )
 
     def make_goal(self) -> Any | None:
-        """Return the goal, and remember what it was made of."""
+        """Return the goal, and remember what it was made of; None for the empty path of a failed planner."""
         self._path = self.get("path")
+        if self._path is not None and not len(self._path.poses):
+            return None
         self._ids = [self.get(name) for name in self._IDS]
         return fill(self.ACTION.Goal, path=self._path, **dict(zip(self._IDS, self._ids, strict=True)))
 

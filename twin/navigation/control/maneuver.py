@@ -1,0 +1,244 @@
+"""A few moves to and fro that free a robot where its controller finds no command, as a driver would park.
+
+A controller looks a second ahead along one curve. Between a rack and somebody who stands still that is not
+enough: a long robot has to back up a little and turn before it can go on. Here poses are searched, the whole
+footprint at each, from where the robot is to the path ahead of it: an A* over (x, y, heading) whose moves are
+short arcs, forwards or backwards, and turns in place (the state lattice of Pivtoraiko, Knepper, Kelly 2009).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.maneuver_kernel import contact, search
+from twin.navigation.control.rotation import turn_rate
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.footprint import padded
+from twin.navigation.costmaps.kernels import escapes, steps_to_collision
+
+_BINS = 48
+_TURN = 2.0 * math.pi / _BINS
+_STEP = 0.075
+"""Of a move [m]: so long that it always leaves its cell."""
+_NEAR, _TURNED = 0.015, 0.03
+"""A move is over this near to its end [m], [rad]."""
+_MARGIN = 0.025
+"""Around the footprint [m], for a robot is a little beside the poses that it follows; if there is no way so,
+there may be one without."""
+_LOOK, _LOOK_TURN = 0.1, 0.3
+"""How far ahead a maneuver is checked while it is driven [m], [rad]: more than the way to stop."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManeuverConfig:
+    """How a robot gets free."""
+
+    wait: float = 1.5
+    """How long the robot stands blocked before it maneuvers: somebody in the way may walk on [s]."""
+    reach: float = 1.5
+    """How far from where it stands the robot goes at most, to each side [m]; 0: it never maneuvers."""
+    ahead_min: float = 0.5
+    """The nearest place on the path where a maneuver may end [m] ..."""
+    ahead_max: float = 1.4
+    """... and the farthest [m]."""
+    speed: float = 0.2
+    """[m/s]"""
+    turn_speed: float = 0.6
+    """[rad/s]"""
+    acceleration: float = 0.5
+    """Of driving [m/s²] ..."""
+    turn_acceleration: float = 1.2
+    """... and turning [rad/s²]."""
+    reverse_penalty: float = 2.0
+    """What a metre backwards counts, where a lidar may see nothing."""
+    turn_price: float = 0.3
+    """What a radian of turning in place counts [m]."""
+    cost_penalty: float = 1.0
+    """A metre at cost 252 counts as 1 + cost_penalty metres of free space."""
+    cusp_penalty: float = 0.1
+    """What it costs to change between forwards, backwards and turning [m]."""
+
+
+def find_maneuver(
+    costmap: Costmap,
+    footprint: ArrayLike,
+    start: Pose2,
+    path: Array,
+    config: ManeuverConfig | None = None,
+) -> list[tuple[int, Array]]:
+    """Return the moves that lead from a blocked pose on to the path; none if there are none.
+
+    Args:
+        costmap: Around the robot.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+        start: In the costmap's frame.
+        path: What is ahead, shape (n, 3), n >= 1, from the pose nearest to the robot on; in that frame, too.
+        config: Prices and limits.
+
+    Returns:
+        Moves in order: 1 forwards, -1 backwards, 0 a turn in place; and its poses, shape (n, 3), n >= 2.
+    """
+    config = config or ManeuverConfig()
+    corners = np.array(footprint, dtype=np.float64, order="C")
+    for margin in (_MARGIN, 0.0):
+        found = _search(costmap, corners, padded(corners, margin), start, path, config)
+        if found:
+            return found
+    return []
+
+
+def _search(
+    costmap: Costmap, corners: Array, wider: Array, start: Pose2, path: Array, config: ManeuverConfig
+) -> list[tuple[int, Array]]:
+    targets = _targets(costmap, wider, path, config)
+    side = 2 * math.ceil(config.reach / costmap.resolution) + 1
+    if not len(targets) or side == 1:
+        return []
+    poses, moves = search(
+        costmap.costs,
+        corners,
+        wider,
+        costmap.frame,
+        np.array([start.x, start.y, start.yaw], dtype=np.float64),
+        targets,
+        _moves(config),
+        side,
+        _BINS,
+        1.5 * costmap.resolution,
+        1.5 * _TURN,
+        config.cost_penalty,
+        config.cusp_penalty,
+    )
+    return _pieces(poses, np.sign(_moves(config)[moves[1:], 0]).astype(int).tolist())
+
+
+@dataclass(kw_only=True)
+class Maneuver:
+    """Drives what `find_maneuver` found; made for one robot, used again and again."""
+
+    footprint: Array
+    config: ManeuverConfig = field(default_factory=ManeuverConfig)
+
+    def __post_init__(self) -> None:
+        self._pieces: list[tuple[int, Array]] = []
+
+    @property
+    def active(self) -> bool:
+        """Whether there is something left to drive."""
+        return bool(self._pieces)
+
+    def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
+        """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
+        self._pieces = find_maneuver(costmap, self.footprint, at, path, self.config)
+        return self.active
+
+    def drop(self) -> None:
+        """Drive no further."""
+        self._pieces = []
+
+    def command(
+        self, at: Pose2, velocity: tuple[float, float], costmap: Costmap, dt: float
+    ) -> tuple[float, float] | None:
+        """Return the command (v [m/s], w [rad/s]); None when it is done, or something came into the way.
+
+        Args:
+            at: Of the base, in the costmap's frame.
+            velocity: The present (v, w).
+            costmap: Around the robot.
+            dt: Control period [s].
+        """
+        while self._pieces:
+            sign, poses = self._pieces[0]
+            left = _way_left(sign, poses[-1], at) if sign else wrap_angle(float(poses[-1, 2]) - at.yaw)
+            if (sign and left < _NEAR) or abs(left) < _TURNED * (1 - abs(sign)):
+                self._pieces.pop(0)
+                continue
+            command = (
+                self._drive(sign, poses, at, left, velocity, dt) if sign else self._turn(left, velocity, dt)
+            )
+            if self._is_free(at, command, left, costmap):
+                return command
+            self._pieces = []
+        return None
+
+    def _turn(self, left: float, velocity: tuple[float, float], dt: float) -> tuple[float, float]:
+        limits = {"max_rate": self.config.turn_speed, "acceleration": self.config.turn_acceleration}
+        return 0.0, turn_rate(left, velocity[1], dt, **limits)
+
+    def _drive(
+        self, sign: int, poses: Array, at: Pose2, left: float, velocity: tuple[float, float], dt: float
+    ) -> tuple[float, float]:
+        local = at.inverse().apply(poses[:, :2])
+        end = poses[-1]
+        nearest = int(np.argmin(np.hypot(local[:, 0], local[:, 1])))
+        ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > 0.2))
+        if ahead == nearest:
+            # Beyond the end, straight on: the lookahead stays as long as it was.
+            heading = float(end[2]) - at.yaw
+            over = sign * 0.2
+            x = float(local[-1, 0]) + over * math.cos(heading)
+            y = float(local[-1, 1]) + over * math.sin(heading)
+        else:
+            x, y = local[ahead].tolist()
+        config = self.config
+        speed = min(config.speed, math.sqrt(2.0 * config.acceleration * left))
+        speed = sign * min(speed, max(sign * velocity[0], 0.0) + config.acceleration * dt)
+        curvature = 2.0 * y / max(x * x + y * y, 1e-6)
+        bound = config.turn_speed / max(abs(speed), 1e-6)
+        return speed, speed * min(max(curvature, -bound), bound)
+
+    def _is_free(self, at: Pose2, command: tuple[float, float], left: float, costmap: Costmap) -> bool:
+        """Whether the robot may do this for as far as it needs to stop, or for what is left of the move."""
+        v, w = command
+        look = (
+            min(_LOOK, abs(left)) / max(abs(v), 1e-6) if v else min(_LOOK_TURN, abs(left)) / max(abs(w), 1e-6)
+        )
+        state, dt = (float(at.x), float(at.y), float(at.yaw), v, w), look / 5.0
+        hit = steps_to_collision(costmap.costs, self.footprint, *state, dt, math.inf, 5, *costmap.frame)
+        return hit < 0 or (hit == 0 and escapes(costmap.costs, self.footprint, *state, dt, 5, *costmap.frame))
+
+
+def _way_left(sign: int, end: Array, at: Pose2) -> float:
+    """Return how far the end is ahead, in the direction of a move [m]."""
+    x, y, yaw = end.tolist()
+    return sign * ((x - at.x) * math.cos(yaw) + (y - at.y) * math.sin(yaw))
+
+
+def _pieces(poses: Array, signs: list[int]) -> list[tuple[int, Array]]:
+    """Return runs of moves of the same sign; turns of less than half a circle, that tell the way round."""
+    pieces, at = [], 0
+    for sign, group in itertools.groupby(signs):
+        left = len(list(group))
+        while left:
+            count = left if sign else min(left, _BINS // 3)
+            pieces.append((sign, poses[at : at + count + 1]))
+            at, left = at + count, left - count
+    return pieces
+
+
+def _moves(config: ManeuverConfig) -> Array:
+    """Return way [m], turn [rad] and price [m] of each, shape (8, 3)."""
+    arcs = [(_STEP, turn, _STEP) for turn in (0.0, _TURN, -_TURN)]
+    back = [(-_STEP, turn, _STEP * config.reverse_penalty) for turn in (0.0, _TURN, -_TURN)]
+    turns = [(0.0, turn, config.turn_price * _TURN) for turn in (_TURN, -_TURN)]
+    return np.array([*arcs, *back, *turns])
+
+
+def _targets(costmap: Costmap, corners: Array, path: Array, config: ManeuverConfig) -> Array:
+    """Return where on the path the robot may stand and go on, shape (m, 3)."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))])
+    wanted = (along >= min(config.ahead_min, along[-1])) & (along <= config.ahead_max)
+    height, width = costmap.costs.shape
+    free = []
+    for x, y, yaw in path[wanted]:
+        column, row = costmap.world_to_cell(x, y)
+        inside = 0 <= column < width and 0 <= row < height
+        if inside and not contact(costmap.costs, corners, corners, x, y, yaw, costmap.frame):
+            free.append((x, y, yaw))
+    return np.array(free).reshape(-1, 3)

@@ -1,0 +1,176 @@
+"""The compiled search of `maneuver`: A* over poses, a whole footprint at each."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+from twin.navigation._jit import jit
+from twin.navigation.costmaps.kernels import footprint_hits, outline_cost
+
+Cells = NDArray[np.uint8]
+
+
+@jit
+def contact(
+    costs: Cells,
+    corners: Array,
+    wider: Array,
+    x: float,
+    y: float,
+    yaw: float,
+    frame: tuple[float, float, float],
+) -> int:
+    """Return 0 if a pose is free, 1 if only the wider footprint touches something, else more: how much."""
+    if outline_cost(costs, corners, x, y, yaw, *frame) == 254:
+        return 2 + footprint_hits(costs, corners, x, y, yaw, *frame)
+    return int(outline_cost(costs, wider, x, y, yaw, *frame) == 254)
+
+
+@jit
+def _bin(x: float, y: float, yaw: float, start: Array, resolution: float, side: int, bins: int) -> int:
+    """Return the index of a pose among cells about the start and headings; -1 outside."""
+    half = side // 2
+    i = math.floor((x - start[0]) / resolution + 0.5) + half
+    j = math.floor((y - start[1]) / resolution + 0.5) + half
+    if i < 0 or j < 0 or i >= side or j >= side:
+        return -1
+    k = round((yaw - start[2]) / (2.0 * math.pi) * bins) % bins
+    return int((k * side + j) * side + i)
+
+
+@jit
+def _away(x: float, y: float, yaw: float, targets: Array, near: float, turned: float) -> tuple[float, bool]:
+    """Return the distance to the nearest target position [m], and whether one is reached."""
+    least, reached = math.inf, False
+    for m in range(targets.shape[0]):
+        distance = math.hypot(targets[m, 0] - x, targets[m, 1] - y)
+        least = min(least, distance)
+        if distance <= near:
+            off = (targets[m, 2] - yaw + math.pi) % (2.0 * math.pi) - math.pi
+            reached = reached or abs(off) <= turned
+    return least, reached
+
+
+@jit
+def search(
+    costs: Cells,
+    corners: Array,
+    wider: Array,
+    frame: tuple[float, float, float],
+    start: Array,
+    targets: Array,
+    moves: Array,
+    side: int,
+    bins: int,
+    near: float,
+    turned: float,
+    cost_penalty: float,
+    cusp_penalty: float,
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the poses of the cheapest way to a target, shape (n, 3), and by which move each was reached.
+
+    Empty if there is none. From a start that touches something a move may lead on as long as it does not
+    touch more.
+
+    Args:
+        costs: The grid.
+        corners: Of the footprint, shape (n, 2) [m].
+        wider: The same with a margin.
+        frame: Origin x, y [m] and resolution [m] of the grid.
+        start: x, y [m], yaw [rad].
+        targets: Shape (m, 3).
+        moves: Way [m] (negative: backwards), turn [rad] and price of each, shape (k, 3).
+        side: Cells per side of the square about the start that is searched.
+        bins: Headings.
+        near: Within so much of a target's position it is reached [m] ...
+        turned: ... and of its heading [rad].
+        cost_penalty: A metre at cost 252 counts as 1 + cost_penalty.
+        cusp_penalty: What it costs to change between forwards, backwards and turning.
+    """
+    states = side * side * bins
+    g = np.full(states, np.inf)
+    parent = np.full(states, -1, dtype=np.int64)
+    by = np.full(states, -1, dtype=np.int64)
+    touching = np.zeros(states, dtype=np.int64)
+    poses = np.zeros((states, 3))
+    closed = np.zeros(states, dtype=np.bool_)
+    first = _bin(start[0], start[1], start[2], start, frame[2], side, bins)
+    g[first] = 0.0
+    poses[first, 0], poses[first, 1], poses[first, 2] = start[0], start[1], start[2]
+    touching[first] = contact(costs, corners, wider, start[0], start[1], start[2], frame)
+    heap = [(0.0, first)]
+    last = -1
+    while len(heap) > 0:
+        _, here = heapq.heappop(heap)
+        if closed[here]:
+            continue
+        closed[here] = True
+        x, y, yaw = poses[here, 0], poses[here, 1], poses[here, 2]
+        _, reached = _away(x, y, yaw, targets, near, turned)
+        if reached and touching[here] == 0:
+            last = here
+            break
+        for m in range(moves.shape[0]):
+            way, turn = moves[m, 0], moves[m, 1]
+            there = _bin(
+                x + way * math.cos(yaw + turn / 2.0),
+                y + way * math.sin(yaw + turn / 2.0),
+                yaw + turn,
+                start,
+                frame[2],
+                side,
+                bins,
+            )
+            if there < 0 or closed[there]:
+                continue
+            touches = touching[here]
+            for step in range(1, 3):  # half a move is less than a cell of the outline's way
+                part = step / 2.0
+                px = x + part * way * math.cos(yaw + part * turn / 2.0)
+                py = y + part * way * math.sin(yaw + part * turn / 2.0)
+                touched = contact(costs, corners, wider, px, py, yaw + part * turn, frame)
+                if touched > touches:
+                    touches = -1
+                    break
+                touches = touched
+            if touches < 0:
+                continue
+            nx = x + way * math.cos(yaw + turn / 2.0)
+            ny = y + way * math.sin(yaw + turn / 2.0)
+            row, column = math.floor((ny - frame[1]) / frame[2]), math.floor((nx - frame[0]) / frame[2])
+            if row < 0 or column < 0 or row >= costs.shape[0] or column >= costs.shape[1]:
+                continue
+            cost = costs[row, column]
+            price = moves[m, 2] * (1.0 + cost_penalty * min(int(cost), 252) / 252.0)
+            if by[here] >= 0 and np.sign(moves[by[here], 0]) != np.sign(way):
+                price += cusp_penalty
+            if g[here] + price < g[there]:
+                g[there] = g[here] + price
+                parent[there], by[there], touching[there] = here, m, touches
+                poses[there, 0], poses[there, 1], poses[there, 2] = nx, ny, yaw + turn
+                away, _ = _away(nx, ny, yaw + turn, targets, near, turned)
+                heapq.heappush(heap, (g[there] + max(away - near, 0.0), there))
+    return _traced(poses, parent, by, last)
+
+
+@jit
+def _traced(poses: Array, parent: Any, by: Any, last: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the poses from the start to `last`, and their moves; empty if `last` is -1."""
+    count, at = 0, last
+    while at >= 0:
+        count += 1
+        at = parent[at]
+    way, moves = np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
+    at = last
+    for i in range(count - 1, -1, -1):
+        for axis in range(3):
+            way[i, axis] = poses[at, axis]
+        moves[i] = by[at]
+        at = parent[at]
+    return way, moves
