@@ -1,4 +1,4 @@
-"""The covariance of `/odom` against the drift that wheels have in MuJoCo."""
+"""The covariances of `/odom` and of the EKF against the drift that they have in MuJoCo."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.topics import Sample
@@ -15,10 +16,12 @@ from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 
 _LOOK_EVERY_S = 15
+_SEEDS = (1, 2, 3)
 
 
-def nees(model: str, seed: int, speed: float, turn_rate: float) -> list[float]:
-    """Return the normalised squared errors of `/odom` every 15 s of random driving."""
+def nees(model: str, seed: int, speed: float, turn_rate: float, kind: str = "wheels") -> list[float]:
+    """Return the normalised squared errors of odometry every 15 s of random driving."""
+    topic = "/odom" if kind == "wheels" else "/odometry/filtered"
     random = np.random.default_rng(seed)
     steps = [
         {
@@ -34,7 +37,7 @@ def nees(model: str, seed: int, speed: float, turn_rate: float) -> list[float]:
             "seed": seed,
             "duration": 46.0,
             "world": {},
-            "robots": [{"model": model}],
+            "robots": [{"model": model, "odometry": {"type": kind}}],
             "mission": {"type": "velocity_profile", "robot": model, "steps": steps},
             "checks": [{"no_collision": {}}],
         }
@@ -42,7 +45,7 @@ def nees(model: str, seed: int, speed: float, turn_rate: float) -> list[float]:
     heard: list[Any] = []
 
     def tap(sample: Sample[Any]) -> None:
-        if sample.topic == "/odom":
+        if sample.topic == topic:
             heard.append(sample.message)
 
     parts = build(scenario, taps=[tap])
@@ -66,11 +69,21 @@ def nees(model: str, seed: int, speed: float, turn_rate: float) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("model", "speed", "turn_rate"),
-    [("diff_bot", 0.4, 1.0), ("warehouse_bot", 0.8, 1.0), ("sp1s", 0.3, 1.0), ("jackal", 1.0, 1.0)],
+    ("model", "speed", "turn_rate", "kind"),
+    [
+        ("diff_bot", 0.4, 1.0, "wheels"),
+        ("warehouse_bot", 0.8, 1.0, "wheels"),
+        ("sp1s", 0.3, 1.0, "wheels"),
+        ("jackal", 1.0, 1.0, "wheels"),
+        ("sp1s", 0.3, 1.0, "ekf"),
+        ("warehouse_bot", 0.8, 1.0, "ekf"),
+    ],
 )
-def test_the_covariance_is_of_the_size_of_the_drift(model: str, speed: float, turn_rate: float) -> None:
-    found = [value for seed in (1, 2) for value in nees(model, seed, speed, turn_rate)]
-    assert len(found) >= 4
-    # 3 would be perfect. Skid steers are modest where they drive slowly.
-    assert 0.1 < float(np.mean(found)) < 6.0, found
+def test_the_covariance_is_of_the_size_of_the_drift(
+    model: str, speed: float, turn_rate: float, kind: str
+) -> None:
+    drives = [nees(model, seed, speed, turn_rate, kind) for seed in _SEEDS]
+    assert all(len(found) >= 2 for found in drives)
+    # The errors of one drive go on from each other: it is one draw of three numbers.
+    low, high = stats.chi2.ppf((0.005, 0.995), 3 * len(drives)) / len(drives)
+    assert low < float(np.mean([np.mean(found) for found in drives])) < high, drives

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
-from twin.controllers.skid_steer import track_ratio, weight_shares
+from twin.controllers.odometry_noise import DIFF_DRIVE, SKID_STEER, OdometryNoise
+from twin.controllers.skid_steer import cornering_slip, track_ratio, weight_shares
 from twin.geometry import Array, Pose3
 from twin.models.description import RobotDescription
+from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.kinematics import link_poses
 from twin.models.specs import DriveSpec
+
+_LEAST_FRICTION = 0.1
+"""Wheels on less than that are on ice."""
 
 
 def drive_config(
@@ -53,12 +59,33 @@ def analytic_track_ratio(
     """
     if drive.kind == "diff_drive":
         return 1.0
+    wheels, is_left, centre = _stance(drive, description)
+    shares = None if equal_loads else weight_shares(wheels[:, :2], centre[:2])
+    return track_ratio(wheels[:, :2], is_left, drive.wheel_separation, shares)
+
+
+def odometry_noise(drive: DriveSpec, description: RobotDescription) -> OdometryNoise:
+    """Return how wrong the odometry of a robot's wheels is: cornering slip follows from its geometry."""
+    if drive.kind == "diff_drive":
+        return DIFF_DRIVE
+    wheels, is_left, centre = _stance(drive, description)
+    given = (description.links[description.joints[name].child].surface.friction for name in drive.left_joints)
+    friction = max(next((value for value in given if value is not None), 1.0), _LEAST_FRICTION)
+    height = float(centre[2] - wheels[:, 2].mean() + drive.wheel_radius)
+    shares = weight_shares(wheels[:, :2], centre[:2])
+    slip = cornering_slip(wheels[:, :2], is_left, shares, height, friction)
+    return replace(
+        SKID_STEER, side_shift=slip.side_shift, turn_gain=slip.turn_gain, grip=friction * STANDARD_GRAVITY
+    )
+
+
+def _stance(drive: DriveSpec, description: RobotDescription) -> tuple[Array, list[bool], Array]:
+    """Return the wheels' centres, shape (n, 3), which are on the left, and the centre of mass, shape (3,)."""
     poses = link_poses(description)
     joints = (*drive.left_joints, *drive.right_joints)
-    wheels = np.array([poses[description.joints[name].child].xyz[:2] for name in joints])
+    wheels = np.array([poses[description.joints[name].child].xyz for name in joints])
     is_left = [True] * len(drive.left_joints) + [False] * len(drive.right_joints)
-    shares = None if equal_loads else weight_shares(wheels, _centre_of_mass(description, poses)[:2])
-    return track_ratio(wheels, is_left, drive.wheel_separation, shares)
+    return wheels, is_left, _centre_of_mass(description, poses)
 
 
 def _centre_of_mass(description: RobotDescription, poses: Mapping[str, Pose3]) -> Array:

@@ -80,13 +80,15 @@ class Odometry:
         noise, length, turned = self.config.noise, abs(distance), abs(angle)
         centripetal = length * turned / dt**2
         place = noise.distance_variance * length + noise.turn_distance_variance * turned
-        place += (noise.side_slip * centripetal) ** 2 * noise.slip_time * dt
+        sliding = centripetal / noise.grip
+        place += (noise.side_shift * sliding * turned) ** 2 * noise.slip_time / dt
         if gyro:
             self._gyro_time += dt
             turn = 2.0 * noise.gyro_bias**2 * self._gyro_time * dt  # the growth of (bias x time)²
         else:
             turn = noise.angle_variance * turned + noise.drift_variance * length
             turn += (noise.turn_slip * centripetal * (1.0 + centripetal)) ** 2 * noise.slip_time * dt
+            turn += (noise.turn_gain * sliding**2 * turned) ** 2 * noise.slip_time / dt
         self._grown, self._dt = (place, turn), dt
         xx, xy, yy, xt, yt, tt = self._variances
         self._variances = (

@@ -23,8 +23,12 @@ class OdometryNoise:
     """Of the heading, per metre driven [rad²/m]."""
     turn_slip: float = 0.005
     """Standard deviation of the turn rate a(1 + a) of centripetal acceleration a [rad/s per m/s²]."""
-    side_slip: float = 0.0
-    """The same of the velocity, per centripetal acceleration [m/s per m/s²]."""
+    side_shift: float = 0.0
+    """A skid steer slides outwards at this times its yaw rate times centripetal acceleration / `grip` [m]."""
+    turn_gain: float = 0.0
+    """And turns faster by this times (centripetal acceleration / `grip`)²."""
+    grip: float = 9.8
+    """Acceleration that friction can hold [m/s²]."""
     slip_time: float = 3.0
     """How long slip keeps its direction [s]."""
     gyro_bias: float = 1e-3
@@ -34,7 +38,5 @@ class OdometryNoise:
 DIFF_DRIVE = OdometryNoise()
 """Of two wheels and casters."""
 
-SKID_STEER = OdometryNoise(
-    distance_variance=2e-5, turn_distance_variance=1e-5, turn_slip=0.045, side_slip=0.04
-)
-"""Of wheels that all slide in every turn (jackal up to 2 m/s; sp1s, slow, is better than that)."""
+SKID_STEER = OdometryNoise(distance_variance=2e-5, turn_distance_variance=1e-5, turn_slip=0.0)
+"""Of wheels that all slide in every turn, beside what cornering does (`skid_steer.CorneringSlip`)."""

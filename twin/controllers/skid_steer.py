@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,6 +12,8 @@ from twin.geometry import Array
 _SMOOTHING = np.geomspace(1.0, 1e-9, 28)
 """Of the friction's corner at zero slip, as a share of the wheels' speed; each solution starts the next."""
 _NEWTON_STEPS = 60
+_CORNERING = 0.1
+"""At this share of the friction cornering is looked at: shift and gain are the same up to twice as much."""
 
 
 def track_ratio(
@@ -31,8 +35,49 @@ def track_ratio(
     weights = np.full(len(xy), 1.0 / len(xy)) if shares is None else np.asarray(shares, dtype=float)
     rolling = np.where(np.asarray(is_left, dtype=bool), -1.0, 1.0)
     scale = float(np.max(np.abs(xy)))
-    turn = _least_friction(xy / scale, rolling, weights)
+    turn = _least_friction(xy / scale, rolling, weights)[2]
     return 2.0 * scale / (turn * separation)
+
+
+class CorneringSlip(NamedTuple):
+    """What the centrifugal force does to a skid steer, whose tyres slide in every turn anyway.
+
+    With q the centripetal acceleration as a share of what friction can hold (μg), the robot slides outwards
+    at `side_shift` q times its yaw rate, and turns faster than on the spot by the share `turn_gain` q².
+    MuJoCo's jackal and sp1s do so within a third.
+    """
+
+    side_shift: float
+    """[m]"""
+    turn_gain: float
+
+
+def cornering_slip(
+    wheels_xy: ArrayLike, is_left: ArrayLike, shares: ArrayLike, height: float, friction: float
+) -> CorneringSlip:
+    """Return how far cornering leads a skid steer off what its wheels tell, by the least friction power.
+
+    Args:
+        wheels_xy: Contact points in the robot's frame, x forward, shape (n, 2) [m].
+        is_left: Which of them are on the left, shape (n,).
+        shares: Of the robot's weight on each wheel, shape (n,).
+        height: Of the centre of mass above the ground [m].
+        friction: Coulomb's coefficient.
+    """
+    xy, left = np.asarray(wheels_xy, dtype=float), np.asarray(is_left, dtype=bool)
+    weights, scale = np.asarray(shares, dtype=float), float(np.max(np.abs(xy)))
+    rolling = np.where(left, -1.0, 1.0)
+    still = _least_friction(xy / scale, rolling, weights)
+    # A turn to the left loads the wheels on the right.
+    width = float(xy[left, 1].mean() - xy[~left, 1].mean())
+    moved = _CORNERING * friction * height / width
+    loaded = np.maximum(weights + moved * np.where(left, -1.0 / left.sum(), 1.0 / (~left).sum()), 0.0)
+    turning = _least_friction(xy / scale, rolling, loaded, outwards=_CORNERING)
+    shift = scale * (still[1] / still[2] - turning[1] / turning[2])
+    return CorneringSlip(
+        side_shift=float(shift) / _CORNERING,
+        turn_gain=max(float(turning[2] / still[2]) - 1.0, 0.0) / _CORNERING**2,
+    )
 
 
 def weight_shares(wheels_xy: ArrayLike, centre_of_mass: ArrayLike) -> Array:
@@ -51,8 +96,10 @@ def weight_shares(wheels_xy: ArrayLike, centre_of_mass: ArrayLike) -> Array:
     return np.maximum(np.linalg.lstsq(balance, wanted, rcond=None)[0], 0.0)
 
 
-def _least_friction(xy: Array, rolling: Array, weights: Array) -> float:
-    """Return the yaw rate at rolling speeds ±1 that minimises the weighted sum of slip speeds.
+def _least_friction(xy: Array, rolling: Array, weights: Array, *, outwards: float = 0.0) -> Array:
+    """Return (vx, vy, yaw rate) at rolling speeds ±1 that minimises the weighted sum of slip speeds.
+
+    A force to the right, of so much of the friction as `outwards` says, works along.
 
     Newton's method on sqrt(slip² + ε²), which is convex, with ε taken to zero; where a wheel sticks, the
     minimum has a corner.
@@ -65,7 +112,7 @@ def _least_friction(xy: Array, rolling: Array, weights: Array) -> float:
 
     def power(velocity: Array, smooth: float) -> float:
         slip = by_velocity @ velocity - own
-        return float(weights @ np.sqrt(np.sum(slip**2, axis=1) + smooth**2))
+        return float(weights @ np.sqrt(np.sum(slip**2, axis=1) + smooth**2) + outwards * velocity[1])
 
     velocity = np.array([0.0, 0.0, 1.0])
     for smooth in _SMOOTHING:
@@ -74,6 +121,7 @@ def _least_friction(xy: Array, rolling: Array, weights: Array) -> float:
             length = np.sqrt(np.sum(slip**2, axis=1) + smooth**2)
             direction = slip / length[:, None]
             gradient = np.einsum("n,nij,ni->j", weights, by_velocity, direction)
+            gradient[1] += outwards
             across = (np.eye(2) - direction[:, :, None] * direction[:, None, :]) / length[:, None, None]
             hessian = np.einsum("n,nij,nik,nkl->jl", weights, by_velocity, across, by_velocity)
             step = np.linalg.lstsq(hessian, -gradient, rcond=None)[0]
@@ -83,4 +131,4 @@ def _least_friction(xy: Array, rolling: Array, weights: Array) -> float:
             velocity = velocity + share * step
             if np.max(np.abs(share * step)) < 1e-13:
                 break
-    return float(velocity[2])
+    return velocity

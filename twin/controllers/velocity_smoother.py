@@ -49,6 +49,11 @@ class VelocitySmoother:
         at_rest = self._linear.value == 0.0 and self._angular.value == 0.0
         return at_rest and self._age > self.config.velocity_timeout
 
+    @property
+    def speed(self) -> float:
+        """What was sent last, without its direction [m/s]."""
+        return abs(self._linear.value)
+
     def reset(self) -> None:
         """Start from rest."""
         self._linear.value = self._angular.value = 0.0

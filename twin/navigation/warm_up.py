@@ -21,6 +21,7 @@ from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.failures import ControlFailure
+from twin.navigation.localisation.evidence import same_surface
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.localisation.particles import clusters, regularised, tempered_weights
@@ -93,6 +94,7 @@ def warm_up_localisation() -> None:
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
     regularised(np.ones((2, 3)), clusters(np.ones((2, 3))), np.ones((2, 3)))
     tempered_weights(np.zeros(2), np.zeros(2), 1.0)
+    same_surface(np.ones((2, 2)), np.ones((2, 2)), 0.05)
 
 
 def warm_up_controller(controller: Controller) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.specs import LidarSpec
+from twin.models.specs import DriveSpec, LidarSpec
 from twin.navigation.control.collision_monitor import (
     FOOTPRINT_APPROACH,
     CollisionMonitorConfig,
@@ -57,11 +57,19 @@ def build_commands(
         footprint,
         CollisionMonitorConfig(polygons=polygons, source_timeout_ns=round(config.source_timeout * 1e9)),
         brakes=brakes,
+        hardest=_hardest(brakes.linear, context.handle.description.drive),
         cmd_vel_in=_GUARDED,
         scan_topics=(_SCAN,) if scans else (),
         range_topics=config.range_topics,
         namespace=namespace,
     )
+
+
+def _hardest(limits: AxisLimits, drive: DriveSpec | None) -> float:
+    """Return how many times harder than in `limits` a drive brakes when it must."""
+    usual = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
+    most = None if drive is None else drive.max_linear_acceleration
+    return max(1.0, (most or usual) / usual)
 
 
 def _approach(limits: AxisLimits) -> MonitorPolygon:

@@ -93,13 +93,15 @@ def build_odometry_filter(context: StackContext, frames: Frames) -> None:
     if context.config.odometry.type == "wheels":
         return
     description = context.handle.description
-    imus = [spec.topic for spec in description.sensors if isinstance(spec, ImuSpec)]
+    imus = [spec for spec in description.sensors if isinstance(spec, ImuSpec)]
     if description.drive is None or not imus:
         raise ScenarioError(
             f"robot '{context.handle.name}' has no {'drive' if description.drive is None else 'IMU'}; "
             "odometry of type ekf needs both, type wheels needs no IMU"
         )
-    config = for_robot(frames.odom, frames.base, context.control_period_ns, imus[0])
+    config = for_robot(
+        frames.odom, frames.base, context.control_period_ns, imus[0].topic, imus[0].gyro_bias_stddev
+    )
     EkfNode(
         context.bus, _with_overrides(config, context.config.odometry.parameters), namespace=context.namespace
     )

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.controllers.drive_config import drive_config
-from twin.controllers.odometry_noise import DIFF_DRIVE, SKID_STEER
+from twin.controllers.drive_config import drive_config, odometry_noise
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
@@ -81,7 +80,7 @@ class RobotStack:
                 right_joints=drive.right_joints,
                 odom_frame=self.frames.odom,
                 base_frame=self.frames.base,
-                noise=SKID_STEER if drive.kind == "skid_steer" else DIFF_DRIVE,
+                noise=odometry_noise(drive, description),
                 period_ns=context.control_period_ns,
                 use_imu=getattr(context.config.localisation, "use_imu", False),
                 enable_odom_tf=context.config.odometry.type == "wheels",

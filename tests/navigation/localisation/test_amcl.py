@@ -116,8 +116,7 @@ def test_tracking_accuracy_and_honesty(hall: Any, hall_map: OccupancyMap, seed: 
     assert yaw < 0.5
     assert np.hypot(run.errors[:, 0], run.errors[:, 1]).max() < 0.15
     assert np.abs(run.errors[:, :2].mean(axis=0)).max() < 0.01, "biased"
-    # 3 would be perfectly honest; the filter may be modest, but not boastful.
-    assert 0.1 < run.nees.mean() < 4.0
+    assert 1.5 < run.nees.mean() < 5.0  # 3 is honest; of one map more cannot be told, see test_honesty.py
     assert len(run.amcl.particles) == 500
 
 

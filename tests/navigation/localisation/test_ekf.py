@@ -24,6 +24,7 @@ from twin.navigation.localisation.ekf import (
     advanced,
     rotation,
 )
+from twin.navigation.localisation.gyro_bias import GyroBias
 
 
 def started(two_d: bool = False) -> Ekf:
@@ -156,3 +157,15 @@ def test_its_covariance_is_honest_in_its_own_world() -> None:
     # The sum over the runs is chi-squared with 3 degrees of freedom each: 99.9 % bounds.
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs) / runs
     assert low < float(np.mean(found)) < high
+
+
+def test_what_is_not_known_of_a_gyroscopes_bias_makes_the_heading_unsure() -> None:
+    bias, noise = GyroBias(1e-3), np.random.default_rng(0)
+    unknown = sum(bias.drift(0.02) for _ in range(500))
+    assert unknown == pytest.approx((1e-3 * 10.0) ** 2)
+    for i in range(200):
+        bias.wheels(0.0, 0.0, 0.02 * i)
+        bias.corrected(noise.normal(8e-4, 2e-3, 3), 0.02 * i)
+    known = sum(bias.drift(0.02) for _ in range(500))
+    assert known < 0.1 * unknown
+    assert np.abs(bias.value - 8e-4).max() < 4.0 * np.sqrt(known) / 10.0

@@ -176,3 +176,22 @@ def test_initial_poses_by_parameter_and_by_service(bench: Bench) -> None:
         bench.call(SetInitialPose, "set_initial_pose", new(SetInitialPose.Request, pose=stamped))
         bench.run(0.3)
         assert (robot.error() < 0.1) == near
+
+
+@pytest.mark.parametrize(("x", "y", "yaw"), [(0.5, 0.0, 30.0), (-0.35, 0.35, -30.0), (0.0, -0.5, 30.0)])
+def test_a_guess_that_is_half_a_metre_and_thirty_degrees_off(
+    bench: Bench, x: float, y: float, yaw: float
+) -> None:
+    robot = Localised(bench)
+    robot.drive(1.0)
+    here = robot.robot.pose
+    # What RViz's "2D Pose Estimate" sends: 0.5 m and 15 degrees.
+    covariance = np.diag([0.25, 0.25, 0.0, 0.0, 0.0, 0.0685]).ravel()
+    guess = Pose2(here.x + x, here.y + y, here.yaw + math.radians(yaw))
+    publisher = bench.node.create_publisher(PoseWithCovarianceStamped, "initialpose", 1)
+    pose = PoseWithCovariance(pose=pose_from_pose2(guess), covariance=covariance)
+    publisher.publish(PoseWithCovarianceStamped(header=header(0, "map"), pose=pose))
+    robot.drive(4.0)
+    assert robot.said("initial pose (")
+    assert robot.error() < 0.04
+    assert robot.state == (0, "localised")

@@ -13,6 +13,8 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import CollisionMonitorState, Range, Twist, header, new
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Pose2
 from twin.navigation.control.collision_monitor import (
     Action,
@@ -122,6 +124,27 @@ def test_nobody_can_drive_it_into_a_wall(bench: Bench, v: float, w: float) -> No
     driven.command = (-v, 0.0)
     bench.run(1.0)
     assert driven.clearance > 0.3, "it drives away freely"
+
+
+@pytest.mark.parametrize(("hardest", "stops"), [(1.0, False), (3.0, True)])
+def test_before_a_wall_that_was_not_there_it_brakes_as_hard_as_the_drive_can(
+    bench: Bench, hardest: float, stops: bool
+) -> None:
+    brakes = VelocitySmootherConfig(
+        linear=AxisLimits(max_velocity=1.0, max_acceleration=0.8, max_deceleration=0.8)
+    )
+    driven = Driven(bench, brakes=brakes, hardest=hardest)
+
+    def carry(pose: Pose2) -> None:
+        driven.robot.start = pose @ driven.robot.pose.inverse() @ driven.robot.start
+
+    carry(Pose2(-2.5, 0.0, 0.0))
+    driven.command = (1.0, 0.0)
+    bench.run(1.6)
+    assert driven.robot.commands[-1][0] == pytest.approx(1.0, abs=0.05)
+    carry(Pose2(3.0 - 0.4 / 2.0 - 0.55, 0.0, 0.0))  # its usual brakes need 0.63 m
+    bench.run(4.0)
+    assert (driven.clearance > 0.0) == stops
 
 
 def test_a_silent_lidar_stops_it_and_one_that_only_says_nan_too(bench: Bench) -> None:

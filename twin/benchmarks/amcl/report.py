@@ -8,7 +8,7 @@ from twin.benchmarks.amcl.relocation import Relocation
 from twin.benchmarks.amcl.tracking import Tracking
 
 MAX_RMS_M, MAX_RMS_DEG, MIN_REAL_TIME, MIN_RIGHT = 0.03, 0.5, 30.0, 0.95
-NEES = (0.5, 6.0)
+NEES = (1.5, 5.0)
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,8 @@ class Action:
     """v [m/s], w [rad/s]."""
     action_type: ActionType | None = None
     polygon_name: str = ""
+    room: float = field(default=math.inf, compare=False)
+    """How far it is along the command to what is in the way [m]; 0 in a `stop` polygon."""
 
 
 @dataclass(kw_only=True)
@@ -95,7 +97,9 @@ class CollisionMonitor:
                 if math.hypot(*safe) < math.hypot(*action.velocity) or (
                     polygon.action_type == "stop" and ratio == 0.0
                 ):
-                    action = Action(safe, polygon.action_type, polygon.name)
+                    action = Action(
+                        safe, polygon.action_type, polygon.name, _room(polygon, ratio, velocity[0])
+                    )
         return action
 
     def _ratio(self, polygon: MonitorPolygon, velocity: tuple[float, float], points: Array) -> float:
@@ -139,6 +143,12 @@ class CollisionMonitor:
             turned,
         )
         return after < before
+
+
+def _room(polygon: MonitorPolygon, ratio: float, v: float) -> float:
+    if polygon.action_type == "approach":
+        return ratio * polygon.time_before_collision * abs(v)
+    return 0.0 if polygon.action_type == "stop" else math.inf
 
 
 @jit

@@ -13,6 +13,7 @@ from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.localisation.amcl_config import MOTION_MODELS, AmclConfig
 from twin.navigation.localisation.annealing import annealed
 from twin.navigation.localisation.confidence import Confidence
+from twin.navigation.localisation.evidence import ScanError, ScanEvidence
 from twin.navigation.localisation.hit_calibration import HitCalibration
 from twin.navigation.localisation.laser_models import is_converged, laser_model, without_strangers
 from twin.navigation.localisation.laser_scan import Beams, chosen_beams
@@ -24,6 +25,7 @@ from twin.navigation.localisation.particles import (
     kld_sample_size,
     mean_and_covariance,
     regularised,
+    reshaped,
     systematic_resample,
 )
 from twin.navigation.localisation.surface_distance import SurfaceDistance
@@ -36,6 +38,11 @@ _FIT_SIGMA = 0.1
 
 _BETTER = 0.25
 """By so much more of the scan must be explained elsewhere before the robot is looked for there."""
+
+_POINT = 1e-14
+"""Particles that are together like this are one point [m², rad²]."""
+_ONE_FIT = 10.0
+"""Where their variances are by more than this larger than those of a fit, particles see more than one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +76,8 @@ class Amcl:
         self._surfaces = SurfaceDistance(occupancy, max_dist=config.laser_likelihood_max_dist)
         self.hits = HitCalibration(occupancy.resolution, config.sigma_hit)
         """What was learnt about this map and lidar."""
+        self.evidence = ScanEvidence(config.beam_weight, occupancy.resolution)
+        """What was learnt about the faults that beams share."""
         self._model = laser_model(config, self._surfaces)
         self._free = np.argwhere(occupancy.data == FREE)[:, ::-1]
         if not len(self._free):
@@ -126,9 +135,10 @@ class Amcl:
             min_range=config.laser_min_range,
             max_range=config.laser_max_range,
         )
+        prior = None
         if len(beams):
-            self._weigh(beams)
-        self.estimate = self._estimated(odom, beams)
+            prior = self._weigh(beams)
+        self.estimate = self._estimated(odom, beams, prior)
         self._updates += 1
         if self._updates % config.resample_interval == 0:
             self._resample(beams, self.estimate)
@@ -165,28 +175,40 @@ class Amcl:
         else:
             self.particles = sample_omni_motion(self.particles, before, now, (*alphas, config.alpha5), noise)
 
-    def _weigh(self, beams: Beams) -> None:
+    def _weigh(self, beams: Beams) -> Array | None:
+        """Take in a scan; return the covariance before it, None where particles were not together."""
         config = self.config
         converged = is_converged(self.particles)
         if config.do_beamskip and config.laser_model_type == "likelihood_field_prob" and converged:
             beams = without_strangers(beams, self.particles, self._surfaces, self.hits, config)
         # What was learnt about hits holds near the truth; far from it a wide model leads there.
         sigma = self.hits.sigma if converged else config.sigma_hit
-        self.particles, self.weights = self._fitted(self.particles, self.weights, beams, sigma)
+        exponent = self.evidence.exponent if converged else config.beam_weight
+        prior = mean_and_covariance(self.particles, self.weights)[1] if converged else None
+        self.particles, self.weights = self._fitted(self.particles, self.weights, beams, sigma, exponent)
+        return prior
 
-    def _fitted(self, particles: Array, weights: Array, beams: Beams, sigma: float) -> tuple[Array, Array]:
+    def _fitted(
+        self, particles: Array, weights: Array, beams: Beams, sigma: float, exponent: float
+    ) -> tuple[Array, Array]:
         config, depth = self.config, self.hits.depth
         return annealed(
             particles,
             weights,
-            lambda poses: config.beam_weight * self._model.log_likelihood(poses, beams, depth, sigma),
+            lambda poses: exponent * self._model.log_likelihood(poses, beams, depth, sigma),
             count=config.max_particles,
             effective=config.effective_share,
             random=self._random,
         )
 
-    def _estimated(self, odom: Pose2, beams: Beams) -> Estimate:
-        """Return the heaviest cluster's pose; learn from how the scan fits there."""
+    def _estimated(self, odom: Pose2, beams: Beams, prior: Array | None) -> Estimate:
+        """Return the heaviest cluster's pose; learn from how the scan fits there.
+
+        Args:
+            odom: Pose of the base in the odom frame.
+            beams: The scan.
+            prior: Covariance before it, where particles were together.
+        """
         cluster = clusters(self.particles)
         if cluster.any():
             members = heaviest(cluster, self.weights)
@@ -195,11 +217,14 @@ class Amcl:
             pose, covariance = mean_and_covariance(self.particles, self.weights)
         fit = math.nan
         if len(beams):
-            distances = self._surfaces.at(pose.apply(beams.ends))
+            ends = pose.apply(beams.ends)
+            distances = self._surfaces.at(ends)
             shares = np.exp(-0.5 * ((distances + self.hits.depth) / _FIT_SIGMA) ** 2)
             fit = float(np.mean(shares))
             self._confidence.update(explained_share(shares, beams, pose, self._surfaces))
-            self.hits.learn(distances)
+            error = self._learn(distances, ends, pose)
+            if error is not None and prior is not None and not cluster.any():
+                covariance = self._made_honest(pose, covariance, error.joined(prior))
         elif self.estimate is not None:
             # Nothing new was seen: only the doubt grows, and noise must not lead the estimate away.
             pose = self.estimate.T_map_odom @ odom
@@ -212,6 +237,26 @@ class Amcl:
             fit=fit,
             lost=self._confidence.lost,
         )
+
+    def _learn(self, distances: Array, ends: Array, pose: Pose2) -> ScanError | None:
+        """Learn from a scan at the estimated pose about the map's and the lidar's faults."""
+        if not self.hits.learn(distances):
+            return None
+        residuals = distances + self.hits.depth
+        hits = np.abs(residuals) < 3.0 * self.hits.sigma
+        seen = ends[hits]
+        return self.evidence.learn(
+            residuals[hits], self._surfaces.normals(seen), seen - np.array(pose[:2]), self.hits.sigma
+        )
+
+    def _made_honest(self, pose: Pose2, covariance: Array, honest: Array) -> Array:
+        """Stretch the particles to a covariance, and return it; leave them where one fit does not tell it."""
+        if np.linalg.eigvalsh(covariance)[0] < _POINT:
+            return covariance
+        if np.trace(np.linalg.solve(honest, covariance)) > 3.0 * _ONE_FIT:
+            return covariance
+        self.particles = reshaped(self.particles, pose, covariance, honest)
+        return honest
 
     def _resample(self, beams: Beams, estimate: Estimate) -> None:
         """Draw as many particles as the spread of the belief asks for (KLD sampling)."""
@@ -245,5 +290,5 @@ class Amcl:
         """
         candidates = self._anywhere(max(count, self.config.global_particles // 5))
         even = np.full(len(candidates), 1.0 / len(candidates))
-        poses, weights = self._fitted(candidates, even, beams, self.config.sigma_hit)
+        poses, weights = self._fitted(candidates, even, beams, self.config.sigma_hit, self.config.beam_weight)
         return poses[systematic_resample(weights, count, float(self._random.random()))]

@@ -59,7 +59,7 @@ class AmclConfig:
     beam_skip_error_threshold: float = 0.9
     """If a larger share of the beams would be left out, none is: the belief is what is wrong."""
     beam_weight: float = 0.5
-    """Exponent of a beam's likelihood: beams are not independent, all of them see the same map's faults."""
+    """Exponent of a beam's likelihood until it is learnt: beams on a surface share its fault on the map."""
     update_min_d: float = 0.25
     """[m]"""
     update_min_a: float = 0.2

@@ -78,6 +78,10 @@ class Ekf:
         self.covariance = F @ self.covariance @ F.T + dt * self._process
         self._flatten()
 
+    def doubt(self, index: int, variance: float) -> None:
+        """Be less sure of a state, by a variance that no measurement told."""
+        self.covariance[index, index] += variance
+
     def correct(
         self,
         indices: Sequence[int],

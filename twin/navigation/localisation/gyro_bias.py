@@ -19,12 +19,24 @@ _MEMORY_S = 60.0
 class GyroBias:
     """Averages the turn rates that are measured at rest; robot_localization takes them as they are."""
 
-    def __init__(self) -> None:
+    def __init__(self, stddev: float = 1e-3) -> None:
+        """Start with no idea but the bias's standard deviation [rad/s]; 0: there is none."""
         self.value: Array = np.zeros(3)
         """Shape (3,) [rad/s], in the frame of the gyroscope."""
         self._rest_since: float | None = None
         self._last: float | None = None
         self._seconds = 0.0
+        self._prior = max(stddev, 1e-6) ** 2
+        self._variance, self._noise = self._prior, 0.0
+        self._since = 0.0
+
+    def drift(self, dt: float) -> float:
+        """Return by how much the variance of a heading grows in `dt` [s], which integrates the rates [rad²].
+
+        What is left of the bias keeps its sign, so the error grows with time, and its variance with time².
+        """
+        self._since += dt
+        return self._variance * (2.0 * self._since - dt) * dt
 
     def wheels(self, linear: float, angular: float, time_s: float) -> None:
         """Take the velocity that the wheels tell [m/s, rad/s]."""
@@ -40,6 +52,15 @@ class GyroBias:
             if self._last is not None and time_s > self._last:
                 step = time_s - self._last
                 self._seconds = min(self._seconds + step, _MEMORY_S)
-                self.value = self.value + min(step / self._seconds, 1.0) * (rates - self.value)
+                gain = min(step / self._seconds, 1.0)
+                spread = rates - self.value
+                self.value = self.value + gain * spread
+                self._learn_variance(gain, float(spread @ spread) / 3.0)
             self._last = time_s
         return rates - self.value
+
+    def _learn_variance(self, gain: float, of_one: float) -> None:
+        """Take in that one more reading, so far off the mean, went into it; its error is a new one."""
+        self._noise += gain * (of_one - self._noise)
+        self._variance = 1.0 / (1.0 / self._prior + 1.0 / max(gain * self._noise, 1e-14))
+        self._since = 0.0

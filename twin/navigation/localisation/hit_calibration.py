@@ -44,24 +44,27 @@ class HitCalibration:
         self._variance = (sigma_hit / _WIDTH) ** 2
         self._count = 0
 
-    def learn(self, distances: Array) -> None:
+    def learn(self, distances: Array) -> bool:
         """Take the signed distances, shape (b,) [m], of beam ends from surfaces at the estimated pose.
+
+        Return whether they are those of a map that fits.
 
         A scan of which less than half hits what the map knows teaches nothing but doubt.
         """
         residuals = distances + self.depth
         hits = residuals[np.abs(residuals) < 3.0 * self._most_sigma]
         if len(hits) < _LEAST_HITS:
-            return
+            return False
         if len(hits) < _LEAST_SHARE * len(distances):
             self._spread((self._most_sigma / _WIDTH) ** 2, 0.1)
-            return
+            return False
         self._count += 1
         gain = max(_FIRST_GAIN / math.sqrt(self._count), _GAIN)
         self.depth = min(max(self.depth - gain * float(np.mean(hits)), self._least_depth), self._most_depth)
         # Of the middle of the hits: a few that struck something else must not widen all others.
         spread = 1.4826 * float(np.median(np.abs(hits - np.median(hits))))
         self._spread(spread**2 + float(np.mean(hits)) ** 2, max(gain / 2.0, 0.05))
+        return True
 
     def _spread(self, variance: float, gain: float) -> None:
         self._variance += gain * (variance - self._variance)

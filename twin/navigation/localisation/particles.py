@@ -178,6 +178,23 @@ def _moments(particles: Array, weights: Array) -> tuple[float, float, float, Arr
     return x, y, yaw, covariance
 
 
+def reshaped(particles: Array, mean: Pose2, covariance: Array, wanted: Array) -> Array:
+    """Return particles, shape (n, 3), stretched about their mean to another covariance, shape (3, 3).
+
+    Args:
+        particles: Shape (n, 3).
+        mean: Theirs.
+        covariance: Theirs, positive definite.
+        wanted: Positive definite.
+    """
+    stretch = np.linalg.cholesky(wanted) @ np.linalg.inv(np.linalg.cholesky(covariance))
+    offset = particles - np.array(mean)
+    offset[:, 2] -= 2.0 * math.pi * np.round(offset[:, 2] / (2.0 * math.pi))
+    moved = np.array(mean) + offset @ stretch.T
+    moved[:, 2] -= 2.0 * math.pi * np.round(moved[:, 2] / (2.0 * math.pi))
+    return np.asarray(moved)
+
+
 def tempered_weights(
     log_prior: Array, log_likelihood: Array, least_effective: float, most: float = 1.0
 ) -> tuple[Array, float]:

@@ -47,3 +47,15 @@ class SurfaceDistance:
         high = (1.0 - fu) * self.signed[iv + 1, iu] + fu * self.signed[iv + 1, iu + 1]
         result[inside] = (1.0 - fv) * low + fv * high
         return result
+
+    def normals(self, points: Array) -> Array:
+        """Return the directions away from the nearest surface, shape (n, 2) -> (n, 2).
+
+        Of length 1; 0 where the distance has no slope. Points are in the map frame [m].
+        """
+        half = 0.5 * self.resolution
+        slope = np.empty((len(points), 2))
+        for axis, step in enumerate(((half, 0.0), (0.0, half))):
+            slope[:, axis] = self.at(points + step) - self.at(points - np.array(step))
+        length = np.hypot(slope[:, 0], slope[:, 1])
+        return np.asarray(slope / np.maximum(length, 1e-9)[:, None])

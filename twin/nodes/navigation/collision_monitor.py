@@ -31,6 +31,8 @@ from twin.nodes.node_parameters import declare_config
 _ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
 _FIRST_PERIOD_S = 0.02
 """After a pause in the commands, in which the drive came to rest."""
+_REACTION_S = 0.1
+"""From a scan to wheels that brake."""
 _RANGE_STEP = np.radians(1.0)
 
 
@@ -56,6 +58,7 @@ class CollisionMonitorNode:
         config: CollisionMonitorConfig | None = None,
         *,
         brakes: VelocitySmootherConfig | None = None,
+        hardest: float = 1.0,
         cmd_vel_in: str = "cmd_vel_smoothed",
         cmd_vel_out: str = "cmd_vel",
         scan_topics: tuple[str, ...] = ("scan",),
@@ -71,6 +74,8 @@ class CollisionMonitorNode:
         self._polygon = ""
         self._readings: dict[str, _Reading | None] = dict.fromkeys((*scan_topics, *range_topics))
         self._brakes = VelocitySmoother(brakes) if brakes else None
+        # How many times harder the drive can brake than it does when nothing is wrong.
+        self._hardest = hardest
         self._commanded_ns: int | None = None
         self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
         self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
@@ -111,10 +116,11 @@ class CollisionMonitorNode:
         action = self.monitor.process(velocity, self._points()) if self._enabled else Action(velocity)
         if action.polygon_name != self._polygon:
             self._tell(action)
-        self._publisher.publish(twist_from_planar(*self._braked(action.velocity)))
+        self._publisher.publish(twist_from_planar(*self._braked(action)))
 
-    def _braked(self, velocity: tuple[float, float]) -> tuple[float, float]:
+    def _braked(self, action: Action) -> tuple[float, float]:
         """Return what the drive can do of it on the same curve: each of its axes brakes by itself."""
+        velocity = action.velocity
         before, self._commanded_ns = self._commanded_ns, self.node.now_ns
         if self._brakes is None:
             return velocity
@@ -123,7 +129,9 @@ class CollisionMonitorNode:
             self._brakes.reset()
             dt = _FIRST_PERIOD_S
         self._brakes.set_command(*velocity)
-        return self._brakes.update(dt)
+        limits, speed = self._brakes.config.linear, self._brakes.speed
+        way = speed**2 / (2.0 * (limits.max_deceleration or limits.max_acceleration)) + speed * _REACTION_S
+        return self._brakes.update(dt if way < action.room else dt * self._hardest)
 
     def _tell(self, action: Action) -> None:
         self._polygon = action.polygon_name

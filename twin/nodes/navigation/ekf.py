@@ -114,7 +114,7 @@ class EkfNode:
         reader = SourceReader(
             source,
             self._buffer,
-            GyroBias(),
+            GyroBias(source.bias_stddev),
             world_frame=self.config.world_frame,
             base=self.config.base_link_frame,
         )
@@ -166,7 +166,10 @@ class EkfNode:
 
     def _predict(self, time_ns: int) -> None:
         if self._time_ns is not None and time_ns > self._time_ns:
-            self.filter.predict((time_ns - self._time_ns) * 1e-9)
+            dt = (time_ns - self._time_ns) * 1e-9
+            self.filter.predict(dt)
+            drifts = [reader.bias.drift(dt) for reader in self._readers if reader.believes_gyroscope]
+            self.filter.doubt(states.YAW, min(drifts, default=0.0))
         self._time_ns = time_ns if self._time_ns is None else max(self._time_ns, time_ns)
 
     def _publish(self, now_ns: int) -> None:
@@ -207,12 +210,25 @@ def _parameters(config: EkfNodeConfig) -> dict[str, Any]:
     return found
 
 
-def for_robot(odom_frame: str, base_frame: str, period_ns: int, imu: str) -> EkfNodeConfig:
-    """Return the defaults for a robot's frames, its control period [ns] and the topic of its IMU."""
+def for_robot(
+    odom_frame: str, base_frame: str, period_ns: int, imu: str, bias_stddev: float
+) -> EkfNodeConfig:
+    """Return the defaults for a robot's frames, its control period [ns], and its IMU.
+
+    Args:
+        odom_frame: Name.
+        base_frame: Name.
+        period_ns: [ns]
+        imu: Topic.
+        bias_stddev: Of its gyroscope [rad/s].
+    """
     return EkfNodeConfig(
         odom_frame=odom_frame,
         world_frame=odom_frame,
         base_link_frame=base_frame,
         period_ns=period_ns,
-        sources={**_WHEELS_AND_IMU, "imu0": replace(_WHEELS_AND_IMU["imu0"], topic=imu)},
+        sources={
+            **_WHEELS_AND_IMU,
+            "imu0": replace(_WHEELS_AND_IMU["imu0"], topic=imu, bias_stddev=bias_stddev),
+        },
     )

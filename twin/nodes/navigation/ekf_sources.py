@@ -57,6 +57,8 @@ class EkfSource:
     remove_gravitational_acceleration: bool = True
     estimate_bias: bool = True
     """Whether a gyroscope's bias is learnt while the wheels stand (robot_localization does not)."""
+    bias_stddev: float = 1e-3
+    """Standard deviation of that bias before it was learnt; its datasheet tells [rad/s]."""
 
     def __post_init__(self) -> None:
         if not self.topic or len(self.config) != SIZE:
@@ -84,6 +86,12 @@ class SourceReader:
         self._world_frame, self._base = world_frame, base
         self._first: Pose3 | None = None
         self._before: tuple[int, Pose3] | None = None
+        self._turned = False
+
+    @property
+    def believes_gyroscope(self) -> bool:
+        """Whether a gyroscope told it the turn rate about the vertical, with a bias to be learnt."""
+        return self.source.estimate_bias and self.source.config[states.VYAW] and self._turned
 
     def read(self, message: Any, stamp_ns: int, attitude: Array) -> Iterator[Measurement]:
         """Yield what a message measures; nothing where a transform is not known.
@@ -159,6 +167,7 @@ class SourceReader:
             spread[3:, 3:] = message.orientation_covariance.reshape(3, 3)
             yield from self._located(level, spread, stamp_ns, states.ROLL)
         rates = np.array([w.x, w.y, w.z])
+        self._turned = True
         if source.estimate_bias:
             rates = self.bias.corrected(rates, stamp_ns * 1e-9)
         force = R @ [a.x, a.y, a.z]
