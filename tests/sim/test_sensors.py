@@ -11,8 +11,9 @@ import pytest
 
 from tests.sim.conftest import BUMPER, IMU, LIDAR, SONAR, box, placed
 from twin.geometry import Pose2, Pose3, rotate_wxyz
+from twin.models.shapes import Box
 from twin.models.specs import SensorSpec
-from twin.sim.scene import Scene
+from twin.sim.scene import FreeBody, Scene, Shape
 from twin.sim.world import World
 
 
@@ -91,6 +92,17 @@ def test_lidar_sees_collision_shapes_of_other_robots_not_their_visuals(room: Sce
     # At z = 0.12 the other cart has its visual hull from x = 0.90 on, and its mast from x = 0.93 on.
     ahead = world.robots["cart"].sensors[0].sample(0).ranges[0]
     assert ahead == pytest.approx(0.93 - 0.05, abs=1e-6)
+
+
+def test_lidar_sees_all_of_a_body_whose_centre_of_mass_is_far_from_its_middle() -> None:
+    """MuJoCo's own culling of many rays loses the light end of such a body when the body is turned."""
+    block = Shape(geometry=Box(size=(0.6, 0.6, 0.6)), T_body_geometry=Pose3.from_xyz_rpy((-0.6, 0.0, 0.0)))
+    post = Shape(geometry=Box(size=(0.04, 0.04, 0.6)), T_body_geometry=Pose3.from_xyz_rpy((0.6, 0.0, 0.0)))
+    turned = Pose3.from_xyz_rpy((2.0, 0.0, 0.3), (0.0, 0.0, math.pi))
+    crane = FreeBody(name="crane", T_world_body=turned, mass=30.0, friction=0.6, shapes=(block, post))
+    beam = replace(LIDAR, samples=1, angle_min=0.0)
+    reading = sample(Scene(name="yard", goods=(crane,)), beam, Pose2(1.4, -2.0, math.pi / 2.0))
+    assert reading.ranges[0] == pytest.approx(2.0 - 0.02 - 0.05, abs=1e-6)
 
 
 def test_imu_at_rest_feels_gravity_upwards(room: Scene) -> None:
