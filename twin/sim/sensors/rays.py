@@ -62,7 +62,7 @@ class _RayBounds:
     """While entered, the bodies' bounding volumes are such that `mj_multiRay` misses nothing.
 
     It skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass plus the
-    volume's offset from it without turning the offset as the body is turned (engine_ray.c, mju_singleRay, as of
+    volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay; seen in
     MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
     attitude. Collisions need the volumes as they are: there a larger one costs time.
     """
