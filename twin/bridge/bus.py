@@ -13,6 +13,7 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
+from twin.bridge.exchange import Exchange
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_services import StandardServices
@@ -37,7 +38,9 @@ class Bus:
     """
 
     def __init__(self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool) -> None:
-        self.session = session
+        self.zenoh = session
+        """The session, for those who hear no topic by it, or tell the exchange."""
+        self.exchange = Exchange(is_private=not networked)
         self.clock = clock
         self.naming = naming
         self.domain_id = naming.domain_id
@@ -133,6 +136,12 @@ class Bus:
         return node
 
     @property
+    def session(self) -> zenoh.Session:
+        """The Zenoh session. Who takes it may hear topics: from then on all messages go through it."""
+        self.exchange.is_private = False
+        return self.zenoh
+
+    @property
     def nodes(self) -> tuple[Node, ...]:
         """In the order of creation."""
         return tuple(self._nodes)
@@ -181,7 +190,7 @@ class Bus:
                 for node in reversed(self.nodes):
                     node.destroy()
                 self.external.report()
-                self.session.close()  # type: ignore[no-untyped-call]
+                self.zenoh.close()  # type: ignore[no-untyped-call]
         finally:
             if self._guarded:
                 guard.leave()

@@ -143,7 +143,7 @@ def alive(bus: Bus, key: str) -> list[str]:
 
     # Zenoh's default handler is a queue of 256: with more tokens of its own a process would wait for itself.
     # A function of our own: what Zenoh calls is marked, and `Event.set` is everybody's.
-    bus.session.liveliness().get(key, direct(on_reply, lambda: done.set()), timeout=_TIMEOUT_S)
+    bus.zenoh.liveliness().get(key, direct(on_reply, lambda: done.set()), timeout=_TIMEOUT_S)
     done.wait(_TIMEOUT_S + 1.0)
     return found
 
@@ -178,7 +178,7 @@ class Graph:
                 bus.external.refuse("token", token[:80], "a liveliness token that cannot be read")
             bus.external.wake()
 
-        liveliness = bus.session.liveliness()
+        liveliness = bus.zenoh.liveliness()
         graph._subscribers += [
             liveliness.declare_subscriber(key, direct(on_change), history=True) for key in _tokens(bus)
         ]

@@ -26,7 +26,7 @@ class Presence:
         token = node.token.endpoint(bus.next_id(), kind, name, dds_name, bus.naming.type_hash(type_hash), qos)
         self.gid = gid(token)
         spelled = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
-        self._token: Any = None if spelled is None else bus.session.liveliness().declare_token(spelled)
+        self._token: Any = None if spelled is None else bus.zenoh.liveliness().declare_token(spelled)
         node.add_endpoint(self)
 
     def destroy(self) -> None:
@@ -57,7 +57,7 @@ class RawPublisher:
         self._sequence = 0
         self._presence = Presence(node, "MP", topic, typename, type_hash, qos)
         key = self._bus.naming.key(self._presence.interface)
-        self._zenoh: Any = declare_publisher(self._bus.session, key, qos)
+        self._zenoh: Any = declare_publisher(self._bus.zenoh, key, qos)
         node.add_endpoint(self)
 
     @property

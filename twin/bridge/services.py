@@ -103,7 +103,7 @@ class Service(Endpoint):
         bus = node.bus
         self._entrance = Entrance(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
-            queryable = bus.session.declare_queryable(key, direct(self._on_query), complete=True)
+            queryable = bus.zenoh.declare_queryable(key, direct(self._on_query), complete=True)
             self._declared.append(queryable)
         self.announce()
 
@@ -175,7 +175,7 @@ class Client(Endpoint):
         self._pending: dict[Future, None] = {}
         node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
-        self._querier = node.bus.session.declare_querier(
+        self._querier = node.bus.zenoh.declare_querier(
             self.key,
             # The bridge's queryables do not say that they are complete.
             target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,

@@ -76,7 +76,7 @@ class Endpoint:
     def announce(self) -> None:
         """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
         if self._token is not None:
-            self._declared.append(self.node.bus.session.liveliness().declare_token(self._token))
+            self._declared.append(self.node.bus.zenoh.liveliness().declare_token(self._token))
 
     def destroy(self) -> None:
         """Leave the graph; nothing arrives any more. Harmless when repeated."""
@@ -94,13 +94,16 @@ class Publisher(Endpoint, Generic[M]):
         self._bus = node.bus
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
-        self._zenoh: Any = declare_publisher(node.bus.session, self.key, qos)
+        self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
+        self._line = None if self._latched or node.bus.networked else node.bus.exchange.line(self.key)
         self._declared.append(self._zenoh)
         self.announce()
 
     @property
     def has_subscribers(self) -> bool:
         """Whether somebody listens now, here or elsewhere; always true if latched: Zenoh does not tell."""
+        if self._line is not None and self._line.is_direct:
+            return bool(self._line.receivers)
         return self._latched or self._zenoh.matching_status.matching
 
     def publish(self, message: M) -> None:
@@ -121,6 +124,14 @@ class Publisher(Endpoint, Generic[M]):
             sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
+        line = self._line
+        if line is not None and line.is_direct and self._bus.in_own_thread():
+            if line.receivers:
+                payload = self.codec.encode(message) if sample is None else sample.payload
+                data = payload, Attachment(self._sequence, time_ns, self.gid)
+                for receiver in line.receivers:
+                    receiver.enqueue(data, False)
+            return
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         if sample is not None or self.has_subscribers:
             payload = self.codec.encode(message) if sample is None else sample.payload
@@ -160,7 +171,13 @@ class Subscription(Endpoint, Generic[M]):
         self._untyped = bus.networked and bus.naming.wire == "ros2dds"
         self._entrance = Entrance(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
-            self._declared.append(declare_subscriber(bus.session, key, self._on_sample, qos))
+            self._declared.append(declare_subscriber(bus.zenoh, key, self._on_sample, qos))
+        self._line = bus.exchange.line(self.key)
+        self._latched = qos.durability == "transient_local"
+        if self._latched:
+            self._line.through_zenoh += 1
+        else:
+            self._line.receivers.append(self)
         self.announce()
 
     @property
@@ -208,6 +225,11 @@ class Subscription(Endpoint, Generic[M]):
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
+        if self._declared:
+            if self._latched:
+                self._line.through_zenoh -= 1
+            else:
+                self._line.receivers.remove(self)
         super().destroy()
         for entry in self._pending:
             entry[0] = None
