@@ -45,15 +45,21 @@ class ContactReader:
         self._matters = ~np.eye(self._robot.max(initial=0) + 3, dtype=bool)
         self._matters[_FLOOR, :] = self._matters[:, _FLOOR] = False
         self._force = np.zeros(6)
+        self._harmless = b""
+        """Geoms of contacts that do not matter, as on most ticks: wheels on the floor."""
 
     def read(self, data: mujoco.MjData) -> list[Contact]:
         """Return what robots touch except for themselves and the floor, one entry for each pair of bodies."""
         if data.ncon == 0:
             return []
         geoms = data.contact.geom
+        touching = geoms.tobytes()
+        if touching == self._harmless:
+            return []
         robots = self._robot[geoms]
         kept = self._matters[robots[:, 0], robots[:, 1]]
-        if not kept.any():  # as on most ticks: wheels on the floor
+        if not kept.any():
+            self._harmless = touching
             return []
         kept &= data.contact.efc_address >= 0
         pairs: dict[tuple[str, str], tuple[float, list[tuple[str, str]]]] = {}

@@ -7,6 +7,7 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.sim.compose import GROUP_COLLISION, GROUP_SOLID
+from twin.sim.sensors.culling import FanSlice, RayBounds
 from twin.sim.sensors.sensor import Mount
 
 
@@ -34,13 +35,15 @@ class RayCaster:
         self.directions = np.zeros((n, 3))
         """Directions of the last cast, in the world frame, shape (n, 3)."""
         self._cutoff = cutoff
-        self._bounds = _RayBounds(self._model)
+        self._bounds = RayBounds(self._model)
+        self._slice = FanSlice(self._model, self._directions, self._groups)
 
     def cast(self) -> Array:
         """Return the distances, shape (n,) [m]; inf for no hit. A few may lie beyond the cutoff."""
         data = self._data
         np.matmul(self._directions, data.xmat[self._body].reshape(3, 3).T, out=self.directions)
-        with self._bounds:
+        self._slice.look(data, self._body)
+        with self._bounds, self._slice:
             mujoco.mj_multiRay(
                 self._model,
                 data,
@@ -56,29 +59,3 @@ class RayCaster:
                 self._cutoff,
             )
         return np.where(self._distance < 0.0, np.inf, self._distance)
-
-
-class _RayBounds:
-    """While entered, the bodies' bounding volumes are such that `mj_multiRay` misses nothing.
-
-    It skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass plus the
-    volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay; seen in
-    MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
-    attitude. Collisions need the volumes as they are: there a larger one costs time.
-    """
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        roots = model.body_bvhadr[model.body_bvhadr >= 0]
-        offset = np.linalg.norm(model.bvh_aabb[roots, :3], axis=1)
-        self._roots = roots[offset > 0.0]
-        self._volumes = model.bvh_aabb
-        self._exact = model.bvh_aabb[self._roots]
-        half = self._exact[:, 3:]
-        growth = 1.0 + offset[offset > 0.0] / np.linalg.norm(half, axis=1)
-        self._safe = np.hstack((np.zeros_like(half), half * growth[:, None]))
-
-    def __enter__(self) -> None:
-        self._volumes[self._roots] = self._safe
-
-    def __exit__(self, *_: object) -> None:
-        self._volumes[self._roots] = self._exact

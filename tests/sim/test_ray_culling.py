@@ -1,0 +1,84 @@
+"""What is culled before rays are cast must be nothing that a single ray, which is not culled, hits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.sim.conftest import LIDAR, box, placed
+from twin.geometry import Array, Pose3
+from twin.models.shapes import Box
+from twin.sim.compose import GROUP_COLLISION, GROUP_SOLID
+from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.world import World
+
+
+def _slab(name: str, xyz: tuple[float, float, float], rpy: tuple[float, float, float]) -> StaticBody:
+    return StaticBody(
+        name=name,
+        T_world_body=Pose3.from_xyz_rpy(xyz, rpy),
+        shapes=(Shape(geometry=Box(size=(2.0, 0.1, 0.3))),),
+    )
+
+
+def _yard() -> Scene:
+    """Slabs at all heights and attitudes, and unbalanced bodies."""
+    rng = np.random.default_rng(3)
+    slabs = [
+        _slab(
+            f"slab{i}", (*rng.uniform(-4.0, 4.0, 2), rng.uniform(0.0, 1.0)), tuple(rng.uniform(-3.0, 3.0, 3))
+        )
+        for i in range(40)
+    ]
+    arms = (
+        Shape(geometry=Box(size=(0.4, 0.4, 0.4)), T_body_geometry=Pose3.from_xyz_rpy((-0.6, 0.0, 0.0))),
+        Shape(geometry=Box(size=(0.9, 0.05, 0.05)), T_body_geometry=Pose3.from_xyz_rpy((0.3, 0.0, 0.1))),
+    )
+    cranes = [
+        FreeBody(
+            name=f"crane{i}",
+            T_world_body=Pose3.from_xyz_rpy(
+                (*rng.uniform(-4.0, 4.0, 2), 0.2), (0.0, 0.0, rng.uniform(-3.0, 3.0))
+            ),
+            mass=5.0,
+            friction=0.5,
+            shapes=arms,
+        )
+        for i in range(6)
+    ]
+    return Scene(
+        name="yard", statics=(*slabs, box("wall", (5.0, 0.0, 0.5), (0.2, 9.0, 1.0))), goods=tuple(cranes)
+    )
+
+
+def _one_by_one(world: World, link: str, spec_angles: Array) -> Array:
+    body = world.model.body(link).id
+    groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
+    groups[[GROUP_SOLID, GROUP_COLLISION]] = 1
+    turn, hit = world.data.xmat[body].reshape(3, 3), np.zeros(1, dtype=np.int32)
+    result = []
+    for angle in spec_angles:
+        ray = turn @ (np.cos(angle), np.sin(angle), 0.0)
+        distance = mujoco.mj_ray(
+            world.model, world.data, world.data.xpos[body], ray, groups, 1, body, hit, None
+        )
+        result.append(np.inf if distance < 0.0 or distance > LIDAR.range_max else distance)
+    return np.array(result)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.01, 0.3])
+def test_many_rays_hit_what_single_rays_hit(tilt: float) -> None:
+    spec = replace(LIDAR, samples=361, range_min=0.0)
+    for yaw in (0.0, 2.0):
+        pose = Pose3.from_xyz_rpy((0.0, 0.0, 0.15), (tilt, -tilt, yaw))
+        world = World.compose(_yard(), [placed(pose, "kinematic", sensors=(spec,))])
+        groups, volumes = world.model.geom_group.copy(), world.model.bvh_aabb.copy()
+        ranges = world.robots["cart"].sensors[0].sample(0).ranges
+        truth = _one_by_one(world, "cart/laser", np.linspace(spec.angle_min, spec.angle_max, spec.samples))
+        np.testing.assert_allclose(ranges, truth, atol=1e-9)
+        assert np.isfinite(truth).mean() > 0.5
+        np.testing.assert_array_equal(world.model.geom_group, groups)
+        np.testing.assert_array_equal(world.model.bvh_aabb, volumes)

@@ -1,0 +1,93 @@
+"""What `mj_multiRay` must not skip, and what it may: exact help for MuJoCo's own culling."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+
+_FLAT = 1e-12
+"""Out of their plane, rays of unit length reach no farther than that."""
+_MARGIN_M = 1e-6
+_HIDDEN = mujoco.mjNGROUP - 1
+"""A group that no ray sees."""
+
+
+class RayBounds:
+    """While entered, the bodies' bounding volumes are such that `mj_multiRay` misses nothing.
+
+    It skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass plus the
+    volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay; seen in
+    MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
+    attitude. Collisions need the volumes as they are: there a larger one costs time.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        roots = model.body_bvhadr[model.body_bvhadr >= 0]
+        offset = np.linalg.norm(model.bvh_aabb[roots, :3], axis=1)
+        self._roots = roots[offset > 0.0]
+        self._volumes = model.bvh_aabb
+        self._exact = model.bvh_aabb[self._roots]
+        half = self._exact[:, 3:]
+        growth = 1.0 + offset[offset > 0.0] / np.linalg.norm(half, axis=1)
+        self._safe = np.hstack((np.zeros_like(half), half * growth[:, None]))
+
+    def __enter__(self) -> None:
+        self._volumes[self._roots] = self._safe
+
+    def __exit__(self, *_: object) -> None:
+        self._volumes[self._roots] = self._exact
+
+
+class FanSlice:
+    """While entered, `mj_multiRay` does not see the scenery that the plane of a flat fan misses.
+
+    It tests every ray against every shape; most of a scene lies above or below a lidar.
+    """
+
+    def __init__(self, model: mujoco.MjModel, directions: Array, groups: NDArray[np.uint8]) -> None:
+        """Bind to a model.
+
+        Args:
+            model: The compiled world.
+            directions: Unit vectors in the link's frame, shape (n, 3); where they fill no plane, all is seen.
+            groups: Of the shapes that rays see, shape (mjNGROUP,).
+        """
+        self._normal = np.linalg.eigh(directions.T @ directions)[1][:, 0]
+        """Of the plane, in the link's frame."""
+        self._groups = model.geom_group
+        is_flat = np.abs(directions @ self._normal).max() < _FLAT and not groups[_HIDDEN]
+        chosen = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE) & is_flat
+        chosen &= groups[np.clip(self._groups, 0, mujoco.mjNGROUP - 1)] > 0
+        self._geoms = np.flatnonzero(chosen)
+        self._centre, self._half = _boxes(model, self._geoms)
+        self._shown = self._groups[self._geoms]
+        self._now = self._shown
+
+    def look(self, data: mujoco.MjData, body: int) -> None:
+        """Find what the plane of the fan, whose link is `body`, meets at present."""
+        normal = data.xmat[body].reshape(3, 3) @ self._normal
+        height = self._centre @ normal - data.xpos[body] @ normal
+        reach = self._half @ np.abs(normal) + _MARGIN_M
+        self._now = np.where(np.abs(height) > reach, _HIDDEN, self._shown)
+
+    def __enter__(self) -> None:
+        self._groups[self._geoms] = self._now
+
+    def __exit__(self, *_: object) -> None:
+        self._groups[self._geoms] = self._shown
+
+
+def _boxes(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return centres and half sizes, shape (n, 3), of axis-aligned boxes around the world body's shapes."""
+    turns = np.zeros((len(geoms), 9))
+    for turn, quat in zip(turns, model.geom_quat[geoms], strict=True):
+        mujoco.mju_quat2Mat(turn, quat)
+    turns = turns.reshape(-1, 3, 3)
+    centre, half = np.hsplit(model.geom_aabb[geoms], 2)
+    return (
+        model.geom_pos[geoms] + np.einsum("nij,nj->ni", turns, centre),
+        np.einsum("nij,nj->ni", np.abs(turns), half),
+    )
