@@ -45,8 +45,10 @@ def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics)
     _floor(spec, scene)
     # Stiff contacts rest within 0.1 mm of the surface; the time constant must span two steps.
     solref = [max(0.004, 2.0 * physics.timestep), 1.0]
+    # A body of its own (without a name) for what is neither touched nor hit by rays: those skip it whole.
+    paint = spec.worldbody.add_body()
     for static in scene.statics:
-        _add_static(spec, static, solref)
+        _add_static(spec.worldbody, paint, static, solref)
     for goods in scene.goods:
         _add_goods(spec, goods, solref)
     for placed in scene.placed:
@@ -144,13 +146,17 @@ def _floor(spec: mujoco.MjSpec, scene: Scene) -> None:
     )
 
 
-def _add_static(spec: mujoco.MjSpec, static: StaticBody, solref: list[float]) -> None:
+def _add_static(
+    world: mujoco.MjsBody, paint: mujoco.MjsBody, static: StaticBody, solref: list[float]
+) -> None:
     # Geoms of the world body: never tested against each other, and found by one bounding tree.
-    frame = spec.worldbody.add_frame(pos=static.T_world_body.xyz, quat=static.T_world_body.quat_wxyz)
+    pose = static.T_world_body
+    frames = {body: body.add_frame(pos=pose.xyz, quat=pose.quat_wxyz) for body in (world, paint)}
     for index, shape in enumerate(static.shapes):
-        geom = _add_geom(spec.worldbody, shape, static.friction, solref)
+        body = world if shape.solid else paint
+        geom = _add_geom(body, shape, static.friction, solref)
         geom.name = static_geom(static.name, index)
-        geom.set_frame(frame)
+        geom.set_frame(frames[body])
 
 
 def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> None:

@@ -16,15 +16,20 @@ _HIDDEN = mujoco.mjNGROUP - 1
 
 
 class RayBounds:
-    """While entered, the bodies' bounding volumes are such that `mj_multiRay` misses nothing.
+    """While entered, `mj_multiRay` misses nothing of the bodies that rays see, and skips the others whole.
 
-    It skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass plus the
-    volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay; seen in
-    MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
+    By itself it skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass
+    plus the volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay;
+    seen in MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
     attitude. Collisions need the volumes as they are: there a larger one costs time.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8]) -> None:
+        """Bind to a model; `groups` of the shapes that rays see, shape (mjNGROUP,)."""
+        seen = np.bincount(model.geom_bodyid, weights=_are_seen(model, groups), minlength=model.nbody)
+        self._unseen = np.flatnonzero(seen == 0)
+        self._counts = model.body_geomnum
+        self._all = self._counts[self._unseen]
         roots = model.body_bvhadr[model.body_bvhadr >= 0]
         offset = np.linalg.norm(model.bvh_aabb[roots, :3], axis=1)
         self._roots = roots[offset > 0.0]
@@ -36,9 +41,11 @@ class RayBounds:
 
     def __enter__(self) -> None:
         self._volumes[self._roots] = self._safe
+        self._counts[self._unseen] = 0
 
     def __exit__(self, *_: object) -> None:
         self._volumes[self._roots] = self._exact
+        self._counts[self._unseen] = self._all
 
 
 class FanSlice:
@@ -59,9 +66,8 @@ class FanSlice:
         """Of the plane, in the link's frame."""
         self._groups = model.geom_group
         is_flat = np.abs(directions @ self._normal).max() < _FLAT and not groups[_HIDDEN]
-        chosen = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE) & is_flat
-        chosen &= groups[np.clip(self._groups, 0, mujoco.mjNGROUP - 1)] > 0
-        self._geoms = np.flatnonzero(chosen)
+        bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & is_flat)
         self._centre, self._half = _boxes(model, self._geoms)
         self._shown = self._groups[self._geoms]
         self._now = self._shown
@@ -80,12 +86,17 @@ class FanSlice:
         self._groups[self._geoms] = self._shown
 
 
+def _are_seen(model: mujoco.MjModel, groups: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return for each shape whether rays see its group."""
+    return groups[np.clip(model.geom_group, 0, mujoco.mjNGROUP - 1)] > 0
+
+
 def _boxes(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> tuple[Array, Array]:
     """Return centres and half sizes, shape (n, 3), of axis-aligned boxes around the world body's shapes."""
-    turns = np.zeros((len(geoms), 9))
-    for turn, quat in zip(turns, model.geom_quat[geoms], strict=True):
-        mujoco.mju_quat2Mat(turn, quat)
-    turns = turns.reshape(-1, 3, 3)
+    rows = np.zeros((len(geoms), 9))
+    for row, quat in zip(rows, model.geom_quat[geoms], strict=True):
+        mujoco.mju_quat2Mat(row, quat)
+    turns = rows.reshape(-1, 3, 3)
     centre, half = np.hsplit(model.geom_aabb[geoms], 2)
     return (
         model.geom_pos[geoms] + np.einsum("nij,nj->ni", turns, centre),

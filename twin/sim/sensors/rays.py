@@ -35,7 +35,7 @@ class RayCaster:
         self.directions = np.zeros((n, 3))
         """Directions of the last cast, in the world frame, shape (n, 3)."""
         self._cutoff = cutoff
-        self._bounds = RayBounds(self._model)
+        self._bounds = RayBounds(self._model, self._groups)
         self._slice = FanSlice(self._model, self._directions, self._groups)
 
     def cast(self) -> Array:
