@@ -20,8 +20,8 @@ class RayBounds:
 
     By itself it skips a body whose bounding sphere a ray misses, but puts that sphere at the centre of mass
     plus the volume's offset from it without turning the offset with the body (engine_ray.c, mju_singleRay;
-    seen in MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in every
-    attitude. Collisions need the volumes as they are: there a larger one costs time.
+    seen in MuJoCo 3.17). A sphere around the centre of mass itself, larger by the offset, holds the body in
+    every attitude. Collisions need the volumes as they are: there a larger one costs time.
     """
 
     def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8]) -> None:
