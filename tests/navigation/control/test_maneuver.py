@@ -95,10 +95,10 @@ def test_a_robot_gets_on_to_its_path_without_touching_anything_more(name: str) -
 
 def test_backwards_is_driven_only_where_it_must() -> None:
     costmap, start = hall(), Pose2(0.0, 0.0, 0.0)
-    signs = [sign for sign, _ in find_maneuver(costmap, LONG, start, line((0.0, 0.0), (1.5, 0.0)))]
-    assert signs == [1]
+    gears = [move.gear for move in find_maneuver(costmap, LONG, start, line((0.0, 0.0), (1.5, 0.0)))]
+    assert gears == [1]
     costmap, start, path = SITUATIONS["nose to somebody beside the way"]
-    assert -1 in [sign for sign, _ in find_maneuver(costmap, LONG, start, path)]
+    assert -1 in [move.gear for move in find_maneuver(costmap, LONG, start, path)]
 
 
 def test_there_may_be_no_way() -> None:
