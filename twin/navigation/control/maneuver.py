@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.control.maneuver_kernel import contact, search
+from twin.navigation.control.maneuver_kernel import contact, keeps_clear, most_contact, search
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.footprint import padded
-from twin.navigation.costmaps.kernels import escapes, steps_to_collision
 
 _BINS = 48
 _TURN = 2.0 * math.pi / _BINS
@@ -29,8 +28,10 @@ _STEP = 0.075
 _NEAR, _TURNED = 0.015, 0.03
 """A move is over this near to its end [m], [rad]."""
 _MARGIN = 0.025
-"""Around the footprint [m], for a robot is a little beside the poses that it follows; if there is no way so,
-there may be one without."""
+"""Around the footprint [m], for a robot is a little beside the poses that it follows; where a way has it not
+it is dear."""
+_AHEAD = 5
+"""So many poses ahead the robot may have come since the last command."""
 _LOOKAHEAD = 0.2
 """Of the pursuit of a move's poses [m]."""
 _LOOK, _LOOK_TURN = 0.1, 0.3
@@ -43,11 +44,11 @@ class ManeuverConfig:
 
     wait: float = 1.5
     """How long the robot stands blocked before it maneuvers: somebody in the way may walk on [s]."""
-    reach: float = 1.5
+    reach: float = 1.8
     """How far from where it stands the robot goes at most, to each side [m]; 0: it never maneuvers."""
     ahead_min: float = 0.5
     """The nearest place on the path where a maneuver may end [m] ..."""
-    ahead_max: float = 1.4
+    ahead_max: float = 2.0
     """... and the farthest [m]."""
     speed: float = 0.2
     """[m/s]"""
@@ -76,12 +77,25 @@ class Move:
     poses: Array
     """Shape (n, 3), n >= 2: x, y [m], yaw [rad]."""
 
-    def left(self, at: Pose2) -> float:
-        """Return what is left of it for a robot at a pose: [m] ahead in its direction, or signed [rad]."""
+    def left(self, at: Pose2, nearest: int) -> float:
+        """Return what is left of it for a robot at a pose: [m], or signed [rad].
+
+        Args:
+            at: Where the robot is.
+            nearest: The pose that it has come to.
+        """
         x, y, yaw = self.poses[-1].tolist()
         if not self.gear:
             return wrap_angle(yaw - at.yaw)
+        between = len(self.poses) - 1 - nearest
+        if between > 1:
+            return between * _STEP
         return self.gear * ((x - at.x) * math.cos(yaw) + (y - at.y) * math.sin(yaw))
+
+    def nearest(self, at: Pose2, since: int) -> int:
+        """Return which pose a robot has come to that was at `since` before; the way may cross itself."""
+        near = self.poses[since : since + _AHEAD]
+        return since + int(np.argmin((near[:, 0] - at.x) ** 2 + (near[:, 1] - at.y) ** 2))
 
     def is_over(self, left: float) -> bool:
         """Whether that is next to nothing."""
@@ -106,24 +120,14 @@ def find_maneuver(
     """
     config = config or ManeuverConfig()
     corners = np.array(footprint, dtype=np.float64, order="C")
-    for margin in (_MARGIN, 0.0):
-        found = _search(costmap, corners, padded(corners, margin), start, path, config)
-        if found:
-            return found
-    return []
-
-
-def _search(
-    costmap: Costmap, corners: Array, wider: Array, start: Pose2, path: Array, config: ManeuverConfig
-) -> list[Move]:
-    targets = _targets(costmap, wider, path, config)
+    targets = _targets(costmap, corners, path, config)
     side = 2 * math.ceil(config.reach / costmap.resolution) + 1
     if not len(targets) or side == 1:
         return []
     poses, moves = search(
         costmap.costs,
         corners,
-        wider,
+        padded(corners, _MARGIN),
         costmap.frame,
         np.array([start.x, start.y, start.yaw], dtype=np.float64),
         targets,
@@ -147,6 +151,10 @@ class Maneuver:
 
     def __post_init__(self) -> None:
         self._moves: list[Move] = []
+        self._nearest = 0
+        """The pose of the first move that the robot has come to."""
+        self._most = 0
+        """How much the footprint may touch: no more than at the beginning."""
 
     @property
     def active(self) -> bool:
@@ -155,6 +163,10 @@ class Maneuver:
 
     def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
         """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
+        pose = float(at.x), float(at.y), float(at.yaw)
+        touched = contact(costmap.costs, self.footprint, self.footprint, *pose, costmap.frame)
+        # A way along a thing is never driven exactly.
+        self._most, self._nearest = most_contact(most_contact(touched)), 0
         self._moves = find_maneuver(costmap, self.footprint, at, path, self.config)
         return self.active
 
@@ -175,9 +187,11 @@ class Maneuver:
         """
         while self._moves:
             move = self._moves[0]
-            left = move.left(at)
+            self._nearest = move.nearest(at, self._nearest) if move.gear else 0
+            left = move.left(at, self._nearest)
             if move.is_over(left):
                 self._moves.pop(0)
+                self._nearest = 0
                 continue
             command = (
                 self._drive(move, at, left, velocity, dt) if move.gear else self._turn(left, velocity, dt)
@@ -195,7 +209,7 @@ class Maneuver:
         self, move: Move, at: Pose2, left: float, velocity: tuple[float, float], dt: float
     ) -> tuple[float, float]:
         local = at.inverse().apply(move.poses[:, :2])
-        nearest = int(np.argmin(np.hypot(local[:, 0], local[:, 1])))
+        nearest = self._nearest
         ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > _LOOKAHEAD))
         if ahead == nearest:
             # Beyond the end, straight on: the lookahead stays as long as it was.
@@ -216,9 +230,10 @@ class Maneuver:
         v, w = command
         size = abs(v) or max(abs(w), 1e-6)
         dt = min(_LOOK if v else _LOOK_TURN, abs(left)) / size / 5.0
-        state = float(at.x), float(at.y), float(at.yaw), v, w
-        hit = steps_to_collision(costmap.costs, self.footprint, *state, dt, math.inf, 5, *costmap.frame)
-        return hit < 0 or (hit == 0 and escapes(costmap.costs, self.footprint, *state, dt, 5, *costmap.frame))
+        pose = float(at.x), float(at.y), float(at.yaw)
+        return bool(
+            keeps_clear(costmap.costs, self.footprint, self._most, pose, command, dt, 5, costmap.frame)
+        )
 
 
 def _moves_of(poses: Array, gears: list[int]) -> list[Move]:

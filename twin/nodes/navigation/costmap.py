@@ -164,7 +164,7 @@ class CostmapNode:
         if everything and len(self._known) and T_frame_map is not None:
             layers.mark(T_frame_map.apply(self._known))
         for source in self._scans.values():
-            scan = source.last
+            scan = source.fresh or source.last
             if scan is not None and self.node.now_ns - ns(scan.header.stamp) <= self.config.update_period_ns:
                 self._take_scan(layers, scan)
 
