@@ -15,7 +15,7 @@ import numpy as np
 from twin.geometry import Pose2
 from twin.navigation.control.collision_monitor import time_to_collision
 from twin.navigation.control.controller import Controller
-from twin.navigation.control.maneuver import find_maneuver
+from twin.navigation.control.maneuver import Maneuver
 from twin.navigation.costmaps.costmap import footprint_cost
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
@@ -61,9 +61,11 @@ def warm_up_planning() -> None:
 
 @cache
 def warm_up_maneuver() -> None:
-    """Look for a way on to a path."""
-    path = np.array([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
-    find_maneuver(_costmap().costmap, _costmap().config.polygon, Pose2(1.0, 1.0, 0.0), path)
+    """Look for a way on to a path, and begin to drive it."""
+    layered, at, path = _costmap(), Pose2(1.0, 1.0, 0.0), np.array([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
+    maneuver = Maneuver(footprint=layered.config.polygon)
+    maneuver.begin(layered.costmap, at, path)
+    maneuver.command(at, (0.0, 0.0), layered.costmap, 0.05)
 
 
 @cache

@@ -43,7 +43,10 @@ def build_commands(
     """
     bus, namespace = context.bus, context.namespace
     sensors = context.handle.description.sensors
-    scans = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
+    scans = config.scan_topics
+    if scans is None:
+        there = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
+        scans = (_SCAN,) if there else ()
     if not config.enabled or not (scans or config.range_topics):
         TwistMuxNode(bus, namespace=namespace)
         return
@@ -59,7 +62,7 @@ def build_commands(
         brakes=brakes,
         hardest=_hardest(brakes.linear, context.handle.description.drive),
         cmd_vel_in=_GUARDED,
-        scan_topics=(_SCAN,) if scans else (),
+        scan_topics=scans,
         range_topics=config.range_topics,
         namespace=namespace,
     )

@@ -162,6 +162,7 @@ def _costmap(
         layers=overridden(
             replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
         ),
+        scan_topics=tuple(overrides.get("scan_topics") or ("scan",)),
         range_topics=tuple(overrides.get("range_topics") or ()),
         update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
     )

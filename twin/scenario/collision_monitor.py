@@ -37,10 +37,12 @@ class CollisionMonitorParameters(StrictModel):
     """Guards the commands of navigation and of people."""
 
     enabled: bool = True
-    """Whether there is one; only robots with a `scan` or `range_topics` have."""
+    """Whether there is one; only robots with a lidar on `scan`, or topics named here, have."""
     polygons: tuple[MonitorPolygonConfig, ...] | None = None
     """The slowest of their results holds; absent: `approach` with the footprint, as early as it brakes."""
     source_timeout: Annotated[Seconds, NotNegative] = 1.0
     """The robot stops when a sensor is silent for so long [s]; 0: it does not."""
+    scan_topics: tuple[str, ...] | None = None
+    """Topics of sensor_msgs/LaserScan that it looks at; absent: `scan`, if the robot has a lidar there."""
     range_topics: tuple[str, ...] = ()
-    """Topics of sensor_msgs/Range that it looks at, beside `scan`."""
+    """Topics of sensor_msgs/Range that it looks at, too."""

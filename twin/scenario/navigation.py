@@ -51,6 +51,8 @@ class CostmapParameters(ParameterGroup):
     """Whether the cells under the robot are free."""
     keepout_before_inflation: bool | None = None
     """Whether keep-out zones are inflated, so that no part of the robot enters them."""
+    scan_topics: tuple[str, ...] | None = None
+    """Topics of sensor_msgs/LaserScan for the obstacle layer; absent: `scan`."""
     range_topics: tuple[str, ...] | None = None
     """Topics of sensor_msgs/Range for the range sensor layer."""
     robot_radius: Annotated[Metres, Positive] | None = None

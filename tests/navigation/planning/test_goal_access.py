@@ -61,9 +61,9 @@ def test_near_to_it_the_hope_ends() -> None:
     for second in range(100):
         opened(access, taken, FAR, second)
     opened(access, taken, NEAR, 100.0)
-    opened(access, taken, NEAR, 104.9)
-    with pytest.raises(GoalOccupied, match=r"something has stood at the goal \(7.00, 2.00\) for 5 s"):
-        opened(access, taken, NEAR, 105.0)
+    opened(access, taken, NEAR, 103.9)
+    with pytest.raises(GoalOccupied, match=r"something has stood at the goal \(7.00, 2.00\) for 4 s"):
+        opened(access, taken, NEAR, 104.0)
     opened(access, free, NEAR, 106.0)
     opened(access, taken, NEAR, 107.0)  # somebody else
     opened(access, hall((6.5, 2.0)), NEAR, 112.1, goal=Pose2(6.5, 2.0, 0.0))  # another goal

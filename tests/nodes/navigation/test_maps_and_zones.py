@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.nodes.conftest import Bench, Robot, map_of_room, open_room
+from tests.nodes.conftest import TICK_NS, Bench, Robot, map_of_room, open_room
 from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionClient
 from twin.bridge.msgs import (
     Costmap as CostmapMessage,
 )
 from twin.bridge.msgs import (
+    LaserScan,
     OccupancyGrid,
     PolygonStamped,
     PoseStamped,
@@ -283,6 +285,29 @@ def test_costmaps_are_cleared_in_part(bench: Bench) -> None:
     bench.call(ClearCostmapAroundPose, "global_costmap/clear_around_pose_global_costmap", request)
     assert at(node, *near) == 0
     assert isinstance(pose, PoseStamped)
+
+
+def test_a_second_lidar_marks_too_and_is_missed_when_it_stops(bench: Bench) -> None:
+    room = open_room()
+    robot = Robot(bench, room)
+    MapServerNode(bench.bus, map_of_room())
+    layers = replace(LAYERS, expected_update_rate=0.5)
+    node = costmap(bench, robot, layers, scan_topics=("scan", "scan_rear"))
+    rear = bench.node.create_publisher(LaserScan, "scan_rear", SENSOR_DATA)
+    robot.blind = True
+    room.add_box(-2.0, -0.2, -1.8, 0.2)
+    bench.run(1.0)
+    assert at(node, -1.81, 0.0) == 0
+    for _ in range(4):
+        rear.publish(room.scan(robot.pose @ robot.T_base_lidar, bench.clock.now_ns - TICK_NS))
+        bench.run(0.2)
+    assert at(node, -1.81, 0.0) == 254
+    assert "no scan for 1.8 s" in node.fault, "the other one"
+    robot.blind = False
+    bench.run(0.2)
+    assert node.fault == ""
+    bench.run(0.6)
+    assert "no scan for" in node.fault
 
 
 def test_costs_can_be_asked_for(bench: Bench) -> None:

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.control.maneuver_kernel import contact, search
+from twin.navigation.control.maneuver_kernel import contact, keeps_clear, most_contact, search
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.footprint import padded
-from twin.navigation.costmaps.kernels import escapes, steps_to_collision
 
 _BINS = 48
 _TURN = 2.0 * math.pi / _BINS
@@ -29,8 +28,12 @@ _STEP = 0.075
 _NEAR, _TURNED = 0.015, 0.03
 """A move is over this near to its end [m], [rad]."""
 _MARGIN = 0.025
-"""Around the footprint [m], for a robot is a little beside the poses that it follows; if there is no way so,
-there may be one without."""
+"""Around the footprint [m], for a robot is a little beside the poses that it follows; where a way has it not
+it is dear."""
+_AHEAD = 5
+"""So many poses ahead the robot may have come since the last command."""
+_LOOKAHEAD = 0.2
+"""Of the pursuit of a move's poses [m]."""
 _LOOK, _LOOK_TURN = 0.1, 0.3
 """How far ahead a maneuver is checked while it is driven [m], [rad]: more than the way to stop."""
 
@@ -41,11 +44,11 @@ class ManeuverConfig:
 
     wait: float = 1.5
     """How long the robot stands blocked before it maneuvers: somebody in the way may walk on [s]."""
-    reach: float = 1.5
+    reach: float = 1.8
     """How far from where it stands the robot goes at most, to each side [m]; 0: it never maneuvers."""
     ahead_min: float = 0.5
     """The nearest place on the path where a maneuver may end [m] ..."""
-    ahead_max: float = 1.4
+    ahead_max: float = 2.0
     """... and the farthest [m]."""
     speed: float = 0.2
     """[m/s]"""
@@ -65,14 +68,48 @@ class ManeuverConfig:
     """What it costs to change between forwards, backwards and turning [m]."""
 
 
+@dataclass(frozen=True)
+class Move:
+    """A run of poses in one gear."""
+
+    gear: int
+    """1 forwards, -1 backwards, 0 a turn in place, of less than half a circle."""
+    poses: Array
+    """Shape (n, 3), n >= 2: x, y [m], yaw [rad]."""
+
+    def left(self, at: Pose2, nearest: int) -> float:
+        """Return what is left of it for a robot at a pose: [m], or signed [rad].
+
+        Args:
+            at: Where the robot is.
+            nearest: The pose that it has come to.
+        """
+        x, y, yaw = self.poses[-1].tolist()
+        if not self.gear:
+            return wrap_angle(yaw - at.yaw)
+        between = len(self.poses) - 1 - nearest
+        if between > 1:
+            return between * _STEP
+        return self.gear * ((x - at.x) * math.cos(yaw) + (y - at.y) * math.sin(yaw))
+
+    def nearest(self, at: Pose2, since: int) -> int:
+        """Return which pose a robot has come to that was at `since` before; the way may cross itself."""
+        near = self.poses[since : since + _AHEAD]
+        return since + int(np.argmin((near[:, 0] - at.x) ** 2 + (near[:, 1] - at.y) ** 2))
+
+    def is_over(self, left: float) -> bool:
+        """Whether that is next to nothing."""
+        return left < _NEAR if self.gear else abs(left) < _TURNED
+
+
 def find_maneuver(
     costmap: Costmap,
     footprint: ArrayLike,
     start: Pose2,
     path: Array,
     config: ManeuverConfig | None = None,
-) -> list[tuple[int, Array]]:
-    """Return the moves that lead from a blocked pose on to the path; none if there are none.
+) -> list[Move]:
+    """Return the moves, in order, that lead from a blocked pose on to the path; none if there are none.
 
     Args:
         costmap: Around the robot.
@@ -80,34 +117,21 @@ def find_maneuver(
         start: In the costmap's frame.
         path: What is ahead, shape (n, 3), n >= 1, from the pose nearest to the robot on; in that frame, too.
         config: Prices and limits.
-
-    Returns:
-        Moves in order: 1 forwards, -1 backwards, 0 a turn in place; and its poses, shape (n, 3), n >= 2.
     """
     config = config or ManeuverConfig()
     corners = np.array(footprint, dtype=np.float64, order="C")
-    for margin in (_MARGIN, 0.0):
-        found = _search(costmap, corners, padded(corners, margin), start, path, config)
-        if found:
-            return found
-    return []
-
-
-def _search(
-    costmap: Costmap, corners: Array, wider: Array, start: Pose2, path: Array, config: ManeuverConfig
-) -> list[tuple[int, Array]]:
-    targets = _targets(costmap, wider, path, config)
+    targets = _targets(costmap, corners, path, config)
     side = 2 * math.ceil(config.reach / costmap.resolution) + 1
     if not len(targets) or side == 1:
         return []
     poses, moves = search(
         costmap.costs,
         corners,
-        wider,
+        padded(corners, _MARGIN),
         costmap.frame,
         np.array([start.x, start.y, start.yaw], dtype=np.float64),
         targets,
-        _moves(config),
+        _steps(config),
         side,
         _BINS,
         1.5 * costmap.resolution,
@@ -115,7 +139,7 @@ def _search(
         config.cost_penalty,
         config.cusp_penalty,
     )
-    return _pieces(poses, np.sign(_moves(config)[moves[1:], 0]).astype(int).tolist())
+    return _moves_of(poses, np.sign(_steps(config)[moves[1:], 0]).astype(int).tolist())
 
 
 @dataclass(kw_only=True)
@@ -126,21 +150,29 @@ class Maneuver:
     config: ManeuverConfig = field(default_factory=ManeuverConfig)
 
     def __post_init__(self) -> None:
-        self._pieces: list[tuple[int, Array]] = []
+        self._moves: list[Move] = []
+        self._nearest = 0
+        """The pose of the first move that the robot has come to."""
+        self._most = 0
+        """How much the footprint may touch: no more than at the beginning."""
 
     @property
     def active(self) -> bool:
         """Whether there is something left to drive."""
-        return bool(self._pieces)
+        return bool(self._moves)
 
     def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
         """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
-        self._pieces = find_maneuver(costmap, self.footprint, at, path, self.config)
+        pose = float(at.x), float(at.y), float(at.yaw)
+        touched = contact(costmap.costs, self.footprint, self.footprint, *pose, costmap.frame)
+        # A way along a thing is never driven exactly.
+        self._most, self._nearest = most_contact(most_contact(touched)), 0
+        self._moves = find_maneuver(costmap, self.footprint, at, path, self.config)
         return self.active
 
     def drop(self) -> None:
         """Drive no further."""
-        self._pieces = []
+        self._moves = []
 
     def command(
         self, at: Pose2, velocity: tuple[float, float], costmap: Costmap, dt: float
@@ -153,18 +185,20 @@ class Maneuver:
             costmap: Around the robot.
             dt: Control period [s].
         """
-        while self._pieces:
-            sign, poses = self._pieces[0]
-            left = _way_left(sign, poses[-1], at) if sign else wrap_angle(float(poses[-1, 2]) - at.yaw)
-            if (sign and left < _NEAR) or abs(left) < _TURNED * (1 - abs(sign)):
-                self._pieces.pop(0)
+        while self._moves:
+            move = self._moves[0]
+            self._nearest = move.nearest(at, self._nearest) if move.gear else 0
+            left = move.left(at, self._nearest)
+            if move.is_over(left):
+                self._moves.pop(0)
+                self._nearest = 0
                 continue
             command = (
-                self._drive(sign, poses, at, left, velocity, dt) if sign else self._turn(left, velocity, dt)
+                self._drive(move, at, left, velocity, dt) if move.gear else self._turn(left, velocity, dt)
             )
             if self._is_free(at, command, left, costmap):
                 return command
-            self._pieces = []
+            self._moves = []
         return None
 
     def _turn(self, left: float, velocity: tuple[float, float], dt: float) -> tuple[float, float]:
@@ -172,23 +206,21 @@ class Maneuver:
         return 0.0, turn_rate(left, velocity[1], dt, **limits)
 
     def _drive(
-        self, sign: int, poses: Array, at: Pose2, left: float, velocity: tuple[float, float], dt: float
+        self, move: Move, at: Pose2, left: float, velocity: tuple[float, float], dt: float
     ) -> tuple[float, float]:
-        local = at.inverse().apply(poses[:, :2])
-        end = poses[-1]
-        nearest = int(np.argmin(np.hypot(local[:, 0], local[:, 1])))
-        ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > 0.2))
+        local = at.inverse().apply(move.poses[:, :2])
+        nearest = self._nearest
+        ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > _LOOKAHEAD))
         if ahead == nearest:
             # Beyond the end, straight on: the lookahead stays as long as it was.
-            heading = float(end[2]) - at.yaw
-            over = sign * 0.2
+            heading, over = float(move.poses[-1, 2]) - at.yaw, move.gear * _LOOKAHEAD
             x = float(local[-1, 0]) + over * math.cos(heading)
             y = float(local[-1, 1]) + over * math.sin(heading)
         else:
             x, y = local[ahead].tolist()
         config = self.config
         speed = min(config.speed, math.sqrt(2.0 * config.acceleration * left))
-        speed = sign * min(speed, max(sign * velocity[0], 0.0) + config.acceleration * dt)
+        speed = move.gear * min(speed, max(move.gear * velocity[0], 0.0) + config.acceleration * dt)
         curvature = 2.0 * y / max(x * x + y * y, 1e-6)
         bound = config.turn_speed / max(abs(speed), 1e-6)
         return speed, speed * min(max(curvature, -bound), bound)
@@ -196,33 +228,27 @@ class Maneuver:
     def _is_free(self, at: Pose2, command: tuple[float, float], left: float, costmap: Costmap) -> bool:
         """Whether the robot may do this for as far as it needs to stop, or for what is left of the move."""
         v, w = command
-        look = (
-            min(_LOOK, abs(left)) / max(abs(v), 1e-6) if v else min(_LOOK_TURN, abs(left)) / max(abs(w), 1e-6)
+        size = abs(v) or max(abs(w), 1e-6)
+        dt = min(_LOOK if v else _LOOK_TURN, abs(left)) / size / 5.0
+        pose = float(at.x), float(at.y), float(at.yaw)
+        return bool(
+            keeps_clear(costmap.costs, self.footprint, self._most, pose, command, dt, 5, costmap.frame)
         )
-        state, dt = (float(at.x), float(at.y), float(at.yaw), v, w), look / 5.0
-        hit = steps_to_collision(costmap.costs, self.footprint, *state, dt, math.inf, 5, *costmap.frame)
-        return hit < 0 or (hit == 0 and escapes(costmap.costs, self.footprint, *state, dt, 5, *costmap.frame))
 
 
-def _way_left(sign: int, end: Array, at: Pose2) -> float:
-    """Return how far the end is ahead, in the direction of a move [m]."""
-    x, y, yaw = end.tolist()
-    return sign * ((x - at.x) * math.cos(yaw) + (y - at.y) * math.sin(yaw))
-
-
-def _pieces(poses: Array, signs: list[int]) -> list[tuple[int, Array]]:
-    """Return runs of moves of the same sign; turns of less than half a circle, that tell the way round."""
-    pieces, at = [], 0
-    for sign, group in itertools.groupby(signs):
+def _moves_of(poses: Array, gears: list[int]) -> list[Move]:
+    """Cut a way where the gear changes, and turns of half a circle so that they tell the way round."""
+    moves, at = [], 0
+    for gear, group in itertools.groupby(gears):
         left = len(list(group))
         while left:
-            count = left if sign else min(left, _BINS // 3)
-            pieces.append((sign, poses[at : at + count + 1]))
+            count = left if gear else min(left, _BINS // 3)
+            moves.append(Move(gear, poses[at : at + count + 1]))
             at, left = at + count, left - count
-    return pieces
+    return moves
 
 
-def _moves(config: ManeuverConfig) -> Array:
+def _steps(config: ManeuverConfig) -> Array:
     """Return way [m], turn [rad] and price [m] of each, shape (8, 3)."""
     arcs = [(_STEP, turn, _STEP) for turn in (0.0, _TURN, -_TURN)]
     back = [(-_STEP, turn, _STEP * config.reverse_penalty) for turn in (0.0, _TURN, -_TURN)]

@@ -15,6 +15,9 @@ from twin.navigation.costmaps.kernels import footprint_hits, outline_cost
 
 Cells = NDArray[np.uint8]
 
+_TIGHT = 5.0
+"""A metre on which the wider footprint touches something counts as so many."""
+
 
 @jit
 def contact(
@@ -30,6 +33,38 @@ def contact(
     if outline_cost(costs, corners, x, y, yaw, *frame) == 254:
         return 2 + footprint_hits(costs, corners, x, y, yaw, *frame)
     return int(outline_cost(costs, wider, x, y, yaw, *frame) == 254)
+
+
+@jit
+def most_contact(first: int) -> int:
+    """Return how much a way may touch that begins at such a pose: nothing, or hardly more than there.
+
+    Along a thing the count of samples varies.
+    """
+    return 1 if first < 2 else first + first // 8 + 4
+
+
+@jit
+def keeps_clear(
+    costs: Cells,
+    corners: Array,
+    most: int,
+    at: tuple[float, float, float],
+    command: tuple[float, float],
+    dt: float,
+    steps: int,
+    frame: tuple[float, float, float],
+) -> bool:
+    """Return whether a command, for some steps, touches at most so much."""
+    x, y, yaw = at
+    for _ in range(steps):
+        yaw += command[1] * dt / 2.0
+        x += command[0] * dt * math.cos(yaw)
+        y += command[0] * dt * math.sin(yaw)
+        yaw += command[1] * dt / 2.0
+        if contact(costs, corners, corners, x, y, yaw, frame) > most:
+            return False
+    return True
 
 
 @jit
@@ -75,8 +110,8 @@ def search(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return the poses of the cheapest way to a target, shape (n, 3), and by which move each was reached.
 
-    Empty if there is none. From a start that touches something a move may lead on as long as it does not
-    touch more.
+    Empty if there is none. Its poses are free, with room for the wider footprint unless that is a long way.
+    From a start that touches something a way may lead on as long as it touches hardly more.
 
     Args:
         costs: The grid.
@@ -97,13 +132,12 @@ def search(
     g = np.full(states, np.inf)
     parent = np.full(states, -1, dtype=np.int64)
     by = np.full(states, -1, dtype=np.int64)
-    touching = np.zeros(states, dtype=np.int64)
     poses = np.zeros((states, 3))
     closed = np.zeros(states, dtype=np.bool_)
     first = _bin(start[0], start[1], start[2], start, frame[2], side, bins)
     g[first] = 0.0
     poses[first, 0], poses[first, 1], poses[first, 2] = start[0], start[1], start[2]
-    touching[first] = contact(costs, corners, wider, start[0], start[1], start[2], frame)
+    most = most_contact(contact(costs, corners, wider, start[0], start[1], start[2], frame))
     heap = [(0.0, first)]
     last = -1
     while len(heap) > 0:
@@ -113,7 +147,7 @@ def search(
         closed[here] = True
         x, y, yaw = poses[here, 0], poses[here, 1], poses[here, 2]
         _, reached = _away(x, y, yaw, targets, near, turned)
-        if reached and touching[here] == 0:
+        if reached and here != first and contact(costs, corners, wider, x, y, yaw, frame) < 2:
             last = here
             break
         for m in range(moves.shape[0]):
@@ -129,17 +163,13 @@ def search(
             )
             if there < 0 or closed[there]:
                 continue
-            touches = touching[here]
+            touched = 0
             for step in range(1, 3):  # half a move is less than a cell of the outline's way
                 part = step / 2.0
                 px = x + part * way * math.cos(yaw + part * turn / 2.0)
                 py = y + part * way * math.sin(yaw + part * turn / 2.0)
-                touched = contact(costs, corners, wider, px, py, yaw + part * turn, frame)
-                if touched > touches:
-                    touches = -1
-                    break
-                touches = touched
-            if touches < 0:
+                touched = max(touched, contact(costs, corners, wider, px, py, yaw + part * turn, frame))
+            if touched > most:
                 continue
             nx = x + way * math.cos(yaw + turn / 2.0)
             ny = y + way * math.sin(yaw + turn / 2.0)
@@ -148,11 +178,13 @@ def search(
                 continue
             cost = costs[row, column]
             price = moves[m, 2] * (1.0 + cost_penalty * min(int(cost), 252) / 252.0)
+            if touched:
+                price *= _TIGHT
             if by[here] >= 0 and np.sign(moves[by[here], 0]) != np.sign(way):
                 price += cusp_penalty
             if g[here] + price < g[there]:
                 g[there] = g[here] + price
-                parent[there], by[there], touching[there] = here, m, touches
+                parent[there], by[there] = here, m
                 poses[there, 0], poses[there, 1], poses[there, 2] = nx, ny, yaw + turn
                 away, _ = _away(nx, ny, yaw + turn, targets, near, turned)
                 heapq.heappush(heap, (g[there] + max(away - near, 0.0), there))

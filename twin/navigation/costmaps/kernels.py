@@ -115,6 +115,20 @@ def outline_cost(
 
 
 @jit
+def outlines_hit(
+    costs: Cells, corners: Array, poses: Array, origin_x: float, origin_y: float, resolution: float
+) -> NDArray[np.bool_]:
+    """Return for which poses, shape (n, 3), the outline of a footprint is lethal or off the map."""
+    hit = np.zeros(poses.shape[0], dtype=np.bool_)
+    for i in range(poses.shape[0]):
+        cost = outline_cost(
+            costs, corners, poses[i, 0], poses[i, 1], poses[i, 2], origin_x, origin_y, resolution
+        )
+        hit[i] = cost == 254
+    return hit
+
+
+@jit
 def steps_to_collision(
     costs: Cells,
     corners: Array,

@@ -27,7 +27,7 @@ class GoalAccessConfig:
 
     goal_near: float = 3.0
     """From here on it matters whether the goal is free [m]: what is seen there from afar will have moved."""
-    goal_patience: float = 5.0
+    goal_patience: float = 4.0
     """How long something may be on the goal when the robot is near [s]."""
     goal_surroundings: float = 1.2
     """How far around an occupied goal only what the map shows is planned around [m]."""

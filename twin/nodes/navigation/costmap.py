@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -48,7 +49,8 @@ class CostmapNodeConfig:
     """global_costmap or local_costmap."""
     frame: str
     layers: CostmapConfig
-    scan_topic: str = "scan"
+    scan_topics: tuple[str, ...] = ("scan",)
+    """Topics of sensor_msgs/LaserScan: the obstacle layer's `observation_sources`."""
     range_topics: tuple[str, ...] = ()
     """Topics of sensor_msgs/Range: the range sensor layer."""
     keepout_filter_info_topic: str = ""
@@ -58,6 +60,17 @@ class CostmapNodeConfig:
     speed_limit_topic: str = "speed_limit"
     update_period_ns: int = 200_000_000
     publish_period_ns: int = 1_000_000_000
+
+
+class _ScanSource:
+    """The scans of one lidar."""
+
+    def __init__(self, robot_pose: RobotPose, now_ns: int) -> None:
+        self.watch = ScanInput(robot_pose, now_ns)
+        self.fresh: LaserScan | None = None
+        """One that has come since the last update."""
+        self.last: LaserScan | None = None
+        """The one taken last."""
 
 
 class CostmapNode:
@@ -73,10 +86,7 @@ class CostmapNode:
             warm_up_ranges()
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
-        self._scan: LaserScan | None = None
-        """One that has come since the last update."""
-        self._last_scan: LaserScan | None = None
-        self._input = ScanInput(robot_pose, node.now_ns)
+        self._scans = {topic: _ScanSource(robot_pose, node.now_ns) for topic in config.scan_topics}
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
         own = f"{namespace}/{config.name}"
@@ -86,7 +96,9 @@ class CostmapNode:
         self._known = np.zeros((0, 2))
         on_map = self._on_known_map if config.layers.rolling_window else self._on_map
         node.create_subscription(OccupancyGrid, f"{namespace}/map", on_map, LATCHED)
-        node.create_subscription(LaserScan, f"{namespace}/{config.scan_topic}", self._on_scan, SENSOR_DATA)
+        for topic, source in self._scans.items():
+            on_scan = partial(self._on_scan, source)
+            node.create_subscription(LaserScan, f"{namespace}/{topic}", on_scan, SENSOR_DATA)
         for topic in config.range_topics:
             node.create_subscription(Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA)
         CostmapServices(
@@ -119,7 +131,10 @@ class CostmapNode:
     def fault(self) -> str:
         """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
         tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
-        return self._input.fault(self.node.now_ns, tolerance_ns) if tolerance_ns else ""
+        if not tolerance_ns:
+            return ""
+        faults = (source.watch.fault(self.node.now_ns, tolerance_ns) for source in self._scans.values())
+        return next(filter(None, faults), "")
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
@@ -136,7 +151,7 @@ class CostmapNode:
         self._known = grid.cell_to_world(np.argwhere(grid.data == OCCUPIED)[:, ::-1])
 
     def _after_clearing(self, everything: bool) -> None:
-        """Take the present scan again: what is seen now is there, whatever was to be forgotten.
+        """Take the present scans again: what is seen now is there, whatever was to be forgotten.
 
         Nav2's servers wait for the next scan instead. A local costmap that has forgotten everything is told
         what the map shows, too: a lidar that is blind to the rear would not see it before the robot has
@@ -148,13 +163,14 @@ class CostmapNode:
         T_frame_map = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.map)
         if everything and len(self._known) and T_frame_map is not None:
             layers.mark(T_frame_map.apply(self._known))
-        scan = self._last_scan
-        if scan is not None and self.node.now_ns - ns(scan.header.stamp) <= self.config.update_period_ns:
-            self._take_scan(layers, scan)
+        for source in self._scans.values():
+            scan = source.fresh or source.last
+            if scan is not None and self.node.now_ns - ns(scan.header.stamp) <= self.config.update_period_ns:
+                self._take_scan(layers, scan)
 
-    def _on_scan(self, message: LaserScan) -> None:
-        if self._input.accept(message, self.node.now_ns):
-            self._scan = message
+    def _on_scan(self, source: _ScanSource, message: LaserScan) -> None:
+        if source.watch.accept(message, self.node.now_ns):
+            source.fresh = message
 
     def _update(self) -> None:
         layers = self._layers
@@ -165,9 +181,10 @@ class CostmapNode:
             if robot is None:
                 return
             layers.move_to(robot.x, robot.y)
-        if self._scan is not None:
-            self._last_scan, self._scan = self._scan, None
-            self._take_scan(layers, self._last_scan)
+        for source in self._scans.values():
+            if source.fresh is not None:
+                source.last, source.fresh = source.fresh, None
+                self._take_scan(layers, source.last)
         for message in self._ranges:
             self._take_range(layers, message)
         self._ranges.clear()

@@ -15,12 +15,13 @@ from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.srvs import IsPathValid
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
 from twin.navigation.planning.hybrid import HybridConfig
+from twin.navigation.planning.path_validity import blocked_poses
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
 from twin.navigation.warm_up import warm_up_planning
@@ -102,7 +103,8 @@ class PlannerServerNode:
             goal_access=goal_access or GoalAccessConfig(),
             smoother=smoother or SmootherConfig(),
         )
-        self._access = GoalAccess(footprint=costmap.config.layers.polygon)
+        self._polygon = np.array(costmap.config.layers.polygon, order="C")
+        self._access = GoalAccess(footprint=self._polygon)
         self._apply(parameters)
         declare_config(
             self.node,
@@ -224,16 +226,9 @@ class PlannerServerNode:
         costmap, known = self._costmap.costmap, self._costmap.known
         if not len(path) or costmap is None or known is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
-        away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
-        nearest = int(np.argmin(away))
-        if away[nearest] > self._server.path_distance or self._access.is_lost(
-            Pose2(*path[-1].tolist()), robot, costmap, known
-        ):
+        away = float(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y).min())
+        end = Pose2(*path[-1].tolist())
+        if away > self._server.path_distance or self._access.is_lost(end, robot, costmap, known):
             return new(IsPathValid.Response, is_valid=False)
-        columns, rows = np.floor((path[nearest:, :2] - costmap.origin) / costmap.resolution).astype(int).T
-        height, width = costmap.costs.shape
-        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-        costs = costmap.costs[np.where(inside, rows, 0), np.where(inside, columns, 0)]
-        blocked = ~inside | ((costs >= INSCRIBED_INFLATED_OBSTACLE) & (costs != NO_INFORMATION))
-        indices = (nearest + np.flatnonzero(blocked)).astype(np.int32)
+        indices = blocked_poses(path, robot, costmap, known, self._polygon)
         return new(IsPathValid.Response, is_valid=not indices.size, invalid_pose_indices=indices)
