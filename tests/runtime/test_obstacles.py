@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.geometry import Pose2
-from twin.runtime.obstacles import Walker
+from twin.navigation.costmaps.footprint import rectangle
+from twin.runtime.obstacles import Walker, outline_of
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 from twin.scenario.world import Obstacle
@@ -71,6 +73,18 @@ def test_a_walker_stops_before_a_robot_and_turns_back_when_it_does_not_go_away()
     assert places[45:] == sorted(places[45:], reverse=True), "patience is over"
     near = Walker(WALKER)
     assert near.walk(0.1, [Pose2(-0.5, 0.0, 0.0)]), "who walks away from a robot need not wait"
+
+
+def test_a_walker_does_not_walk_into_a_robots_corner_that_its_base_is_no_nearer_for() -> None:
+    cart = WALKER.model_copy(update={"size": (1.2, 0.4, 1.0)})
+    beside = Pose2(0.55, -0.7, 0.5)  # along its side, but the robot's nose reaches before it
+    outline, (nose,) = outline_of(rectangle(1.2, 0.6)), beside.apply(np.array([[0.6, 0.3]]))
+    assert abs(nose[1]) < 0.2
+    blind, careful = Walker(cart), Walker(cart)
+    for _ in range(60):
+        blind.walk(0.02, [beside])
+        careful.walk(0.02, [beside], [outline])
+    assert blind.pose.x + 0.6 > nose[0] > careful.pose.x + 0.6 + 0.25
 
 
 def test_a_walker_is_seen_by_the_lidar_where_it_walks(

@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import zip_longest
 
 import numpy as np
 
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Array, Pose2, Pose3
 from twin.scenario.world import Obstacle
 from twin.sim.world import World
 
+_GAP = 0.3
+"""Nobody walks nearer to any part of a robot than so [m]."""
+_REACH = 1.0
+"""How much farther than its base a robot is looked at as a whole [m]."""
 _BELOW_M = 20.0
 """An obstacle that is not there waits so far below its place, where no ray and no robot comes."""
 
@@ -30,8 +35,16 @@ def hidden_pose(obstacle: Obstacle) -> Pose3:
 class ObstacleSchedule:
     """Puts obstacles in the robots' way as they drive."""
 
-    def __init__(self, world: World, obstacles: Sequence[Obstacle]) -> None:
+    def __init__(self, world: World, obstacles: Sequence[Obstacle], footprints: Sequence[Array] = ()) -> None:
+        """Take the world's obstacles.
+
+        Args:
+            world: Where they are.
+            obstacles: As the scenario has them.
+            footprints: Of the robots, in the order of `update`, each of shape (n, 2) [m].
+        """
         self._world = world
+        self._outlines = [outline_of(footprint) for footprint in footprints]
         self._waiting = [obstacle for obstacle in obstacles if obstacle.appears_within is not None]
         self._walkers = [Walker(obstacle) for obstacle in obstacles if obstacle.route is not None]
         self._time_ns = world.time_ns
@@ -51,7 +64,7 @@ class ObstacleSchedule:
         elapsed = (self._world.time_ns - self._time_ns) * 1e-9
         self._time_ns = self._world.time_ns
         for walker in self._walkers:
-            if walker.walk(elapsed, bases):
+            if walker.walk(elapsed, bases, self._outlines):
                 self._world.place(walker.obstacle.name, _on_floor(walker.obstacle, walker.pose))
 
 
@@ -75,11 +88,17 @@ class Walker:
         """Where its footprint's centre stands; its heading stays that of its start."""
         return self._at(self._along)
 
-    def walk(self, elapsed: float, bases: Sequence[Pose2]) -> bool:
-        """Walk for `elapsed` [s] unless a robot is in the way; return whether it moved."""
+    def walk(self, elapsed: float, bases: Sequence[Pose2], outlines: Sequence[Array] = ()) -> bool:
+        """Walk for `elapsed` [s] unless a robot is in the way; return whether it moved.
+
+        Args:
+            elapsed: Since the last call [s].
+            bases: The robots' poses.
+            outlines: Points of their outlines in the base frame, each of shape (n, 2) [m].
+        """
         end = self._knots[-1]
         along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
-        if self._is_blocked(along, bases):
+        if self._is_blocked(along, bases, outlines):
             self._waited += elapsed
             if self._waited >= self.obstacle.patience:
                 self._waited, self._direction = 0.0, -self._direction
@@ -91,13 +110,18 @@ class Walker:
             self._direction = 1 if along == 0.0 else -1
         return moved
 
-    def _is_blocked(self, along: float, bases: Sequence[Pose2]) -> bool:
-        """Whether a robot is near, and would be nearer after the step."""
-        there = self._at(along)
-        for base in bases:
+    def _is_blocked(self, along: float, bases: Sequence[Pose2], outlines: Sequence[Array]) -> bool:
+        """Whether a robot is near, and would be nearer after the step: its base, or some corner of it."""
+        here, there = self.pose, self._at(along)
+        for base, outline in zip_longest(bases, outlines):
             then = _distance(self.obstacle, there, base)
-            if then < self.obstacle.yields_within and then < _distance(self.obstacle, self.pose, base):
+            if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
                 return True
+            if outline is not None and then < self.obstacle.yields_within + _REACH:
+                points = base.apply(outline)
+                gap = _gap(self.obstacle, there, points)
+                if gap < _GAP and gap < _gap(self.obstacle, here, points):
+                    return True
         return False
 
     def _at(self, along: float) -> Pose2:
@@ -114,6 +138,23 @@ class Walker:
 
 def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:
     return Pose3.from_pose2(pose, obstacle.size[2] / 2.0)
+
+
+def outline_of(footprint: Array) -> Array:
+    """Return points at most 5 cm apart on the outline of a footprint, shape (n, 2) [m]."""
+    ends = np.roll(footprint, -1, axis=0)
+    pieces = np.maximum(1, np.ceil(np.hypot(*(ends - footprint).T) / 0.05)).astype(int)
+    lines = [
+        a + (b - a) * np.linspace(0, 1, n, endpoint=False)[:, None]
+        for a, b, n in zip(footprint, ends, pieces, strict=True)
+    ]
+    return np.concatenate(lines)
+
+
+def _gap(obstacle: Obstacle, pose: Pose2, points: Array) -> float:
+    """Return how far the nearest of points, shape (n, 2) [m], is from the footprint of an obstacle [m]."""
+    away = np.abs(pose.inverse().apply(points)) - np.array(obstacle.size[:2]) / 2.0
+    return float(np.hypot(*np.maximum(away, 0.0).T).min())
 
 
 def _distance(obstacle: Obstacle, pose: Pose2, base: Pose2) -> float:

@@ -71,7 +71,9 @@ class Run:
         self._substeps = self.tick_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
-        self._obstacles = ObstacleSchedule(self.world, scenario.world.obstacles)
+        self._obstacles = ObstacleSchedule(
+            self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
+        )
         self._faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
