@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
 import socket
 import time
 from collections.abc import Callable
@@ -9,11 +12,17 @@ from collections.abc import Callable
 POLL_S = 0.005
 
 
+_PORTS = itertools.cycle(range(10240 + os.getpid() % 70 * 320, 10240 + (os.getpid() % 70 + 1) * 320))
+"""Below those that the system gives away: between a look and its use nobody else takes one of them."""
+
+
 def free_endpoint(protocol: str = "tcp") -> str:
     """An endpoint on which nobody listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    for port in itertools.islice(_PORTS, 320):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return f"{protocol}/127.0.0.1:{port}"
+    raise OSError("no port is free")
 
 
 def wait_for(condition: Callable[[], object], seconds: float = 20.0) -> None:
