@@ -1,6 +1,6 @@
 """`make soak`: kilometres of random goals among people, with what went wrong and how memory grew.
 
-python -m tests.benchmarks.soak --km 60 --leg-km 5 --workers 2
+python -m tests.benchmarks.soak --km 60 --leg-km 4 --workers 2
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def main() -> int:
     """Drive all legs; 1 if anything was touched, too much recovered, or memory grew."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--km", type=float, default=60.0)
-    parser.add_argument("--leg-km", type=float, default=5.0)
+    parser.add_argument("--leg-km", type=float, default=4.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--first-seed", type=int, default=1)
     options = parser.parse_args()
