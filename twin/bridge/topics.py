@@ -209,7 +209,7 @@ class Subscription(Endpoint, Generic[M]):
             if age_ns > self._lifespan_ns:
                 self.dropped += 1
                 return
-        payload, self._origin = data
+        payload, origin = data
         if self._wanted is not None and not self._wanted(payload):
             return
         if external:
@@ -220,6 +220,7 @@ class Subscription(Endpoint, Generic[M]):
                 return
         else:
             message = self.codec.decode(payload)
+        self._origin = origin
         self._callback(message)
         self._origin = None
 

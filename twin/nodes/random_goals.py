@@ -107,7 +107,8 @@ class RandomGoalsNode(MissionNode):
     def _next(self, robot: Pose2) -> Pose2 | None:
         """Return a goal that was put off, or after such a one a new one."""
         self._returning = bool(self._put_off) and not self._returning
-        return self._put_off.pop(0) if self._returning else self._draw(robot)
+        goal = None if self._returning else self._draw(robot)
+        return self._put_off.pop(0) if goal is None and self._put_off else goal
 
     def _send(self, goal: Pose2) -> None:
         self._place = goal

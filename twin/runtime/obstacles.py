@@ -15,8 +15,6 @@ from twin.sim.world import World
 
 _GAP = 0.3
 """Nobody walks nearer to any part of a robot than so [m]."""
-_REACH = 1.0
-"""How much farther than its base a robot is looked at as a whole [m]."""
 _BELOW_M = 20.0
 """An obstacle that is not there waits so far below its place, where no ray and no robot comes."""
 
@@ -117,7 +115,7 @@ class Walker:
             then = _distance(self.obstacle, there, base)
             if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
                 return True
-            if outline is not None and then < self.obstacle.yields_within + _REACH:
+            if outline is not None and then < np.hypot(outline[:, 0], outline[:, 1]).max() + _GAP:
                 points = base.apply(outline)
                 gap = _gap(self.obstacle, there, points)
                 if gap < _GAP and gap < _gap(self.obstacle, here, points):

@@ -130,8 +130,8 @@ class ServerParameters(ParameterGroup):
     failure_tolerance: Annotated[Seconds, NotNegative] | None = None
     """How long the robot waits for a way to open before following fails [s]."""
     maneuvers: bool | None = None
-    """Whether a robot that has stood blocked for 1.5 s looks for moves to and fro that free it; absent: yes.
-    Otherwise that is left to recoveries."""
+    """Whether a robot that has stood blocked for 1.5 s, if `failure_tolerance` is longer, looks for moves to
+    and fro that free it; absent: yes. Otherwise that is left to recoveries."""
     goal_checker: Literal["simple", "stopped", "position"] | None = None
     """What a goal asks for: position and heading, rest too, or position alone; absent: `simple`."""
     xy_goal_tolerance: Annotated[Metres, Positive] | None = None

@@ -66,7 +66,17 @@ def test_near_to_it_the_hope_ends() -> None:
         opened(access, taken, NEAR, 104.0)
     opened(access, free, NEAR, 106.0)
     opened(access, taken, NEAR, 107.0)  # somebody else
-    opened(access, hall((6.5, 2.0)), NEAR, 112.1, goal=Pose2(6.5, 2.0, 0.0))  # another goal
+    opened(access, hall((6.5, 2.0)), NEAR, 111.5, goal=Pose2(6.5, 2.0, 0.0))  # another goal
+    with pytest.raises(GoalOccupied):
+        opened(access, taken, NEAR, 112.0)  # the one before, of a request that asks for both
+    opened(access, taken, NEAR, 212.0)  # nobody has asked for a while
+
+
+def test_a_goal_beside_somebody_is_tried_after_a_while_if_the_robot_fits() -> None:
+    access, beside = GoalAccess(footprint=LONG), hall((7.0, 2.45))
+    assert opened(access, beside, NEAR, 0.0) is not beside.costmap
+    assert opened(access, beside, NEAR, 4.0) is beside.costmap
+    assert not access.is_lost(GOAL, NEAR, beside.costmap, beside.known)
 
 
 def test_no_patience_with_a_goal_that_the_map_forbids() -> None:

@@ -39,6 +39,18 @@ def test_what_the_map_makes_tight_stays_valid() -> None:
     assert blocked(hall(), Pose2(1.0, 0.45, 0.0), along_the_wall) == []
 
 
+def test_a_wall_that_is_seen_a_cell_off_does_not_block_a_path_along_it() -> None:
+    seen = hall(*[(x, 0.12) for x in np.arange(0.0, 8.0, 0.05)])
+    along_the_wall = DIAGONAL - np.array([0.0, 1.48, 0.0])
+    assert blocked(seen, Pose2(1.0, 0.52, 0.0), along_the_wall) == []
+
+
+def test_without_a_map_only_the_centre_is_looked_at() -> None:
+    layers = hall((3.0, 2.42))
+    indices = blocked_poses(DIAGONAL, Pose2(1.0, 2.0, 0.0), layers.costmap, None, LONG)
+    assert not len(indices)
+
+
 def test_the_map_ends() -> None:
     beyond = PATH + np.array([2.0, 0.0, 0.0])
     assert blocked(hall(), Pose2(3.0, 2.0, 0.0), beyond)[0] == pytest.approx(8.0, abs=0.11)

@@ -23,8 +23,10 @@ from twin.navigation.costmaps.footprint import padded
 
 _BINS = 48
 _TURN = 2.0 * math.pi / _BINS
-_STEP = 0.075
-"""Of a move [m]: so long that it always leaves its cell."""
+_CELL = 0.05
+"""Places that are told apart [m]; those of a coarser costmap are."""
+_STEP = 1.5
+"""Of a move, in such cells: so long that it always leaves its cell, also across the corner."""
 _NEAR, _TURNED = 0.015, 0.03
 """A move is over this near to its end [m], [rad]."""
 _MARGIN = 0.025
@@ -76,6 +78,8 @@ class Move:
     """1 forwards, -1 backwards, 0 a turn in place, of less than half a circle."""
     poses: Array
     """Shape (n, 3), n >= 2: x, y [m], yaw [rad]."""
+    step: float
+    """Between them, if it is no turn [m]."""
 
     def left(self, at: Pose2, nearest: int) -> float:
         """Return what is left of it for a robot at a pose: [m], or signed [rad].
@@ -89,7 +93,7 @@ class Move:
             return wrap_angle(yaw - at.yaw)
         between = len(self.poses) - 1 - nearest
         if between > 1:
-            return between * _STEP
+            return between * self.step
         return self.gear * ((x - at.x) * math.cos(yaw) + (y - at.y) * math.sin(yaw))
 
     def nearest(self, at: Pose2, since: int) -> int:
@@ -121,9 +125,12 @@ def find_maneuver(
     config = config or ManeuverConfig()
     corners = np.array(footprint, dtype=np.float64, order="C")
     targets = _targets(costmap, corners, path, config)
-    side = 2 * math.ceil(config.reach / costmap.resolution) + 1
+    cell = max(_CELL, costmap.resolution)
+    side = 2 * math.ceil(config.reach / cell) + 1
     if not len(targets) or side == 1:
         return []
+    steps = _steps(config, cell)
+    swept = max(_STEP * cell, _TURN * float(np.hypot(corners[:, 0], corners[:, 1]).max()))
     poses, moves = search(
         costmap.costs,
         corners,
@@ -131,15 +138,17 @@ def find_maneuver(
         costmap.frame,
         np.array([start.x, start.y, start.yaw], dtype=np.float64),
         targets,
-        _steps(config),
+        steps,
         side,
+        cell,
         _BINS,
-        1.5 * costmap.resolution,
+        math.ceil(swept / costmap.resolution),
+        1.5 * cell,
         1.5 * _TURN,
         config.cost_penalty,
         config.cusp_penalty,
     )
-    return _moves_of(poses, np.sign(_steps(config)[moves[1:], 0]).astype(int).tolist())
+    return _moves_of(poses, np.sign(steps[moves[1:], 0]).astype(int).tolist(), _STEP * cell)
 
 
 @dataclass(kw_only=True)
@@ -154,7 +163,9 @@ class Maneuver:
         self._nearest = 0
         """The pose of the first move that the robot has come to."""
         self._most = 0
-        """How much the footprint may touch: no more than at the beginning."""
+        """How much the footprint may touch: hardly more than at the beginning, nothing once it is free."""
+        self.speed_limit: float | None = None
+        """[m/s]"""
 
     @property
     def active(self) -> bool:
@@ -185,6 +196,9 @@ class Maneuver:
             costmap: Around the robot.
             dt: Control period [s].
         """
+        pose = float(at.x), float(at.y), float(at.yaw)
+        if not contact(costmap.costs, self.footprint, self.footprint, *pose, costmap.frame):
+            self._most = 0
         while self._moves:
             move = self._moves[0]
             self._nearest = move.nearest(at, self._nearest) if move.gear else 0
@@ -219,7 +233,8 @@ class Maneuver:
         else:
             x, y = local[ahead].tolist()
         config = self.config
-        speed = min(config.speed, math.sqrt(2.0 * config.acceleration * left))
+        most = config.speed if self.speed_limit is None else min(config.speed, self.speed_limit)
+        speed = min(most, math.sqrt(2.0 * config.acceleration * left))
         speed = move.gear * min(speed, max(move.gear * velocity[0], 0.0) + config.acceleration * dt)
         curvature = 2.0 * y / max(x * x + y * y, 1e-6)
         bound = config.turn_speed / max(abs(speed), 1e-6)
@@ -236,22 +251,23 @@ class Maneuver:
         )
 
 
-def _moves_of(poses: Array, gears: list[int]) -> list[Move]:
+def _moves_of(poses: Array, gears: list[int], step: float) -> list[Move]:
     """Cut a way where the gear changes, and turns of half a circle so that they tell the way round."""
     moves, at = [], 0
     for gear, group in itertools.groupby(gears):
         left = len(list(group))
         while left:
             count = left if gear else min(left, _BINS // 3)
-            moves.append(Move(gear, poses[at : at + count + 1]))
+            moves.append(Move(gear, poses[at : at + count + 1], step))
             at, left = at + count, left - count
     return moves
 
 
-def _steps(config: ManeuverConfig) -> Array:
+def _steps(config: ManeuverConfig, cell: float) -> Array:
     """Return way [m], turn [rad] and price [m] of each, shape (8, 3)."""
-    arcs = [(_STEP, turn, _STEP) for turn in (0.0, _TURN, -_TURN)]
-    back = [(-_STEP, turn, _STEP * config.reverse_penalty) for turn in (0.0, _TURN, -_TURN)]
+    step = _STEP * cell
+    arcs = [(step, turn, step) for turn in (0.0, _TURN, -_TURN)]
+    back = [(-step, turn, step * config.reverse_penalty) for turn in (0.0, _TURN, -_TURN)]
     turns = [(0.0, turn, config.turn_price * _TURN) for turn in (_TURN, -_TURN)]
     return np.array([*arcs, *back, *turns])
 

@@ -102,7 +102,9 @@ def search(
     targets: Array,
     moves: Array,
     side: int,
+    cell: float,
     bins: int,
+    parts: int,
     near: float,
     turned: float,
     cost_penalty: float,
@@ -111,7 +113,8 @@ def search(
     """Return the poses of the cheapest way to a target, shape (n, 3), and by which move each was reached.
 
     Empty if there is none. Its poses are free, with room for the wider footprint unless that is a long way.
-    From a start that touches something a way may lead on as long as it touches hardly more.
+    From a start that touches something a way may lead on as long as it touches hardly more, and nothing once
+    it is free.
 
     Args:
         costs: The grid.
@@ -122,7 +125,9 @@ def search(
         targets: Shape (m, 3).
         moves: Way [m] (negative: backwards), turn [rad] and price of each, shape (k, 3).
         side: Cells per side of the square about the start that is searched.
+        cell: Its edge [m].
         bins: Headings.
+        parts: How often each move is looked at.
         near: Within so much of a target's position it is reached [m] ...
         turned: ... and of its heading [rad].
         cost_penalty: A metre at cost 252 counts as 1 + cost_penalty.
@@ -134,10 +139,11 @@ def search(
     by = np.full(states, -1, dtype=np.int64)
     poses = np.zeros((states, 3))
     closed = np.zeros(states, dtype=np.bool_)
-    first = _bin(start[0], start[1], start[2], start, frame[2], side, bins)
+    bound = np.full(states, 1, dtype=np.int64)  # what the next pose may touch
+    first = _bin(start[0], start[1], start[2], start, cell, side, bins)
     g[first] = 0.0
     poses[first, 0], poses[first, 1], poses[first, 2] = start[0], start[1], start[2]
-    most = most_contact(contact(costs, corners, wider, start[0], start[1], start[2], frame))
+    bound[first] = most_contact(contact(costs, corners, wider, start[0], start[1], start[2], frame))
     heap = [(0.0, first)]
     last = -1
     while len(heap) > 0:
@@ -157,19 +163,21 @@ def search(
                 y + way * math.sin(yaw + turn / 2.0),
                 yaw + turn,
                 start,
-                frame[2],
+                cell,
                 side,
                 bins,
             )
             if there < 0 or closed[there]:
                 continue
             touched = 0
-            for step in range(1, 3):  # half a move is less than a cell of the outline's way
-                part = step / 2.0
+            last_touched = 0
+            for step in range(1, parts + 1):
+                part = step / parts
                 px = x + part * way * math.cos(yaw + part * turn / 2.0)
                 py = y + part * way * math.sin(yaw + part * turn / 2.0)
-                touched = max(touched, contact(costs, corners, wider, px, py, yaw + part * turn, frame))
-            if touched > most:
+                last_touched = contact(costs, corners, wider, px, py, yaw + part * turn, frame)
+                touched = max(touched, last_touched)
+            if touched > bound[here]:
                 continue
             nx = x + way * math.cos(yaw + turn / 2.0)
             ny = y + way * math.sin(yaw + turn / 2.0)
@@ -185,6 +193,7 @@ def search(
             if g[here] + price < g[there]:
                 g[there] = g[here] + price
                 parent[there], by[there] = here, m
+                bound[there] = bound[here] if last_touched > 1 else 1
                 poses[there, 0], poses[there, 1], poses[there, 2] = nx, ny, yaw + turn
                 away, _ = _away(nx, ny, yaw + turn, targets, near, turned)
                 heapq.heappush(heap, (g[there] + max(away - near, 0.0), there))

@@ -20,6 +20,9 @@ from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import footprint_hits
 from twin.navigation.failures import GoalOccupied
 
+_STALE_S = 3.0
+"""A goal that nobody has asked for, longer than patience by so much, is another one when it comes again."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GoalAccessConfig:
@@ -39,6 +42,7 @@ class GoalAccess:
 
     The planners ask whether the centre of the robot may be at the goal. A robot that is longer than wide
     needs more room, and beside somebody enough to turn; to find that out on the spot takes many recoveries.
+    Where it fits, but could hardly turn, it is waited for room, and then tried.
     """
 
     footprint: ArrayLike
@@ -48,36 +52,37 @@ class GoalAccess:
     def __post_init__(self) -> None:
         self._corners = np.array(self.footprint, dtype=np.float64, order="C")
         self._turning_radius = radii(self._corners)[1]
-        self._goal: Pose2 | None = None
-        self._occupied_ns: int | None = None
+        self._asked: dict[Pose2, tuple[int, int]] = {}
+        """For occupied goals near the robot: since when they are, and when they were asked for last [ns]."""
 
-    def open_to(self, goal: Pose2, start: Pose2, costmap: Costmap, known: Costmap, now_ns: int) -> Costmap:
+    def open_to(self, goal: Pose2, robot: Pose2, costmap: Costmap, known: Costmap, now_ns: int) -> Costmap:
         """Return the costmap to plan on: the given one, or without what is seen around an occupied goal.
 
         Args:
             goal: Where to.
-            start: Where the robot is.
+            robot: Where the robot is.
             costmap: As it is now.
             known: What the map and the masks alone say.
             now_ns: The time.
 
         Raises:
-            GoalOccupied: something has been seen on the goal for too long, the robot being near.
+            GoalOccupied: the robot is near, and what is seen has left it no room at the goal for too long.
         """
-        if goal != self._goal:
-            self._goal, self._occupied_ns = goal, None
-        if (
-            not np.isfinite(goal).all()
-            or not costmap.contains(goal.x, goal.y)
-            or not self._is_occupied(costmap, known, goal)
-        ):
-            self._occupied_ns = None
+        self._forget(now_ns)
+        inside = bool(np.isfinite(goal).all()) and costmap.contains(goal.x, goal.y)
+        if not inside or not self._is_free(known, goal):
+            return costmap  # the planner says what is wrong with it
+        free = self._is_free(costmap, goal)
+        if free and not self._is_crowded(costmap, known, goal):
+            self._asked.pop(goal, None)
             return costmap
-        if start.distance(goal) < self.config.goal_near:
-            if self._occupied_ns is None:
-                self._occupied_ns = now_ns
-            waited = (now_ns - self._occupied_ns) * 1e-9
+        if robot.distance(goal) < self.config.goal_near:
+            since, _ = self._asked.get(goal, (now_ns, now_ns))
+            self._asked[goal] = since, now_ns
+            waited = (now_ns - since) * 1e-9
             if waited >= self.config.goal_patience:
+                if free:
+                    return costmap
                 raise GoalOccupied(
                     f"something has stood at the goal ({goal.x:.2f}, {goal.y:.2f}) for {waited:.0f} s"
                 )
@@ -85,12 +90,16 @@ class GoalAccess:
 
     def is_lost(self, end: Pose2, robot: Pose2, costmap: Costmap, known: Costmap) -> bool:
         """Whether the robot is near the end of its path, and what is seen there leaves it no room."""
-        return robot.distance(end) < self.config.goal_near and self._is_occupied(costmap, known, end)
+        near = robot.distance(end) < self.config.goal_near
+        return near and not self._is_free(costmap, end) and self._is_free(known, end)
 
-    def _is_occupied(self, costmap: Costmap, known: Costmap, goal: Pose2) -> bool:
-        """Whether what is seen, and not on the map, leaves no room to stand or turn at the goal."""
-        if not self._is_free(known, goal):
-            return False
+    def _forget(self, now_ns: int) -> None:
+        """Begin anew with goals that nobody has asked for lately."""
+        stale_ns = round((self.config.goal_patience + _STALE_S) * 1e9)
+        self._asked = {goal: times for goal, times in self._asked.items() if now_ns - times[1] < stale_ns}
+
+    def _is_crowded(self, costmap: Costmap, known: Costmap, goal: Pose2) -> bool:
+        """Whether somebody who is seen, and not on the map, is too near for the robot to turn there."""
         around = self._around(costmap, goal, self._turning_radius)
         # A wall is seen a cell beside where the map has it.
         seen = (costmap.costs[around] == LETHAL_OBSTACLE) & (
@@ -99,8 +108,7 @@ class GoalAccess:
         rows, columns = np.nonzero(seen)
         corner = np.array([around[1].start, around[0].start])
         away = costmap.cell_to_world(np.column_stack([columns, rows]) + corner) - goal[:2]
-        near = np.hypot(away[:, 0], away[:, 1]) < self._turning_radius
-        return bool(near.any()) or not self._is_free(costmap, goal)
+        return bool((np.hypot(away[:, 0], away[:, 1]) < self._turning_radius).any())
 
     def _is_free(self, costmap: Costmap, pose: Pose2) -> bool:
         cost = costmap.cost_at(pose.x, pose.y)

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import (
+    FREE_SPACE,
+    INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
+    NO_INFORMATION,
+    Costmap,
+)
 from twin.navigation.costmaps.kernels import outlines_hit
 
 _NEAR = 3.0
@@ -14,7 +20,7 @@ _NEAR = 3.0
 
 
 def blocked_poses(
-    path: Array, robot: Pose2, costmap: Costmap, known: Costmap, footprint: Array
+    path: Array, robot: Pose2, costmap: Costmap, known: Costmap | None, footprint: Array
 ) -> NDArray[np.int32]:
     """Return the indices of the poses at which a robot, from the nearest one on, cannot be.
 
@@ -27,7 +33,7 @@ def blocked_poses(
         path: Shape (n, 3), n >= 1.
         robot: Where it is now.
         costmap: As it is now.
-        known: What the map and the masks alone say.
+        known: What the map and the masks alone say; None: there is no map, the outline is not looked at.
         footprint: Shape (m, 2) [m].
     """
     away = np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y)
@@ -38,10 +44,17 @@ def blocked_poses(
     inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
     costs = costmap.costs[np.where(inside, rows, 0), np.where(inside, columns, 0)]
     blocked = ~inside | ((costs >= INSCRIBED_INFLATED_OBSTACLE) & (costs != NO_INFORMATION))
-    # Where the robot stands it is turned otherwise than its path, perhaps.
-    reach = float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
-    near = (away[nearest:] < _NEAR) & (away[nearest:] > reach) & (costs > 0)
-    seen = outlines_hit(costmap.costs, footprint, ahead[near], *costmap.frame)
-    mapped = outlines_hit(known.costs, footprint, ahead[near], *known.frame)
-    blocked[near] |= seen & ~mapped
+    if known is not None:
+        # Where the robot stands it is turned otherwise than its path, perhaps.
+        reach = float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
+        near = (away[nearest:] < _NEAR) & (away[nearest:] > reach)
+        seen = outlines_hit(_unmapped(costmap, known), footprint, ahead[near], *costmap.frame)
+        blocked[near] |= seen & ~outlines_hit(known.costs, footprint, ahead[near], *known.frame)
     return (nearest + np.flatnonzero(blocked)).astype(np.int32)
+
+
+def _unmapped(costmap: Costmap, known: Costmap) -> NDArray[np.uint8]:
+    """Return the costs without what the map has, which is seen a cell beside it."""
+    costs = costmap.costs.copy()
+    costs[(costs == LETHAL_OBSTACLE) & (known.costs >= INSCRIBED_INFLATED_OBSTACLE)] = FREE_SPACE
+    return costs

@@ -169,6 +169,9 @@ class ControllerServerNode:
         for controller in self.controllers.values():
             absolute = controller.max_speed * limit / 100.0 if message.percentage else limit
             controller.set_speed_limit(absolute if limit > 0.0 else None)
+        fraction = self._maneuver.config.speed * limit / 100.0
+        slower = fraction if message.percentage else limit
+        self._maneuver.speed_limit = slower if limit > 0.0 else None
 
     # The action
 
@@ -178,6 +181,8 @@ class ControllerServerNode:
             task = self._task(handle.request)
             due = self.node.now_ns
             while True:
+                if handle.is_cancel_requested:
+                    self._maneuver.drop()
                 if handle.is_cancel_requested and task.controller.cancel():
                     handle.canceled()
                     finished = stop = True
@@ -213,6 +218,8 @@ class ControllerServerNode:
         handler.accept(path)
         controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
         before = self._preempted
+        if before is not None and not np.array_equal(before.path[-1], path[-1]):
+            self._maneuver.drop()  # it leads to another goal
         self._preempted = task = _Task(
             path=path,
             controller=controller,

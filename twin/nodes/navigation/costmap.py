@@ -124,8 +124,8 @@ class CostmapNode:
 
     @property
     def known(self) -> Costmap | None:
-        """What the map and the masks alone say; None until the map is there."""
-        return self._layers.known if self._layers else None
+        """What the map and the masks alone say; None until the map is there, and for a rolling window."""
+        return self._layers.known if self._layers and not self.config.layers.rolling_window else None
 
     @property
     def fault(self) -> str:
@@ -151,7 +151,7 @@ class CostmapNode:
         self._known = grid.cell_to_world(np.argwhere(grid.data == OCCUPIED)[:, ::-1])
 
     def _after_clearing(self, everything: bool) -> None:
-        """Take the present scans again: what is seen now is there, whatever was to be forgotten.
+        """Take scans of the last period again: what is seen now is there, whatever was to be forgotten.
 
         Nav2's servers wait for the next scan instead. A local costmap that has forgotten everything is told
         what the map shows, too: a lidar that is blind to the rear would not see it before the robot has
@@ -175,10 +175,12 @@ class CostmapNode:
     def _update(self) -> None:
         layers = self._layers
         if layers is None:
+            self._ranges.clear()
             return
         robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
         if self.config.layers.rolling_window:
             if robot is None:
+                self._ranges.clear()
                 return
             layers.move_to(robot.x, robot.y)
         for source in self._scans.values():

@@ -194,9 +194,12 @@ class PlannerServerNode:
 
     def _open_costmap(self, start: Pose2, goal: Pose2) -> Costmap:
         costmap, known = self._costmap.costmap, self._costmap.known
-        if costmap is None or known is None:
+        if costmap is None:
             raise NoPose("no plan without map")
-        return self._access.open_to(goal, start, costmap, known, self.node.now_ns)
+        if known is None:
+            return costmap
+        robot = self._robot_pose.in_map() or start
+        return self._access.open_to(goal, robot, costmap, known, self.node.now_ns)
 
     def _start(self, request: Any) -> Pose2:
         if request.use_start:
@@ -224,11 +227,12 @@ class PlannerServerNode:
         """Answer whether the rest of a path, from the pose nearest to the robot on, is free."""
         path, robot = path_array(request.path), self._robot_pose.in_map()
         costmap, known = self._costmap.costmap, self._costmap.known
-        if not len(path) or costmap is None or known is None or robot is None:
+        if not len(path) or costmap is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
         away = float(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y).min())
         end = Pose2(*path[-1].tolist())
-        if away > self._server.path_distance or self._access.is_lost(end, robot, costmap, known):
+        lost = known is not None and self._access.is_lost(end, robot, costmap, known)
+        if lost or away > self._server.path_distance:
             return new(IsPathValid.Response, is_valid=False)
         indices = blocked_poses(path, robot, costmap, known, self._polygon)
         return new(IsPathValid.Response, is_valid=not indices.size, invalid_pose_indices=indices)
