@@ -11,7 +11,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.geometry import Pose2
 from twin.navigation.costmaps.footprint import rectangle
-from twin.runtime.obstacles import Walker, outline_of
+from twin.runtime.obstacles import Outline, Walker
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 from twin.scenario.world import Obstacle
@@ -78,7 +78,7 @@ def test_a_walker_stops_before_a_robot_and_turns_back_when_it_does_not_go_away()
 def test_a_walker_does_not_walk_into_a_robots_corner_that_its_base_is_no_nearer_for() -> None:
     cart = WALKER.model_copy(update={"size": (1.2, 0.4, 1.0)})
     beside = Pose2(0.55, -0.7, 0.5)  # along its side, but the robot's nose reaches before it
-    outline, (nose,) = outline_of(rectangle(1.2, 0.6)), beside.apply(np.array([[0.6, 0.3]]))
+    outline, (nose,) = Outline.of(rectangle(1.2, 0.6)), beside.apply(np.array([[0.6, 0.3]]))
     assert abs(nose[1]) < 0.2
     blind, careful = Walker(cart), Walker(cart)
     for _ in range(60):

@@ -6,10 +6,13 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, Pose3
+from twin.navigation.costmaps.footprint import radii
+from twin.navigation.planning.planner import filled
 from twin.scenario.world import Obstacle
 from twin.sim.world import World
 
@@ -42,7 +45,7 @@ class ObstacleSchedule:
             footprints: Of the robots, in the order of `update`, each of shape (n, 2) [m].
         """
         self._world = world
-        self._outlines = [outline_of(footprint) for footprint in footprints]
+        self._outlines = [Outline.of(footprint) for footprint in footprints]
         self._waiting = [obstacle for obstacle in obstacles if obstacle.appears_within is not None]
         self._walkers = [Walker(obstacle) for obstacle in obstacles if obstacle.route is not None]
         self._time_ns = world.time_ns
@@ -66,6 +69,20 @@ class ObstacleSchedule:
                 self._world.place(walker.obstacle.name, _on_floor(walker.obstacle, walker.pose))
 
 
+class Outline(NamedTuple):
+    """A robot's outline on the floor."""
+
+    points: Array
+    """At most 5 cm apart, in the base frame, shape (n, 2) [m]."""
+    reach: float
+    """Of the farthest from the base [m]."""
+
+    @classmethod
+    def of(cls, footprint: Array) -> Outline:
+        """Return that of a footprint, shape (n, 2) [m]."""
+        return cls(filled(np.vstack([footprint, footprint[:1]]), 0.05), radii(footprint)[1])
+
+
 class Walker:
     """Somebody who walks along a route and back, and gives way to robots as people do."""
 
@@ -86,13 +103,13 @@ class Walker:
         """Where its footprint's centre stands; its heading stays that of its start."""
         return self._at(self._along)
 
-    def walk(self, elapsed: float, bases: Sequence[Pose2], outlines: Sequence[Array] = ()) -> bool:
+    def walk(self, elapsed: float, bases: Sequence[Pose2], outlines: Sequence[Outline] = ()) -> bool:
         """Walk for `elapsed` [s] unless a robot is in the way; return whether it moved.
 
         Args:
             elapsed: Since the last call [s].
             bases: The robots' poses.
-            outlines: Points of their outlines in the base frame, each of shape (n, 2) [m].
+            outlines: Theirs, in the same order.
         """
         end = self._knots[-1]
         along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
@@ -108,15 +125,15 @@ class Walker:
             self._direction = 1 if along == 0.0 else -1
         return moved
 
-    def _is_blocked(self, along: float, bases: Sequence[Pose2], outlines: Sequence[Array]) -> bool:
+    def _is_blocked(self, along: float, bases: Sequence[Pose2], outlines: Sequence[Outline]) -> bool:
         """Whether a robot is near, and would be nearer after the step: its base, or some corner of it."""
         here, there = self.pose, self._at(along)
         for base, outline in zip_longest(bases, outlines):
             then = _distance(self.obstacle, there, base)
             if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
                 return True
-            if outline is not None and then < np.hypot(outline[:, 0], outline[:, 1]).max() + _GAP:
-                points = base.apply(outline)
+            if outline is not None and then < outline.reach + _GAP:
+                points = base.apply(outline.points)
                 gap = _gap(self.obstacle, there, points)
                 if gap < _GAP and gap < _gap(self.obstacle, here, points):
                     return True
@@ -136,17 +153,6 @@ class Walker:
 
 def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:
     return Pose3.from_pose2(pose, obstacle.size[2] / 2.0)
-
-
-def outline_of(footprint: Array) -> Array:
-    """Return points at most 5 cm apart on the outline of a footprint, shape (n, 2) [m]."""
-    ends = np.roll(footprint, -1, axis=0)
-    pieces = np.maximum(1, np.ceil(np.hypot(*(ends - footprint).T) / 0.05)).astype(int)
-    lines = [
-        a + (b - a) * np.linspace(0, 1, n, endpoint=False)[:, None]
-        for a, b, n in zip(footprint, ends, pieces, strict=True)
-    ]
-    return np.concatenate(lines)
 
 
 def _gap(obstacle: Obstacle, pose: Pose2, points: Array) -> float:

@@ -88,8 +88,7 @@ def _run_worker(request: Mapping[str, object], source: Path, time_limit_s: float
             )
         except subprocess.TimeoutExpired:
             raise _endless(f"{time_limit_s:g} s", source) from None
-        if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-            # The hard limit kills as one that is out of memory is killed.
+        if done.returncode == -signal.SIGXCPU:
             raise _endless(f"{CPU_SECONDS} s of computing", source)
         if done.returncode != 0:
             last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]

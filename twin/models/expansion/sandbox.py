@@ -44,7 +44,8 @@ def limit_resources() -> None:
     for kind, most in limits.items():
         # Not every system knows every limit, and the user's own may be lower.
         with contextlib.suppress(OSError, ValueError):
-            resource.setrlimit(kind, (most, most))
+            # At the hard limit of time a process is killed without a reason: it comes a second later.
+            resource.setrlimit(kind, (most, most + 1 if kind == resource.RLIMIT_CPU else most))
 
 
 def refuse_outside(name: str, packages: Packages) -> None:

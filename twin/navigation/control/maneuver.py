@@ -175,7 +175,7 @@ class Maneuver:
     def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
         """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
         pose = float(at.x), float(at.y), float(at.yaw)
-        touched = contact(costmap.costs, self.footprint, self.footprint, *pose, costmap.frame)
+        touched = contact(costmap.costs, self.footprint, *pose, costmap.frame)
         # A way along a thing is never driven exactly.
         self._most, self._nearest = most_contact(most_contact(touched)), 0
         self._moves = find_maneuver(costmap, self.footprint, at, path, self.config)
@@ -197,7 +197,7 @@ class Maneuver:
             dt: Control period [s].
         """
         pose = float(at.x), float(at.y), float(at.yaw)
-        if not contact(costmap.costs, self.footprint, self.footprint, *pose, costmap.frame):
+        if not contact(costmap.costs, self.footprint, *pose, costmap.frame):
             self._most = 0
         while self._moves:
             move = self._moves[0]
@@ -281,6 +281,6 @@ def _targets(costmap: Costmap, corners: Array, path: Array, config: ManeuverConf
     for x, y, yaw in path[wanted]:
         column, row = costmap.world_to_cell(x, y)
         inside = 0 <= column < width and 0 <= row < height
-        if inside and not contact(costmap.costs, corners, corners, x, y, yaw, costmap.frame):
+        if inside and not contact(costmap.costs, corners, x, y, yaw, costmap.frame):
             free.append((x, y, yaw))
     return np.array(free).reshape(-1, 3)

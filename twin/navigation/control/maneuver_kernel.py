@@ -21,6 +21,16 @@ _TIGHT = 5.0
 
 @jit
 def contact(
+    costs: Cells, corners: Array, x: float, y: float, yaw: float, frame: tuple[float, float, float]
+) -> int:
+    """Return 0 if a pose is free, else how much it touches: 2 at least."""
+    if outline_cost(costs, corners, x, y, yaw, *frame) != 254:
+        return 0
+    return 2 + footprint_hits(costs, corners, x, y, yaw, *frame)
+
+
+@jit
+def _tightness(
     costs: Cells,
     corners: Array,
     wider: Array,
@@ -29,10 +39,31 @@ def contact(
     yaw: float,
     frame: tuple[float, float, float],
 ) -> int:
-    """Return 0 if a pose is free, 1 if only the wider footprint touches something, else more: how much."""
-    if outline_cost(costs, corners, x, y, yaw, *frame) == 254:
-        return 2 + footprint_hits(costs, corners, x, y, yaw, *frame)
-    return int(outline_cost(costs, wider, x, y, yaw, *frame) == 254)
+    """Return `contact`, but 1 for a free pose at which the wider footprint touches something."""
+    touched = contact(costs, corners, x, y, yaw, frame)
+    return touched if touched else int(outline_cost(costs, wider, x, y, yaw, *frame) == 254)
+
+
+@jit
+def _swept(
+    costs: Cells,
+    corners: Array,
+    wider: Array,
+    at: Array,
+    way: float,
+    turn: float,
+    parts: int,
+    frame: tuple[float, float, float],
+) -> tuple[int, int]:
+    """Return the most that a move from a pose touches, and what it touches at its end."""
+    most = last = 0
+    for step in range(1, parts + 1):
+        part = step / parts
+        heading = at[2] + part * turn / 2.0
+        x, y = at[0] + part * way * math.cos(heading), at[1] + part * way * math.sin(heading)
+        last = _tightness(costs, corners, wider, x, y, at[2] + part * turn, frame)
+        most = max(most, last)
+    return most, last
 
 
 @jit
@@ -62,7 +93,7 @@ def keeps_clear(
         x += command[0] * dt * math.cos(yaw)
         y += command[0] * dt * math.sin(yaw)
         yaw += command[1] * dt / 2.0
-        if contact(costs, corners, corners, x, y, yaw, frame) > most:
+        if contact(costs, corners, x, y, yaw, frame) > most:
             return False
     return True
 
@@ -143,7 +174,7 @@ def search(
     first = _bin(start[0], start[1], start[2], start, cell, side, bins)
     g[first] = 0.0
     poses[first, 0], poses[first, 1], poses[first, 2] = start[0], start[1], start[2]
-    bound[first] = most_contact(contact(costs, corners, wider, start[0], start[1], start[2], frame))
+    bound[first] = most_contact(contact(costs, corners, start[0], start[1], start[2], frame))
     heap = [(0.0, first)]
     last = -1
     while len(heap) > 0:
@@ -153,34 +184,18 @@ def search(
         closed[here] = True
         x, y, yaw = poses[here, 0], poses[here, 1], poses[here, 2]
         _, reached = _away(x, y, yaw, targets, near, turned)
-        if reached and here != first and contact(costs, corners, wider, x, y, yaw, frame) < 2:
+        if reached and here != first and not contact(costs, corners, x, y, yaw, frame):
             last = here
             break
         for m in range(moves.shape[0]):
             way, turn = moves[m, 0], moves[m, 1]
-            there = _bin(
-                x + way * math.cos(yaw + turn / 2.0),
-                y + way * math.sin(yaw + turn / 2.0),
-                yaw + turn,
-                start,
-                cell,
-                side,
-                bins,
-            )
+            nx, ny = x + way * math.cos(yaw + turn / 2.0), y + way * math.sin(yaw + turn / 2.0)
+            there = _bin(nx, ny, yaw + turn, start, cell, side, bins)
             if there < 0 or closed[there]:
                 continue
-            touched = 0
-            last_touched = 0
-            for step in range(1, parts + 1):
-                part = step / parts
-                px = x + part * way * math.cos(yaw + part * turn / 2.0)
-                py = y + part * way * math.sin(yaw + part * turn / 2.0)
-                last_touched = contact(costs, corners, wider, px, py, yaw + part * turn, frame)
-                touched = max(touched, last_touched)
+            touched, last_touched = _swept(costs, corners, wider, poses[here], way, turn, parts, frame)
             if touched > bound[here]:
                 continue
-            nx = x + way * math.cos(yaw + turn / 2.0)
-            ny = y + way * math.sin(yaw + turn / 2.0)
             row, column = math.floor((ny - frame[1]) / frame[2]), math.floor((nx - frame[0]) / frame[2])
             if row < 0 or column < 0 or row >= costs.shape[0] or column >= costs.shape[1]:
                 continue
