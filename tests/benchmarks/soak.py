@@ -30,6 +30,7 @@ class Leg:
     real_time_factor: float
     early_mb: float
     late_mb: float
+    digest: str
     reasons: tuple[str, ...]
 
 
@@ -62,12 +63,13 @@ def drive(seed: int, km: float) -> Leg:
         real_time_factor=verdict.metrics["real_time_factor"],
         early_mb=memory[len(memory) // 10],
         late_mb=memory[-1],
+        digest=(verdict.digest or "")[:12],
         reasons=tuple(check.reason for check in verdict.checks if not check.passed),
     )
 
 
 def main() -> int:
-    """Drive all legs; 1 if anything was touched, too much recovered, or memory grew."""
+    """Drive all legs; 1 if anything was touched, too much recovered, a way not driven, or memory grew."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--km", type=float, default=60.0)
     parser.add_argument("--leg-km", type=float, default=4.0)
@@ -76,7 +78,7 @@ def main() -> int:
     options = parser.parse_args()
     legs: list[Leg] = []
     seeds = range(options.first_seed, options.first_seed + round(options.km / options.leg_km))
-    print("seed     km  hours  recoveries  collision  localisation  real time  memory")
+    print("seed     km  hours  recoveries  collision  localisation  real time  memory  digest")
     with ProcessPoolExecutor(options.workers) as pool:
         for future in as_completed([pool.submit(drive, seed, options.leg_km) for seed in seeds]):
             leg = future.result()
@@ -84,7 +86,7 @@ def main() -> int:
             print(
                 f"{leg.seed:4d} {leg.km:6.2f} {leg.hours:6.2f} {leg.recoveries:11d} {leg.collision_N:8.0f} N "
                 f"{leg.localisation_mm:10.1f} mm {leg.real_time_factor:9.1f}x {leg.early_mb:5.0f} -> "
-                f"{leg.late_mb:.0f} MB  {'; '.join(leg.reasons)}",
+                f"{leg.late_mb:.0f} MB  {leg.digest}  {'; '.join(leg.reasons)}",
                 flush=True,
             )
     km, recoveries = sum(leg.km for leg in legs), sum(leg.recoveries for leg in legs)
@@ -95,7 +97,10 @@ def main() -> int:
         f"{km:.1f} km in {hours:.1f} h: {recoveries / km:.2f} recoveries/km, {collisions} legs with a "
         f"collision, memory grew by {growth:.0f} MB at most"
     )
-    return int(recoveries / km > MAX_RECOVERIES_PER_KM or collisions > 0 or growth > MAX_GROWTH_MB)
+    whole = km > 0.99 * len(legs) * options.leg_km
+    return int(
+        not whole or recoveries / km > MAX_RECOVERIES_PER_KM or collisions > 0 or growth > MAX_GROWTH_MB
+    )
 
 
 if __name__ == "__main__":
