@@ -15,6 +15,7 @@ from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.docking.docks import Dock
 from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
@@ -292,8 +293,8 @@ def test_the_files_collision_monitor_unless_the_scenario_has_one(tmp_path: Path)
     assert slow.points[2] == (-0.4, 0.0)
     own = CollisionMonitorParameters()
     assert monitor_with_file(NavigationConfig(params_file=file, collision_monitor=own), "") is own
-    wrong = _file(tmp_path, MORE.replace("action_type: stop, radius: 0.3", "action_type: stopp"))
-    with pytest.raises(NavigationError, match="collision_monitor: Input should be 'stop'"):
+    wrong = _file(tmp_path, MORE.replace("stop, radius: 0.3", "stopp, radius: 0.3"))
+    with pytest.raises(NavigationError, match=r"collision_monitor: Round\.action_type must be 'stop'"):
         monitor_with_file(NavigationConfig(params_file=wrong), "")
 
 
@@ -305,3 +306,177 @@ def test_one_file_for_every_robot_that_navigates(tmp_path: Path) -> None:
     assert "charger" in navigation.docking.docks
     with pytest.raises(ScenarioError, match="no robot of 'r2d2_circle' has it"):
         load(ROOT / "scenarios" / "r2d2_circle.yaml").with_params_file(tmp_path / "nav2.yaml")
+
+
+# what a user's own file may have
+
+
+def _said(tmp_path: Path, text: str) -> list[str]:
+    with pytest.raises(NavigationError) as caught:
+        applied(tmp_path, text)
+    return [problem.message for problem in caught.value.problems]
+
+
+def test_names_of_nav2_that_look_like_mistakes_are_none(tmp_path: Path) -> None:
+    text = """\
+docking_server:
+  ros__parameters:
+    dock_plugins: [simple_charging_dock]
+    simple_charging_dock:
+      plugin: opennav_docking::SimpleChargingDock
+      external_detection_rotation_pitch: 1.57
+      external_detection_rotation_roll: -1.57
+planner_server:
+  ros__parameters:
+    GridBased: {plugin: nav2_smac_planner::SmacPlannerHybrid, analytic_expansion_max_cost: 200.0}
+"""
+    told = applied(tmp_path, text)[1]
+    assert told == [
+        "nav2.yaml: planner_server does not have GridBased.analytic_expansion_max_cost",
+        "nav2.yaml: docking_server does not have simple_charging_dock.external_detection_rotation_pitch, "
+        "simple_charging_dock.external_detection_rotation_roll",
+    ]
+
+
+def _costmap(tmp_path: Path, text: str, config: dict[str, object] | None = None) -> CostmapNodeConfig:
+    got, _ = applied(
+        tmp_path,
+        f"local_costmap: {{local_costmap: {{ros__parameters: {{{text}}}}}}}",
+        {"local_costmap": config or {}},
+    )
+    return got.local_costmap
+
+
+def test_outlines_as_nav2_writes_them(tmp_path: Path) -> None:
+    corners = "footprint: '[[0.4, 0.2], [0.4, -0.2], [-0.3, 0]]'"
+    expected = ((0.4, 0.2), (0.4, -0.2), (-0.3, 0.0))
+    assert _costmap(tmp_path, corners).layers.footprint == expected
+    assert _costmap(tmp_path, f"{corners}, robot_radius: 0.5").layers.footprint == expected, "as in Nav2"
+    round_ = _costmap(tmp_path, "robot_radius: 0.5, footprint: '[]'").layers
+    assert round_.inscribed_radius == pytest.approx(0.5, rel=0.02), "not the model's footprint"
+    own = _costmap(tmp_path, "robot_radius: 0.5", {"robot_radius": "0.2 m"}).layers
+    assert own.inscribed_radius == pytest.approx(0.2, rel=0.02)
+    text = "local_costmap: {local_costmap: {ros__parameters: {footprint: '[[1, 2]]'}}}"
+    assert _said(tmp_path, text) == ["local_costmap/local_costmap: footprint must be a list, not '[[1, 2]]'"]
+
+
+def test_layers_have_what_is_theirs_whatever_they_are_called(tmp_path: Path) -> None:
+    voxels = "plugin: 'nav2_costmap_2d::VoxelLayer', mark_threshold: 0, obstacle_max_range: 1.5"
+    got = _costmap(tmp_path, f"front: {{{voxels}}}")
+    assert got.layers.obstacle_max_range == 1.5
+    assert got.layers.range_sensor_layer.mark_threshold == 0.8, "voxels' is another thing"
+    sonar = "plugin: 'nav2_costmap_2d::RangeSensorLayer', mark_threshold: 0.7, topics: [/sonar, /sonar_2]"
+    got = _costmap(tmp_path, f"sonar: {{{sonar}}}")
+    assert got.layers.range_sensor_layer.mark_threshold == 0.7
+    assert got.range_topics == ("sonar", "sonar_2")
+
+
+def test_sources_of_a_costmap(tmp_path: Path) -> None:
+    layer = """layer: {plugin: 'nav2_costmap_2d::ObstacleLayer', observation_sources: front rear cloud,
+        front: {topic: /front/scan, data_type: LaserScan}, rear: {data_type: LaserScan},
+        cloud: {topic: /points}}"""
+    assert _costmap(tmp_path, layer).scan_topics == ("front/scan", "rear")
+    assert _costmap(tmp_path, layer, {"scan_topics": ["mine"]}).scan_topics == ("mine",)
+    assert _costmap(tmp_path, f"plugins: [other], {layer}").scan_topics == ("scan",), (
+        "Nav2 reads no such layer"
+    )
+    told = applied(tmp_path, f"local_costmap: {{local_costmap: {{ros__parameters: {{{layer}}}}}}}")[1]
+    assert told == ["nav2.yaml: local_costmap/local_costmap does not have layer.cloud.topic"]
+
+
+def test_values_that_cannot_be(tmp_path: Path) -> None:
+    text = """\
+controller_server:
+  ros__parameters:
+    failure_tolerance: -1.0
+    FollowPath:
+      plugin: nav2_mppi_controller::MPPIController
+      motion_model: Omni
+      critics: [ConstraintCritic, CostCritc, MyCritic]
+      CostCritic: {cost_weight: -3.0}
+planner_server:
+  ros__parameters:
+    GridBased:
+      plugin: nav2_smac_planner::SmacPlannerHybrid
+      motion_model_for_search: LATTICE
+      minimum_turning_radius: 0.0
+      max_iterations: -1
+velocity_smoother:
+  ros__parameters:
+    max_velocity: ["fast", "slow", "slow"]
+"""
+    assert _said(tmp_path, text) == [
+        "planner_server: GridBased.motion_model_for_search must be 'DUBIN' or 'REEDS_SHEPP', not 'LATTICE'",
+        "planner_server: GridBased.minimum_turning_radius must be greater than 0, not 0.0",
+        "controller_server: FollowPath.motion_model must be 'DiffDrive' or 'Ackermann', not 'Omni'",
+        "controller_server: FollowPath.CostCritic.cost_weight must be greater than or equal to 0, not -3.0",
+        "controller_server has no critic 'CostCritc'; did you mean 'CostCritic'?",
+    ]
+
+
+def test_names_of_other_releases(tmp_path: Path) -> None:
+    text = """\
+controller_server:
+  ros__parameters:
+    progress_checker_plugin: moves
+    moves: {plugin: nav2_controller::PoseProgressChecker, required_movement_angle: 0.2}
+    goal_checker_plugins: [rests]
+    rests: {plugin: nav2_controller::StoppedGoalChecker, trans_stopped_velocity: 0.1}
+    FollowPath:
+      plugin: nav2_mppi_controller::MPPIController
+      motion_model: ackermann
+      AckermannConstraints: {min_turning_r: 0.7}
+planner_server:
+  ros__parameters:
+    GridBased: {plugin: nav2_navfn_planner/NavfnPlanner}
+"""
+    got, told = applied(tmp_path, text)
+    assert told == []
+    assert type(got.planner).__name__ == "PlannerConfig"
+    assert (_controller(got).motion_model, _controller(got).min_turning_r) == ("Ackermann", 0.7)
+    assert got.controller_server.progress_checkers["progress_checker"].required_movement_angle == 0.2
+    assert got.controller_server.goal_checkers["general_goal_checker"].trans_stopped_velocity == 0.1
+
+
+def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
+    file = _file(tmp_path, "amcl: {ros__parameters: {min_particles: 3000, max_particles: 5000}}")
+    amcl, _ = amcl_with_file(AmclConfig(), frozenset(), file, "")
+    assert (amcl.filter.min_particles, amcl.filter.max_particles) == (3000, 5000)
+    file = _file(tmp_path, "amcl: {ros__parameters: {min_particles: 5000}}")
+    with pytest.raises(NavigationError, match=r"yaml:1: amcl: min_particles is 5000, more than"):
+        amcl_with_file(AmclConfig(), frozenset(), file, "")
+
+
+def test_a_monitors_sources_and_what_it_lacks(tmp_path: Path) -> None:
+    text = """\
+collision_monitor:
+  ros__parameters:
+    polygons: [Stop, Turning]
+    Stop: {type: polygon, action_type: stop, points: "[[0.4, 0.3], [0.4, -0.3], [-0.4, 0.0]]", visualize: 1}
+    Turning: {type: velocity_polygon, action_type: stop, velocity_polygons: [slow]}
+    NotListed: {type: circle, action_type: stop, radius: 1.0}
+    observation_sources: [front, sonar, cloud]
+    front: {type: scan, topic: /front/scan}
+    sonar: {type: range, topic: /sonar}
+    cloud: {type: pointcloud, topic: /points}
+"""
+    monitor = monitor_with_file(NavigationConfig(params_file=_file(tmp_path, text)), "")
+    assert monitor.polygons is not None
+    assert [polygon.name for polygon in monitor.polygons] == ["Stop"], "no footprint in place of Turning"
+    assert (monitor.scan_topics, monitor.range_topics) == (("front/scan",), ("sonar",))
+    assert applied(tmp_path, text)[1] == [
+        "nav2.yaml: collision_monitor does not have Stop.visualize, Turning.type, Turning.action_type, "
+        "Turning.velocity_polygons, cloud.type, cloud.topic"
+    ]
+    wrong = text.replace("Stop: {type", "Stop: {slowdown_ration: 0.4, type").replace("-0.4, 0.0]]", "-0.4]]")
+    assert _said(tmp_path, wrong) == [
+        "collision_monitor has no parameter Stop.slowdown_ration; did you mean 'slowdown_ratio'?",
+        "collision_monitor: Stop.points must be corners '[[x, y], ...]', "
+        "not '[[0.4, 0.3], [0.4, -0.3], [-0.4]]'",
+    ]
+    for circle, said in (
+        ("Stop: {type: circle, action_type: stop}", "Stop.type is circle, which needs a radius"),
+        ("Stop: {type: circle, action_type: stop, radius: wide}", "Stop.radius must be a number, not 'wide'"),
+    ):
+        one = f"collision_monitor: {{ros__parameters: {{polygons: [Stop], {circle}}}}}"
+        assert _said(tmp_path, one) == [f"collision_monitor: {said}"]

@@ -141,16 +141,19 @@ def overlay(
     """
     found = {unit.name: (path, unit, value) for path, unit, value in _fields(config, names)}
     refused: dict[str, str] = {}
-    for name, value in values.items():
-        if name not in found:
-            continue
-        path, unit, old = found[name]
-        try:
-            following = _with(config, path, unit.read(_as(value, unit.tell(old))))
-        except (ValueError, ZeroDivisionError) as error:
-            refused[name] = str(error) if isinstance(error, ValueError) else "must be more than zero"
-        else:
-            config = following
+    left = {name: value for name, value in values.items() if name in found}
+    while left:
+        refused = {}
+        for name, value in left.items():
+            path, unit, old = found[name]
+            try:
+                config = _with(config, path, unit.read(_as(value, unit.tell(old))))
+            except (ValueError, ZeroDivisionError) as error:
+                refused[name] = str(error) if isinstance(error, ValueError) else "must be more than zero"
+        if len(refused) == len(left):
+            break
+        # Some are valid only with others: a least number that is above the old greatest one.
+        left = {name: left[name] for name in refused}
     return config, refused
 
 
@@ -165,6 +168,8 @@ def _as(value: Any, old: Any) -> Any:
         return float(value)
     if isinstance(old, list) and isinstance(value, list) and value:
         return [_as(item, old[0]) for item in value]
+    if isinstance(old, tuple) and isinstance(value, list):
+        return tuple(_as(item, old[0]) for item in value)
     if type(value) is not type(old):
         meant = {
             bool: "true or false",
@@ -172,6 +177,7 @@ def _as(value: Any, old: Any) -> Any:
             float: "a number",
             str: "a text",
             list: "a list",
+            tuple: "a list",
         }
         raise ValueError(f"must be {meant[type(old)]}, not {value!r}")
     return value

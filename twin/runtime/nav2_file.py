@@ -6,48 +6,44 @@ import difflib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import yaml
+from pydantic import BaseModel
 
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
 from twin.nodes.node_parameters import overlay, parameter_names
+from twin.runtime.nav2_checks import why_not, wrong_critics
+from twin.runtime.nav2_names import (
+    LISTS,
+    Value,
+    by_axis,
+    class_of,
+    converted,
+    flat,
+    is_same,
+    local_name,
+    renamed,
+)
 
 C = TypeVar("C")
 
-PLANNERS = {
-    "NavfnPlanner": "grid_based",
-    "SmacPlanner2D": "grid_based",
-    "ThetaStarPlanner": "theta_star",
-    "SmacPlannerHybrid": "smac_hybrid",
-}
-"""Nav2's plugin -> the scenario's name of what does the same here."""
 _TYPO = 0.85
 """As similar as this to a name that the node has, an unknown name is a mistake; else it is Nav2's alone."""
-_ONLY_NAV2S = ("critics", "transform_tolerance")
+_ONLY_NAV2S = (
+    "analytic_expansion_max_cost",
+    "critics",
+    "external_detection_rotation_pitch",
+    "external_detection_rotation_roll",
+    "fine_xy_goal_tolerance",
+    "max_angular_decel",
+    "max_angular_vel",
+    "max_linear_accel",
+    "transform_tolerance",
+    "yaw_goal_tolerance",
+)
 """Names of Nav2 that only look like mistakes."""
-_LISTS = ("plugins", "plugin", "docks")
-"""What these name has sections of its own."""
-_DOCKS = ("SimpleChargingDock", "SimpleNonChargingDock")
-_LAYERS = ("static_layer", "obstacle_layer", "voxel_layer", "inflation_layer", "stvl_layer", "range_layer")
-_BEHAVIORS = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
-_SECTIONS = {
-    "controller_plugins": "FollowPath",
-    "planner_plugins": "GridBased",
-    "goal_checker_plugins": "general_goal_checker",
-    "progress_checker_plugins": "progress_checker",
-}
-"""List of plugins -> what the section of the first one is called here."""
-
-
-class _Value(NamedTuple):
-    value: Any
-    said: str
-    """Its name in the file."""
-    line: int | None
-    is_general: bool
-    """Whether it is for whichever node has it, as what is under a pattern is."""
 
 
 class Nav2Parameters:
@@ -72,6 +68,7 @@ class Nav2Parameters:
         self._problems: list[Problem] = []
         self._ignored: dict[str, list[str]] = {}
         self._nodes: set[str] = set()
+        self._understood: set[tuple[str, str]] = set()
 
     def applied(
         self,
@@ -81,6 +78,7 @@ class Nav2Parameters:
         *,
         prefix: str = "",
         keep: frozenset[str] = frozenset(),
+        limits: type[BaseModel] | None = None,
     ) -> C:
         """Return a node's config with the file's values.
 
@@ -90,6 +88,7 @@ class Nav2Parameters:
             names: Field -> parameter, as for `declare_config`.
             prefix: Of all parameters of this config, such as 'GridBased.'.
             keep: Parameters, without their sections, that the scenario gives: they stay.
+            limits: What a scenario may give of them.
         """
         self._nodes.add(node)
         values = self._values(node, config, names or {}, prefix)
@@ -100,23 +99,45 @@ class Nav2Parameters:
             if name in known and not keep & {name, *name.split(".")}
         }
         config, refused = overlay(config, taken, names or {})
+        if limits is not None:
+            impossible = {name: why_not(limits, local_name(name), value) for name, value in taken.items()}
+            refused = {**{name: why for name, why in impossible.items() if why}, **refused}
         for name, why in refused.items():
             entry = values[prefix + name]
-            self._problems.append(Problem(f"{node}: {entry.said} {why}", self.path, entry.line))
-        for name, entry in values.items():
-            if name not in known and not entry.is_general and name != "use_sim_time":
-                self._unknown(node, name, entry, known)
+            said = why if why.startswith(f"{node}: ") else f"{node}: {entry.said} {why}"
+            self._problems.append(Problem(said, self.path, entry.line))
+        self._check_critics(node, values, known)
+        self._tell(node, values, known)
         return config
 
     def plugin(self, node: str, section: str, key: str = "plugin") -> str:
         """Return the class of a plugin, without its package; '' if the file does not tell."""
-        entry = _renamed(self._said(node)).get(f"{section}.{key}")
-        return "" if entry is None else str(entry.value).rpartition("::")[2]
+        entry = renamed(self._said(node)).get(f"{section}.{key}")
+        return "" if entry is None else class_of(entry.value)
+
+    def is_round(self, node: str) -> bool:
+        """Whether a costmap of the file has a radius, and no polygon that would go before it."""
+        said = converted(self._said(node))
+        return "robot_radius" in said and "footprint" not in said
 
     def values(self, node: str) -> dict[str, Any]:
         """Return all that the file says of a node, by the names that it uses."""
         self._nodes.add(node)
         return {name: entry.value for name, entry in self._said(node).items() if not entry.is_general}
+
+    def relative(self, topic: str) -> str:
+        """Return a topic's name in the robot's namespace."""
+        for before in (f"{self._namespace}/", "<robot_namespace>/", "/"):
+            topic = topic.removeprefix(before)
+        return topic
+
+    def understood(self, node: str, *names: str) -> None:
+        """Note parameters that were read by `values`: nothing needs to be told of them."""
+        self._understood.update((node, name) for name in names)
+
+    def others(self, node: str, known: tuple[str, ...]) -> None:
+        """Tell what the file says of a node beside what is known."""
+        self._tell(node, self._said(node), known)
 
     def wrong(self, node: str, name: str, why: str) -> None:
         """Note that a value cannot be."""
@@ -154,46 +175,63 @@ class Nav2Parameters:
     def _without_namespace(self, name: str) -> str:
         return name.removeprefix(self._namespace.strip("/") + "/") if self._namespace else name
 
-    def _values(self, node: str, config: Any, names: Mapping[str, str], prefix: str) -> dict[str, _Value]:
+    def _values(self, node: str, config: Any, names: Mapping[str, str], prefix: str) -> dict[str, Value]:
         """Return the node's values by the names that this config has for them."""
-        renamed = _by_axis(_renamed(self._said(node)))
+        values = converted(by_axis(renamed(self._said(node))))
         known = tuple(prefix + name for name in parameter_names(config, names))
         if "costmap" in node or node == "behavior_server":
-            renamed = {_flat(name, known): entry for name, entry in renamed.items()}
-        foreign = [name.removesuffix("plugin") for name in renamed if name.endswith(".plugin")]
-        return self._without_foreign(node, renamed, config, names, prefix, foreign)
+            values = flat(values, known)
+        foreign = [name.removesuffix("plugin") for name in values if name.endswith(".plugin")]
+        return self._without_foreign(node, values, config, names, prefix, foreign)
 
-    def _said(self, node: str) -> dict[str, _Value]:
+    def _said(self, node: str) -> dict[str, Value]:
         """Return what the file says of a node."""
-        found: dict[str, _Value] = {}
+        found: dict[str, Value] = {}
         for full in dict.fromkeys((f"/{node}", f"{self._namespace}/{node}")):
             for section in sorted(self._sections, key=lambda section: not section.is_pattern):
                 if section.matches(full):
                     for said, value in section.values.items():
                         line = self._lines.get((section.node, said))
-                        found[said] = _Value(value, said, line, section.is_pattern)
+                        found[said] = Value(value, said, line, section.is_pattern)
         return found
 
     def _without_foreign(
         self,
         node: str,
-        values: dict[str, _Value],
+        values: dict[str, Value],
         config: Any,
         names: Mapping[str, str],
         prefix: str,
         sections: list[str],
-    ) -> dict[str, _Value]:
+    ) -> dict[str, Value]:
         """Leave out sections of plugins that are others than those here, and the lists of plugins."""
         classes = {prefix: config} if prefix else dict(_plugins(config, names))
-        out = {name: entry for name, entry in values.items() if not name.endswith(_LISTS)}
+        out = {name: entry for name, entry in values.items() if not name.endswith(LISTS)}
         for section in sections:
             own, plugin = classes.get(section), str(values[section + "plugin"].value)
-            if own is not None and not _is_same(plugin, own):
+            if own is not None and not is_same(plugin, own):
                 self._ignored.setdefault(node, []).append(f"{plugin} ({section}*)")
                 out = {name: entry for name, entry in out.items() if not name.startswith(section)}
         return out
 
-    def _unknown(self, node: str, name: str, entry: _Value, known: tuple[str, ...]) -> None:
+    def _check_critics(self, node: str, values: Mapping[str, Value], known: tuple[str, ...]) -> None:
+        for name, entry in values.items():
+            section = name.removesuffix("critics")
+            if name not in known or section == name or not isinstance(entry.value, list):
+                continue
+            there = {other.removeprefix(section).partition(".")[0] for other in known if "." in other}
+            mistakes, absent = wrong_critics(entry.value, sorted({*there, "Oscillation"}))
+            self._problems += [Problem(f"{node} {said}", self.path, entry.line) for said in mistakes]
+            for critic in absent:
+                self._ignored.setdefault(node, []).append(f"the critic {critic}")
+
+    def _tell(self, node: str, values: Mapping[str, Value], known: tuple[str, ...]) -> None:
+        for name, entry in values.items():
+            is_read = name in (*known, "use_sim_time") or (node, entry.said) in self._understood
+            if not is_read and not entry.is_general:
+                self._unknown(node, name, entry, known)
+
+    def _unknown(self, node: str, name: str, entry: Value, known: tuple[str, ...]) -> None:
         section, _, last = name.rpartition(".")
         beside = [other.rpartition(".")[2] for other in known if other.rpartition(".")[0] == section]
         close = difflib.get_close_matches(last, beside, n=1, cutoff=_TYPO)
@@ -211,63 +249,6 @@ def _plugins(config: Any, names: Mapping[str, str]) -> Iterator[tuple[str, Any]]
         value = getattr(config, field.name)
         inside = value.items() if isinstance(value, Mapping) else [(names.get(field.name, field.name), value)]
         yield from ((f"{name}.", inner) for name, inner in inside if is_dataclass(inner))
-
-
-def _renamed(values: dict[str, _Value]) -> dict[str, _Value]:
-    """Give the sections of the first plugins the names that they have here."""
-    new_names = {
-        f"{values[key].value[0]}.": f"{name}."
-        for key, name in _SECTIONS.items()
-        if key in values and isinstance(values[key].value, list) and values[key].value
-    }
-
-    def renamed(name: str) -> str:
-        for old, new in new_names.items():
-            if name.startswith(old):
-                return new + name.removeprefix(old)
-        return name
-
-    out = {renamed(name): entry for name, entry in values.items()}
-    if "error_code_names" in out and isinstance(out["error_code_names"].value, list):
-        entry = out.pop("error_code_names")
-        prefixes = [str(name).removesuffix("_error_code") for name in entry.value]
-        out["error_code_name_prefixes"] = entry._replace(value=prefixes)
-    return out
-
-
-def _by_axis(values: dict[str, _Value]) -> dict[str, _Value]:
-    """Return the smoother's parameters with its lists [x, y, yaw] taken apart, as they are declared here."""
-    out = dict(values)
-    for said, name in (
-        ("max_velocity", "max_velocity"),
-        ("max_accel", "max_acceleration"),
-        ("max_decel", "max_deceleration"),
-    ):
-        entry = out.get(said)
-        if entry is None or not isinstance(entry.value, list) or len(entry.value) != 3:
-            continue
-        x, _, yaw = out.pop(said).value
-        out[f"linear.{name}"] = entry._replace(value=abs(x))
-        out[f"angular.{name}"] = entry._replace(value=abs(yaw))
-    return out
-
-
-def _flat(name: str, known: tuple[str, ...]) -> str:
-    """Return a layer's or behaviour's parameter by its last part: here they share one set."""
-    layer, last = name.partition(".")[0], name.rpartition(".")[2]
-    if layer not in _LAYERS + _BEHAVIORS:
-        return name
-    return next((other for other in known if other.rpartition(".")[2] == last), name)
-
-
-def _is_same(plugin: str, config: Any) -> bool:
-    """Whether a plugin is of a config's kind, as RegulatedPurePursuitController is."""
-    kind = type(config).__name__.removesuffix("Config").casefold()
-    name = plugin.rpartition("::")[2]
-    if kind == "docktype":
-        return name in _DOCKS
-    same = PLANNERS.get(name, "").replace("_", "").replace("smac", "")
-    return kind in name.casefold() or kind in ("planner", same)
 
 
 def _lines(path: Path) -> dict[tuple[str, str], int]:

@@ -1,21 +1,13 @@
-"""What Nav2's parameter files name in lists: docks with their types, polygons of the collision monitor."""
+"""What Nav2's parameter files name in lists: docks with their types, sources of costmaps."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
 
-import yaml
-from pydantic import ValidationError
-
-from twin.errors import NavigationError, Problem
 from twin.geometry import Pose2
 from twin.navigation.docking.docks import Dock, DockDatabase, DockType
 from twin.runtime.nav2_file import Nav2Parameters
-from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonConfig
-
-_CIRCLE_CORNERS = 16
+from twin.runtime.nav2_names import class_of
 
 
 def database_of(file: Nav2Parameters, own: DockDatabase) -> DockDatabase:
@@ -54,41 +46,29 @@ def _dock_type(plugin: str) -> DockType:
     )
 
 
-def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
-    """Return the file's collision monitor; None if it has none.
-
-    Raises:
-        NavigationError: a polygon that cannot be.
-    """
-    values = file.values("collision_monitor")
-    if not values.get("polygons"):
-        return None
-    try:
-        names = [name for name in values["polygons"] if values.get(f"{name}.enabled", True)]
-        polygons = tuple(_polygon(name, values) for name in names)
-        timeout = values.get("source_timeout", 2.0)
-        return CollisionMonitorParameters(polygons=polygons, source_timeout=timeout)
-    except (ValidationError, yaml.YAMLError, TypeError) as error:
-        said = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
-        raise NavigationError([Problem(f"collision_monitor: {said}", file.path)]) from error
+def sources_of(file: Nav2Parameters, node: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the topics of scans and of ranges that a costmap's layers take; empty if the file tells none."""
+    values = file.values(node)
+    scans, ranges = list[str](), list[str]()
+    for name, value in values.items():
+        layer, _, last = name.rpartition(".")
+        if values.get(f"{layer}.enabled") is False or layer not in values.get("plugins", layer):
+            continue
+        if last == "observation_sources":
+            found = _lasers(file, node, layer, value.split() if isinstance(value, str) else value)
+            scans += [topic for topic in found if topic not in scans]
+        elif last == "topics" and class_of(values.get(f"{layer}.plugin", "")) == "RangeSensorLayer":
+            file.understood(node, name)
+            ranges += [file.relative(str(topic)) for topic in value]
+    return tuple(scans), tuple(ranges)
 
 
-def _polygon(name: str, values: Mapping[str, Any]) -> MonitorPolygonConfig:
-    inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
-    given = {key: inside[key] for key in MonitorPolygonConfig.model_fields if key in inside}
-    points = inside.get("points", [])
-    points = yaml.safe_load(points) if isinstance(points, str) else points
-    if points and not isinstance(points[0], list | tuple):  # Nav2 until Iron: x, y, x, y, …
-        points = list(zip(points[::2], points[1::2], strict=True))
-    if inside.get("type") == "circle":
-        points = _circle(float(inside.get("radius", 0.0)))
-    if "max_points" in inside:
-        given["min_points"] = inside["max_points"] + 1
-    return MonitorPolygonConfig.model_validate({**given, "name": name, "points": points})
-
-
-def _circle(radius: float) -> list[tuple[float, float]]:
-    """Return a polygon around a circle [m]."""
-    reach = radius / math.cos(math.pi / _CIRCLE_CORNERS)
-    angles = [2.0 * math.pi * i / _CIRCLE_CORNERS for i in range(_CIRCLE_CORNERS)]
-    return [(reach * math.cos(angle), reach * math.sin(angle)) for angle in angles]
+def _lasers(file: Nav2Parameters, node: str, layer: str, sources: Sequence[str]) -> list[str]:
+    """Return the topics of those sources of a layer that are laser scans (Nav2's default: point clouds)."""
+    values, found = file.values(node), []
+    for source in sources:
+        topic, type_ = (f"{layer}.{source}.{key}" for key in ("topic", "data_type"))
+        if values.get(type_) == "LaserScan":
+            found.append(file.relative(str(values.get(topic, source))))
+            file.understood(node, f"{layer}.observation_sources", topic, type_)
+    return found

@@ -9,12 +9,16 @@ from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNodeConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import NAMES as DOCKING_NAMES
-from twin.runtime.nav2_file import PLANNERS, Nav2Parameters
-from twin.runtime.nav2_lists import database_of, monitor_of
+from twin.runtime.nav2_file import Nav2Parameters
+from twin.runtime.nav2_lists import database_of, sources_of
+from twin.runtime.nav2_monitor import monitor_of
+from twin.runtime.nav2_names import PLANNERS
 from twin.runtime.navigation_config import NavigationParameters
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.navigation import NavigationConfig
+from twin.scenario.controllers import ControllerParameters
+from twin.scenario.navigation import CostmapParameters, NavigationConfig
 from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.planners import PlannerParameters
 
 _CONTROLLER_NAMES = dict.fromkeys(
     ("controllers", "goal_checkers", "progress_checkers", "primary_controller"), ""
@@ -26,12 +30,20 @@ _CONTROLLERS = {
 }
 
 
+_GOAL_CHECKERS = {
+    "SimpleGoalChecker": "simple",
+    "StoppedGoalChecker": "stopped",
+    "PositionGoalChecker": "position",
+}
+_PROGRESS_CHECKERS = {"SimpleProgressChecker": "simple", "PoseProgressChecker": "pose"}
+_PLUGINS = frozenset({"goal_checker", "plugin", "progress_checker", "rotation_shim"})
+"""What a scenario chooses; the chosen ones' parameters may come from the file."""
 _DOCKS = frozenset({"docks", "pose", "type", "frame"})
 """Of a dock: these are read together."""
 
 
 def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
-    """Return a scenario's navigation with the file's controller and planner, unless it names its own.
+    """Return a scenario's navigation with the file's plugins, unless it names its own.
 
     Raises:
         NavigationError: the file is no parameter file.
@@ -48,6 +60,13 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
     if update["plugin"] and not {"plugin", "rotation_shim"} & controller.model_fields_set:
         controller = controller.model_copy(update=update)
+    for key, section, classes in (
+        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
+        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS),
+    ):
+        chosen = classes.get(file.plugin("controller_server", section), "")
+        if chosen and key not in controller.model_fields_set:
+            controller = controller.model_copy(update={key: chosen})
     found = PLANNERS.get(file.plugin("planner_server", "GridBased"))
     if found and "plugin" not in planner.model_fields_set:
         planner = planner.model_copy(update={"plugin": found})
@@ -124,13 +143,18 @@ def with_file(
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
         planner=file.applied(
-            "planner_server", parameters.planner, prefix="GridBased.", keep=_given(config.planner)
+            "planner_server",
+            parameters.planner,
+            prefix="GridBased.",
+            keep=_given(config.planner),
+            limits=PlannerParameters,
         ),
         controller_server=file.applied(
             "controller_server",
             parameters.controller_server,
             _CONTROLLER_NAMES,
-            keep=_given(config.controller),
+            keep=_given(config.controller) - _PLUGINS,
+            limits=ControllerParameters,
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
         docking=file.applied("docking_server", docking, DOCKING_NAMES, keep=_given(config.docking) | _DOCKS),
@@ -138,6 +162,8 @@ def with_file(
         navigator=file.applied("bt_navigator", parameters.navigator, keep=_given(config.navigator)),
         waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
+    if config.collision_monitor is None:
+        monitor_of(file)
     return changed, file.finish(elsewhere=("amcl", "collision_monitor"))
 
 
@@ -147,4 +173,14 @@ def _given(group: ParameterGroup) -> frozenset[str]:
 
 
 def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: ParameterGroup) -> CostmapNodeConfig:
-    return file.applied(f"{config.name}/{config.name}", config, {"layers": ""}, keep=_given(group))
+    node, keep = f"{config.name}/{config.name}", _given(group)
+    scans, ranges = sources_of(file, node)
+    config = replace(
+        config,
+        scan_topics=scans if scans and "scan_topics" not in keep else config.scan_topics,
+        range_topics=ranges if ranges and "range_topics" not in keep else config.range_topics,
+    )
+    changed = file.applied(node, config, {"layers": ""}, keep=keep, limits=CostmapParameters)
+    if file.is_round(node) and "robot_radius" not in keep:
+        changed = replace(changed, layers=replace(changed.layers, footprint=()))
+    return changed
