@@ -20,8 +20,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-MANY, SHOWN = 100, 20
+MANY, SHOWN = 30, 20
 """Of more names than this in a message only so many are told."""
+ALIKE = 5
+"""Or, where one was meant, so many that are like it."""
 COMPARED = 200
 """Up to so many names, the nearest one is looked for."""
 
@@ -114,18 +116,22 @@ class BenchmarkError(TwinError):
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """Return the tail of an error message that lists valid names, the nearest one first.
+    """Return the tail of an error message that lists valid names, of many only those nearest to a word.
 
     >>> nearest("lidr", ["imu", "lidar"])
     "did you mean 'lidar'? Valid: imu, lidar"
+    >>> nearest("rang_7", [f"range_{i}" for i in range(100)])
+    "did you mean 'range_7'? Valid: range_7, range_97, range_87, range_79, range_78, and 95 more"
     """
     import difflib
 
     names = sorted(valid)
     # Comparing very many names takes long, as a file may name as many unknown ones.
     likely = names if len(names) <= COMPARED else [name for name in names if name.lower() == word.lower()]
-    close = difflib.get_close_matches(word, likely, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(word, likely, n=ALIKE, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
+    if close and len(names) > MANY:
+        return f"{hint}Valid: {', '.join(close)}, and {len(names) - len(close)} more"
     return f"{hint}Valid: {shortened(names)}"
 
 

@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.errors import ScenarioError
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
@@ -12,7 +15,10 @@ from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
 from twin.scenario.navigation import NavigationConfig
+from twin.scenario.schema import load
 from twin.strict_yaml import Faults
+
+ROOT = Path(__file__).parents[2]
 
 LIMITS = VelocitySmootherConfig(
     linear=AxisLimits(max_velocity=0.8, max_acceleration=0.7, max_deceleration=1.1),
@@ -57,15 +63,30 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
     [
         (
             {"plugin": "mppi", "desired_linear_vel": 0.5},
-            "'desired_linear_vel' is of another plugin, not of mppi",
+            "'desired_linear_vel' is not of mppi with rotation shim; "
+            "valid with `plugin: regulated_pure_pursuit`",
         ),
-        ({"vx_max": 0.5}, "not of regulated_pure_pursuit without rotation shim"),
-        ({"angular_dist_threshold": 0.5}, "'angular_dist_threshold' is of the rotation shim"),
+        ({"vx_max": 0.5}, "not of regulated_pure_pursuit without rotation shim; valid with `plugin: mppi`"),
+        ({"angular_dist_threshold": 0.5}, "valid with `rotation_shim: true`"),
     ],
 )
 def test_a_key_of_another_plugin_is_refused(keys: dict[str, object], told: str) -> None:
     with pytest.raises(ValidationError, match=told):
         ControllerParameters.model_validate(keys)
+
+
+def test_an_unknown_key_is_told_with_the_few_that_it_may_mean(tmp_path: Path) -> None:
+    text = (ROOT / "scenarios" / "warehouse_patrol.yaml").read_text("utf-8")
+    file = tmp_path / "demo.yaml"
+    file.write_text(
+        text.replace("navigation: {}", "navigation: {controller: {desired_linear_velocity: 1.0}}")
+    )
+    with pytest.raises(ScenarioError) as caught:
+        load(file)
+    said = caught.value.problems[0].message
+    assert "did you mean 'desired_linear_vel'? Valid: desired_linear_vel, " in said
+    assert said.count(",") <= 6
+    assert said.endswith(" more")
 
 
 def test_more_controllers_are_there_by_id_with_a_goal_checker_each() -> None:
@@ -88,7 +109,10 @@ def test_more_controllers_are_there_by_id_with_a_goal_checker_each() -> None:
         ({"FollowPath": {}}, "is what `controller` describes"),
         ({"a b": {}}, "pattern"),
         ({"Slow": {"controller_frequency": 10.0}}, "give it under `controller`"),
-        ({"Slow": {"plugin": "dwb", "vx_max": 0.1}}, "of another plugin"),
+        (
+            {"Slow": {"plugin": "dwb", "vx_max": 0.1}},
+            "'vx_max' is not of dwb with rotation shim; valid with `plugin: mppi`",
+        ),
     ],
 )
 def test_ids_and_keys_of_more_controllers_are_checked(controllers: object, told: str) -> None:

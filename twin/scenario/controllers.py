@@ -6,12 +6,11 @@ plugin does not have is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from twin.errors import nearest
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.predictive_controllers import DWBParameters, MPPIParameters
@@ -159,6 +158,18 @@ _OF_EACH_CONTROLLER = {"plugin", "rotation_shim", "goal_checker", "xy_goal_toler
 """The server's keys that every controller has for itself."""
 
 
+def _valid_with(name: str) -> str:
+    """Return what a key needs beside it."""
+    owners = [f"`plugin: {plugin}`" for plugin, groups in _OF_PLUGIN.items() if _has(groups, name)]
+    if _has((ShimParameters, RotationParameters), name):
+        owners.append("`rotation_shim: true`")
+    return " or ".join(owners)
+
+
+def _has(groups: Iterable[type[ParameterGroup]], name: str) -> bool:
+    return any(name in group.model_fields for group in groups)
+
+
 class ControllerParameters(
     ServerParameters,
     PurePursuitParameters,
@@ -193,9 +204,8 @@ class ControllerParameters(
         valid = {name for group in groups for name in group.model_fields}
         for name in type(self).model_fields:
             if name in self.model_fields_set and name not in valid:
-                owner = "the rotation shim" if name in ShimParameters.model_fields else "another plugin"
                 told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
-                yield Fault((name,), f"'{name}' is of {owner}, not of {told}; {nearest(name, sorted(valid))}")
+                yield Fault((name,), f"'{name}' is not of {told}; valid with {_valid_with(name)}")
 
     def overrides(self) -> dict[str, Any]:
         """Return only the parameters that the file gives, by name; a critic's as a mapping."""
