@@ -87,6 +87,14 @@ def test_straight_ahead_is_straight() -> None:
     assert path_length(path) == pytest.approx(4.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("model", ["DUBIN", "REEDS_SHEPP"])
+def test_a_robot_at_its_goal_stays_there(model: str) -> None:
+    here = Pose2(3.0, 3.0, 0.7)
+    path = planner(model).plan(costmap(), here, here)
+    assert path_length(path) == 0.0
+    assert path[-1] == pytest.approx(here)
+
+
 def test_planning_twice_gives_the_same_path() -> None:
     room = costmap((2.5, 2.5, 3.5, 3.5))
     paths = [planner().plan(room, Pose2(1.0, 1.0, 2.0), Pose2(5.0, 5.0, 0.0)) for _ in range(2)]

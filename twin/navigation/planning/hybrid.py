@@ -237,7 +237,8 @@ class HybridPlanner:
             elif not found:
                 found = [(int(moves[j]) % 3 - 1, self._arc if moves[j] < 3 else -self._arc)]
             pieces += found
-            last = (pieces[-1][0], 1 if pieces[-1][1] > 0.0 else -1)
+            if pieces:  # none yet where the robot stands at the goal
+                last = (pieces[-1][0], 1 if pieces[-1][1] > 0.0 else -1)
             i = j
         return pieces
 
