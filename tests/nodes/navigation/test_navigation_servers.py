@@ -386,6 +386,21 @@ def test_a_path_that_is_none_is_refused(bench: Bench, stack: Stack, path: np.nda
     assert goal.result.error_msg
 
 
+def test_a_path_is_followed_where_its_frame_says(bench: Bench, stack: Stack) -> None:
+    ahead = np.array([[0.1 * i, 0.0, 0.0] for i in range(8)])
+    aside = np.array([[0.0, 0.1 * i, math.pi / 2] for i in range(8)])
+    for path in (path_msg(aside, "map", 0), path_msg(ahead, "base_footprint", 0)):
+        goal = stack.drive(path)
+        bench.until(lambda goal=goal: goal.done, 10.0)
+        assert goal.status == GoalStatus.STATUS_SUCCEEDED
+    assert stack.robot.pose.distance(Pose2(0.0, 1.4, 0.0)) < 0.2, "ahead of where it stood after the first"
+    lost = stack.drive(path_msg(ahead, "moon", 0))
+    bench.until(lambda: lost.done, 1.0)
+    assert (lost.status, lost.result.error_code) == (GoalStatus.STATUS_ABORTED, 102)
+    assert "frame 'moon' has no transform to 'map'" in lost.result.error_msg
+    assert not stack.is_valid(path_msg(ahead, "moon", 0))
+
+
 def test_an_unlocalised_robot_does_not_drive(bench: Bench) -> None:
     robot = Robot(bench, open_room())
     robot.localised = False

@@ -29,7 +29,7 @@ from twin.navigation.control.progress_checker import ProgressChecker, ProgressCh
 from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
 from twin.navigation.failures import ControlFailure, NoValidControl
 from twin.navigation.warm_up import warm_up_maneuver
-from twin.nodes.messages import path_array, path_msg
+from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.trajectory_markers import trajectory_markers
@@ -211,7 +211,10 @@ class ControllerServerNode:
         controller = _chosen("controller", self.controllers, request.controller_id)
         goal_checker = _chosen("goal checker", self.config.goal_checkers, request.goal_checker_id)
         progress = _chosen("progress checker", self.config.progress_checkers, request.progress_checker_id)
-        path = path_array(request.path)
+        path = self._robot_pose.path_in_map(request.path)
+        if path is None:
+            frames = request.path.header.frame_id, self._robot_pose.frames.map
+            raise _Abort(_TF_ERROR, "the path's frame {!r} has no transform to {!r}".format(*frames))
         if not len(path) or not np.isfinite(path).all():
             raise _Abort(_INVALID_PATH, "the path is empty or not finite")
         handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))

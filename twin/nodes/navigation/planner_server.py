@@ -25,7 +25,7 @@ from twin.navigation.planning.path_validity import blocked_poses
 from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
 from twin.navigation.warm_up import warm_up_planning
-from twin.nodes.messages import path_array, path_msg
+from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
@@ -225,9 +225,9 @@ class PlannerServerNode:
 
     def _on_is_path_valid(self, request: Any) -> Any:
         """Answer whether the rest of a path, from the pose nearest to the robot on, is free."""
-        path, robot = path_array(request.path), self._robot_pose.in_map()
+        path, robot = self._robot_pose.path_in_map(request.path), self._robot_pose.in_map()
         costmap, known = self._costmap.costmap, self._costmap.known
-        if not len(path) or costmap is None or robot is None:
+        if path is None or not len(path) or costmap is None or robot is None:
             return new(IsPathValid.Response, is_valid=False)
         away = float(np.hypot(path[:, 0] - robot.x, path[:, 1] - robot.y).min())
         end = Pose2(*path[-1].tolist())

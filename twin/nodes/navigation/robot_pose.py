@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twin.bridge.msgs import Header, ns
+import numpy as np
+
+from twin.bridge.msgs import Header, Path, ns
 from twin.bridge.tf import TransformBuffer, TransformError
-from twin.geometry import Pose2
+from twin.geometry import Array, Pose2
+from twin.nodes.messages import path_array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,3 +46,13 @@ class RobotPose:
     def at_stamp(self, target: str, header: Header) -> Pose2 | None:
         """Return the planar pose, in `target`, of the frame that a message was measured in, when it was."""
         return self.relative(target, header.frame_id, ns(header.stamp))
+
+    def path_in_map(self, message: Path) -> Array | None:
+        """Return a path as x, y, yaw in the map frame, shape (n, 3); None if its frame has no transform."""
+        path, frame = path_array(message), message.header.frame_id
+        if frame in ("", self.frames.map) or not len(path):
+            return path
+        T_map_frame = self.relative(self.frames.map, frame)
+        if T_map_frame is None:
+            return None
+        return np.array([T_map_frame @ Pose2(*pose) for pose in path.tolist()])

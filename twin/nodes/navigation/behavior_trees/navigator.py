@@ -39,7 +39,8 @@ def tree_file(name: str) -> FilePath:
     shipped = {file.stem: file for file in sorted(SHIPPED.glob("*.xml"))}
     found = shipped.get(name.removesuffix(".xml"))
     if found is None:
-        raise NavigationError(f"there is no behaviour tree {name!r}: no such file; {nearest(name, shipped)}")
+        why = "trees are files that end in .xml" if path.exists() else "no such file"
+        raise NavigationError(f"there is no behaviour tree {name!r}: {why}; {nearest(name, shipped)}")
     return found
 
 
