@@ -16,6 +16,7 @@ from twin.bridge.action_types import ComputePathThroughPoses, NavigateThroughPos
 from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import BehaviorTreeLog, GoalStatus, PoseStamped, new
+from twin.bridge.srvs import Toggle
 from twin.errors import NavigationError
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
@@ -255,6 +256,31 @@ def test_a_goal_may_bring_its_tree(bench: Bench, stack: Stack, tmp_path: Path) -
     named = stack.go(1.0, 0.0, tree="navigate_to_pose")
     stack.until_done(named)
     assert named.succeeded
+
+
+def test_a_tree_switches_the_collision_monitor_and_cuts_paths(
+    bench: Bench, stack: Stack, tmp_path: Path
+) -> None:
+    asked: list[bool] = []
+
+    def on_toggle(request: Any) -> Any:
+        asked.append(request.enable)
+        return new(Toggle.Response, success=True)
+
+    bench.node.create_service(Toggle, "collision_monitor/toggle", on_toggle)
+    nodes = """<Sequence>
+        <ToggleCollisionMonitor enable="false"/>
+        <ComputePathToPose goal="{goal}" path="{whole}"/>
+        <TruncatePathLocal input_path="{whole}" output_path="{path}" distance_forward="0.5"
+            robot_frame="base_footprint"/>
+        <FollowPath path="{path}"/>
+        <ToggleCollisionMonitor/>
+    </Sequence>"""
+    sent = stack.go(1.0, 0.0, tree=tree(tmp_path, nodes))
+    stack.until_done(sent)
+    assert sent.succeeded
+    assert asked == [False, True]
+    assert stack.robot.pose.x == pytest.approx(0.5, abs=0.1)
 
 
 def test_a_tree_that_is_wrong_or_missing_ends_the_goal_not_the_run(stack: Stack, tmp_path: Path) -> None:

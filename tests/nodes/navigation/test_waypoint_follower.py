@@ -128,3 +128,11 @@ def test_a_cancel_reaches_the_navigator(bench: Bench) -> None:
     bench.run(0.2)
     assert course.cancelled == 1
     assert course.order == []
+
+
+def test_as_many_loops_as_a_message_can_hold(bench: Bench) -> None:
+    course = Course(bench)
+    sent = course.follow(2, number_of_loops=2**32 - 1)
+    bench.until(lambda: len(course.visited) > 4, 20.0)
+    assert course.order[:5] == [0, 1, 0, 1, 0]
+    assert not sent.done

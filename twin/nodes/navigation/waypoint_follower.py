@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 from twin.bridge import types
@@ -64,8 +65,10 @@ class WaypointFollowerNode:
             )
             return new(FollowWaypoints.Result, error_code=_NO_VALID_WAYPOINTS, error_msg=what)
         missed: list[Any] = []
-        rest = [*range(first, len(goal.poses)), *(list(range(len(goal.poses))) * loops)]
-        for index in rest:
+        count = len(goal.poses)
+        # One by one: whoever wants to go round for ever asks for four thousand million loops.
+        again = (index for _ in range(loops) for index in range(count))
+        for index in chain(range(first, count), again):
             sent = yield from self._visit(handle, goal.poses[index], index)
             if sent is None:
                 handle.canceled()

@@ -48,6 +48,7 @@ class TruncatePathLocal(NavigatorNode):
     PORTS = (
         *inputs(input_path="message", distance_forward=("double", 8.0), distance_backward=("double", 4.0)),
         *inputs(robot_base_frame="string", global_frame="string", transform_tolerance=("double", 0.2)),
+        *inputs(robot_frame="string"),  # what `robot_base_frame` was before Lyrical
         *inputs(pose="message", angular_distance_weight=("double", 0.0)),
         *inputs(max_robot_pose_search_dist=("double", math.inf)),
         *outputs(output_path="message"),
@@ -68,7 +69,9 @@ class TruncatePathLocal(NavigatorNode):
         pose = (
             pose2_from_pose(given.pose)
             if given is not None
-            else self.context.pose(path.header.frame_id or None, self.get("robot_base_frame"))
+            else self.context.pose(
+                path.header.frame_id or None, self.get("robot_base_frame") or self.get("robot_frame")
+            )
         )
         if pose is None:
             return Status.FAILURE

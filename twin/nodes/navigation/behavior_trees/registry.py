@@ -36,6 +36,7 @@ _CLASSES: tuple[type[TreeNode], ...] = (
     services.ClearCostmapAroundPose,
     services.IsPathValid,
     services.ReinitializeGlobalLocalization,
+    services.ToggleCollisionMonitor,
     goals.RemovePassedGoals,
     goals.RemoveInCollisionGoals,
     goals.GetNextFewGoals,

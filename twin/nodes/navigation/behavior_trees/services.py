@@ -135,3 +135,14 @@ class ReinitializeGlobalLocalization(ServiceNode):
 
     SERVICE, NAME = srvs.Empty, "reinitialize_global_localization"
     PORTS: ClassVar[tuple[Port, ...]] = SERVICE_PORTS
+
+
+class ToggleCollisionMonitor(ServiceNode):
+    """Switches the collision monitor."""
+
+    SERVICE, NAME = srvs.Toggle, "collision_monitor/toggle"
+    PORTS: ClassVar[tuple[Port, ...]] = (*SERVICE_PORTS, *inputs(enable=("bool", True)))
+
+    def make_request(self) -> Any | None:
+        """Return whether it is to be on."""
+        return new(srvs.Toggle.Request, enable=self.get("enable"))
