@@ -11,6 +11,10 @@ from twin.bridge.clock import Clock
 from twin.bridge.msgs import ParameterEvent
 from twin.errors import BridgeError
 from twin.geometry import Array
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.docking.docks import DockType
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.nodes.navigation.controller_server import ControllerServerConfig
 from twin.nodes.node_parameters import declare_config
 
 
@@ -74,3 +78,23 @@ def test_without_a_way_to_replace_it_a_config_is_read_only(bus: Bus) -> None:
     declare_config(node, Config(), names={"limits": ""})
     with pytest.raises(BridgeError, match="read-only"):
         node.set_parameter("speed", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("config", "name", "value"),
+    [
+        (DWBConfig(), "min_vel_x", -0.2),
+        (DockType(), "staging_yaw_offset", -1.57),
+        (ControllerServerConfig(), "failure_tolerance", -1.0),
+        (AmclConfig(), "laser_max_range", -1.0),
+    ],
+)
+def test_what_is_negative_in_nav2_too_may_become_so(
+    bus: Bus, config: object, name: str, value: float
+) -> None:
+    node, seen = bus.create_node("n"), []
+    declare_config(node, config, seen.append)
+    assert node.get_parameter(name).value >= 0.0
+    node.set_parameter(name, value)
+    assert node.get_parameter(name).value == value
+    assert seen

@@ -18,6 +18,17 @@ C = TypeVar("C")
 
 _NO_NAMES: Mapping[str, str] = {}
 
+_SIGNED = frozenset(
+    {
+        *("x", "y", "z", "yaw"),
+        *("external_detection_translation_x", "external_detection_translation_y"),
+        *("external_detection_rotation_yaw", "staging_x_offset", "staging_yaw_offset"),
+        *("min_vel_x", "vx_min"),
+        *("failure_tolerance", "laser_max_range", "laser_min_range", "random_seed"),
+    }
+)
+"""Parameters that may become negative though they are not: places, speeds backwards, and Nav2's -1."""
+
 
 @dataclasses.dataclass(frozen=True)
 class _Unit:
@@ -117,7 +128,7 @@ def _check(parameter: Parameter, old: Any) -> None:
         return
     if math.isnan(value) or (math.isfinite(old) and not math.isfinite(value)):
         raise BridgeError(f"{parameter.name} must be finite")
-    if old >= 0 > value:
+    if old >= 0 > value and parameter.name.rpartition(".")[2] not in _SIGNED:
         raise BridgeError(f"{parameter.name} must not be negative")
 
 
