@@ -19,6 +19,7 @@ from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.runtime.overrides import overridden
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.schema import load
@@ -445,6 +446,12 @@ def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
     file = _file(tmp_path, "amcl: {ros__parameters: {min_particles: 5000}}")
     with pytest.raises(NavigationError, match=r"yaml:1: amcl: min_particles is 5000, more than"):
         amcl_with_file(AmclConfig(), frozenset(), file, "")
+
+
+def test_what_a_scenario_gives_must_fit_together() -> None:
+    assert overridden(AmclConfig(), {"min_particles": 900}).min_particles == 900
+    with pytest.raises(ScenarioError, match="amcl: min_particles is 5000, more than max_particles"):
+        overridden(AmclConfig(), {"min_particles": 5000})
 
 
 def test_a_monitors_sources_and_what_it_lacks(tmp_path: Path) -> None:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from twin.scenario.fields import Fraction, NotNegative, Positive, RosName
 from twin.strict_yaml import Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
+
+
+def _corners(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if 0 < len(points) < 3:
+        raise ValueError("must be three corners or more")
+    return points
 
 
 class MonitorPolygonConfig(StrictModel):
@@ -17,7 +23,9 @@ class MonitorPolygonConfig(StrictModel):
     """What messages call it."""
     action_type: Literal["stop", "slowdown", "limit", "approach"]
     """`approach` looks ahead along the command, the others at the polygon as it is."""
-    points: tuple[tuple[Metres, Metres], ...] = Field(default=(), max_length=100)
+    points: Annotated[tuple[tuple[Metres, Metres], ...], AfterValidator(_corners)] = Field(
+        default=(), max_length=100
+    )
     """Corners in the base frame [m]; absent: the robot's footprint."""
     min_points: Annotated[int, Positive] = 4
     """Fewer points in it are none."""
