@@ -415,6 +415,19 @@ velocity_smoother:
     ]
 
 
+def test_what_would_divide_by_zero(tmp_path: Path) -> None:
+    text = """\
+velocity_smoother: {ros__parameters: {max_accel: [1.0, 0.0, 3.0], max_decel: [0.0, 0.0, -3.0]}}
+bt_navigator: {ros__parameters: {bt_loop_duration: 0}}
+waypoint_follower: {ros__parameters: {loop_rate: 0}}
+"""
+    assert _said(tmp_path, text) == [
+        "velocity_smoother: max_decel must be greater than 0, not 0.0",
+        "bt_navigator: bt_loop_duration must be greater than 0, not 0",
+        "waypoint_follower: loop_rate must be greater than 0, not 0",
+    ]
+
+
 def test_names_of_other_releases(tmp_path: Path) -> None:
     text = """\
 controller_server:

@@ -4,9 +4,36 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+
+_MoreThanZero = Annotated[float, Field(gt=0.0)]
+
+
+class _AxisParameters(BaseModel):
+    max_acceleration: _MoreThanZero
+    max_deceleration: _MoreThanZero
+
+
+class VelocitySmootherParameters(BaseModel):
+    """What a scenario has no keys for: a robot that cannot brake is none."""
+
+    linear: _AxisParameters
+    angular: _AxisParameters
+
+
+class NavigatorParameters(BaseModel):
+    """Of `/bt_navigator`."""
+
+    bt_loop_duration: Annotated[int, Field(gt=0)]
+
+
+class WaypointFollowerParameters(BaseModel):
+    """Of `/waypoint_follower`."""
+
+    loop_rate: _MoreThanZero
+
 
 _SENTINELS = ("failure_tolerance",)
 """A negative value of these means that there is no limit."""

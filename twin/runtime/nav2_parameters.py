@@ -9,6 +9,11 @@ from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNodeConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import NAMES as DOCKING_NAMES
+from twin.runtime.nav2_checks import (
+    NavigatorParameters,
+    VelocitySmootherParameters,
+    WaypointFollowerParameters,
+)
 from twin.runtime.nav2_file import Nav2Parameters
 from twin.runtime.nav2_lists import database_of, sources_of
 from twin.runtime.nav2_monitor import monitor_of
@@ -139,7 +144,9 @@ def with_file(
     given = frozenset(name for name, speed in speeds.items() if speed is not None)
     changed = replace(
         parameters,
-        smoother=file.applied("velocity_smoother", parameters.smoother, keep=given),
+        smoother=file.applied(
+            "velocity_smoother", parameters.smoother, keep=given, limits=VelocitySmootherParameters
+        ),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
         planner=file.applied(
@@ -159,8 +166,10 @@ def with_file(
         behaviors=file.applied("behavior_server", parameters.behaviors),
         docking=file.applied("docking_server", docking, DOCKING_NAMES, keep=_given(config.docking) | _DOCKS),
         path_smoother=file.applied("smoother_server", parameters.path_smoother),
-        navigator=file.applied("bt_navigator", parameters.navigator, keep=_given(config.navigator)),
-        waypoints=file.applied("waypoint_follower", parameters.waypoints),
+        navigator=file.applied(
+            "bt_navigator", parameters.navigator, keep=_given(config.navigator), limits=NavigatorParameters
+        ),
+        waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
     )
     if config.collision_monitor is None:
         monitor_of(file)
