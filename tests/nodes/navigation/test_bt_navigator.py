@@ -26,7 +26,8 @@ from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.messages import path_msg, pose_stamped
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig, BtNavigatorNode
-from twin.nodes.navigation.controller_server import ControllerServerConfig, ControllerServerNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.map_server import MapServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode

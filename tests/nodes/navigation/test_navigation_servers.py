@@ -23,7 +23,8 @@ from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPureP
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
-from twin.nodes.navigation.controller_server import ControllerServerConfig, ControllerServerNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.map_server import MapServerNode, occupancy_map
 from twin.nodes.navigation.planner_server import PlannerServerNode
