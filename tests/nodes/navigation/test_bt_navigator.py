@@ -19,7 +19,7 @@ from twin.bridge.msgs import BehaviorTreeLog, GoalStatus, PoseStamped, new
 from twin.errors import NavigationError
 from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig

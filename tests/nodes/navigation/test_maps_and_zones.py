@@ -38,7 +38,7 @@ from twin.bridge.srvs import (
     SetBool,
 )
 from twin.geometry import Pose2
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap

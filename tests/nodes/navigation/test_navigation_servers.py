@@ -19,7 +19,7 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped

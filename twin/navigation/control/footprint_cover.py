@@ -59,6 +59,28 @@ class FootprintCover:
         )
 
 
+class CoverOf:
+    """The cover of a footprint, made again only when a costmap is inflated or resolved otherwise."""
+
+    def __init__(self, footprint: Array, *, consider_footprint: bool, padding: float = 0.0) -> None:
+        self._footprint = footprint
+        self._consider_footprint, self._padding = consider_footprint, padding
+        self._key: tuple[float, ...] | None = None
+
+    def on(self, costmap: Costmap) -> FootprintCover:
+        """Return `FootprintCover.of`."""
+        key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
+        if key != self._key:
+            self._key = key
+            self._cover = FootprintCover.of(
+                self._footprint,
+                costmap,
+                consider_footprint=self._consider_footprint,
+                padding=self._padding,
+            )
+        return self._cover
+
+
 def _cost(costmap: Costmap, distance: float) -> int:
     """Return the least cost of cells that may have an obstacle within `distance` [m]."""
     farthest = distance + _SLACK * costmap.resolution

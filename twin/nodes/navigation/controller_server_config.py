@@ -9,7 +9,7 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoal
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 
 
 @dataclass(frozen=True, kw_only=True)
