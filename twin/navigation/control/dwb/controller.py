@@ -107,7 +107,6 @@ class DWB(Controller):
         """Return raw scores, which samples are free of collisions, and where they end in the base frame."""
         config, grid, at = self.config, now.grid, now.at_grid
         path = at.apply(now.pose.inverse().apply(local.poses[:, :2]))
-        cover = self._cover.on(grid)
         goal, ahead = path[-1], config.GoalAlign.forward_point_distance
         bearing = math.atan2(goal[1] - at.y, goal[0] - at.x)
         nose = goal + ahead * np.array([math.cos(bearing), math.sin(bearing)])
@@ -122,9 +121,7 @@ class DWB(Controller):
             np.array([config.linear_granularity, config.angular_granularity]),
             grid.costs,
             1.0 / grid.resolution,
-            np.array([int(len(cover.outline) > 0), *cover.costs]),
-            cover.circles,
-            cover.outline,
+            self._cover.on(grid),
             np.ascontiguousarray(path.T),
             np.array([*goal, *nose]),
             np.array([config.PathAlign.forward_point_distance, ahead]),

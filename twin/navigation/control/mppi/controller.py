@@ -15,10 +15,10 @@ import numpy as np
 from twin.geometry import Array
 from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.detour import DetouringPathHandler, free_points
-from twin.navigation.control.footprint_cover import CoverOf
-from twin.navigation.control.mppi import kernels
+from twin.navigation.control.footprint_cover import F32, CoverOf
+from twin.navigation.control.mppi import controls
+from twin.navigation.control.mppi.arrays import Ground
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.noise import NoiseBank
 from twin.navigation.control.mppi.pursuit import pursue
 from twin.navigation.control.mppi.rollouts import Rollouts
@@ -142,11 +142,14 @@ class MPPI(Controller):
             along=np.concatenate([[0.0], np.cumsum(step)]).astype(np.float32),
             valid=free_points(grid, points + grid.origin),
             local=local,
-            costmap=grid,
             limits=limits,
-            tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits[0])),
+            ground=Ground(
+                costs=grid.costs,
+                per_metre=np.float32(1.0 / grid.resolution),
+                tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits.vx_max)),
+                cover=self._cover.on(grid),
+            ),
             to_grid=to_grid,
-            cover=self._cover.on(grid),
         )
 
     # Optimization
@@ -160,13 +163,13 @@ class MPPI(Controller):
             noise[:, :, 1] = -self._mean
             noise[:, :, 2] = pursuit - self._mean
             self._rollouts.simulate(scene, noise, self._mean, self._under_way)
-            if self._rollouts.hit.all():
+            if self._rollouts.batch.hit.all():
                 return False
             at = self._rollouts.score(scene)
             self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
             before = self._mean.copy()
             config = self.config
-            best = kernels.average(
+            best = controls.average(
                 noise,
                 self._mean,
                 self._rollouts.total,
@@ -185,20 +188,18 @@ class MPPI(Controller):
         return True
 
     def _pursuit(self, scene: Scene) -> F32:
-        controls = np.zeros_like(self._mean)
+        written = np.zeros_like(self._mean)
         pursue(
             scene.path,
             scene.along,
             scene.start,
             scene.limits,
             np.float32(self.config.model_dt),
-            scene.costmap.costs,
-            np.float32(1.0 / scene.costmap.resolution),
-            scene.tables[2],
+            scene.ground,
             scene.local.reversing and self.reverses,
-            controls,
+            written,
         )
-        return controls
+        return written
 
     # The controls
 
@@ -207,30 +208,18 @@ class MPPI(Controller):
         if self.config.time_steps <= 20:
             return
         past = np.array(self._sent, dtype=np.float32).T
-        kernels.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
+        controls.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)
-        kernels.constrain(self._mean, scene.start, scene.limits, np.float32(dt), model_dt)
-        kernels.simulate(
+        controls.constrain(self._mean, scene.start, scene.limits, np.float32(dt), model_dt)
+        controls.simulate(
             self._mean, self._under_way, self._rollouts.delays, scene.start, model_dt, self._leads
         )
 
     def _collides(self, scene: Scene) -> bool:
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
-        check = np.array([1, *scene.cover.costs])
-        return bool(
-            kernels.first_collision(
-                self._leads,
-                scene.costmap.costs,
-                np.float32(1.0 / scene.costmap.resolution),
-                check,
-                scene.cover.circles,
-                scene.cover.outline,
-                steps,
-            )
-            >= 0
-        )
+        return bool(controls.first_collision(self._leads, scene.ground, steps) >= 0)
 
     def _remember(self, command: tuple[float, float]) -> None:
         self._last = command
