@@ -7,7 +7,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
