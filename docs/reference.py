@@ -22,7 +22,7 @@ from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig

@@ -10,7 +10,7 @@ from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.errors import ScenarioError
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.runtime.controller_config import controller_server_config
 from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
@@ -68,6 +68,11 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
         ),
         ({"vx_max": 0.5}, "not of regulated_pure_pursuit without rotation shim; valid with `plugin: mppi`"),
         ({"angular_dist_threshold": 0.5}, "valid with `rotation_shim: true`"),
+        ({"required_movement_angle": 0.5}, "needs 'progress_checker: pose' beside it"),
+        (
+            {"goal_checker": "position", "yaw_goal_tolerance": 0.5},
+            "not looked at with 'goal_checker: position'",
+        ),
     ],
 )
 def test_a_key_of_another_plugin_is_refused(keys: dict[str, object], told: str) -> None:

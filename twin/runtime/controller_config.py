@@ -22,9 +22,9 @@ from twin.navigation.control.mppi.config import (
 )
 from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
-from twin.nodes.navigation.controller_server import ControllerServerConfig
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.runtime.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 

@@ -16,7 +16,7 @@ from twin.navigation.planning.goal_access import GoalAccessConfig
 from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
-from twin.nodes.navigation.controller_server import ControllerServerConfig
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.planner_server import PlannerServerConfig

@@ -9,8 +9,8 @@ import pytest
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.control.goal_checker import GoalCheckerConfig, SimpleGoalChecker
 from twin.navigation.control.progress_checker import SimpleProgressChecker
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.failures import InvalidPath, NoValidControl

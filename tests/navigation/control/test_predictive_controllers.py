@@ -22,8 +22,8 @@ from twin.navigation.control.mppi.config import (
 )
 from twin.navigation.control.mppi.controller import MPPI
 from twin.navigation.control.plugins import create_controller
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
 from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.navigation.costmaps.costmap import Costmap, footprint_cost
 from twin.navigation.costmaps.footprint import rectangle

@@ -38,13 +38,14 @@ from twin.bridge.srvs import (
     SetBool,
 )
 from twin.geometry import Pose2
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.maps.zones import empty_mask, rectangle, with_zone
 from twin.nodes.messages import path_msg, pose_stamped
-from twin.nodes.navigation.controller_server import ControllerServerConfig, ControllerServerNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.costmap_filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
 from twin.nodes.navigation.map_saver import MapSaverNode

@@ -19,11 +19,12 @@ from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import PlannerConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
-from twin.nodes.navigation.controller_server import ControllerServerConfig, ControllerServerNode
+from twin.nodes.navigation.controller_server import ControllerServerNode
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.map_server import MapServerNode, occupancy_map
 from twin.nodes.navigation.planner_server import PlannerServerNode

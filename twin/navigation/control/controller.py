@@ -1,51 +1,116 @@
-"""What every controller offers to the controller server (nav2_core::Controller)."""
+"""What every controller is to the controller server (nav2_core::Controller)."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 
+_NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
 
-class Controller(Protocol):
+
+@dataclass(frozen=True, kw_only=True)
+class Situation:
+    """What one command is made from."""
+
+    pose: Pose2
+    """Of the base, in the path's frame."""
+    velocity: tuple[float, float]
+    """The present (v [m/s], w [rad/s])."""
+    path: Array
+    """Shape (n, 3): x, y, yaw."""
+    costmap: Costmap | None
+    """Around the robot; None: nothing is known of obstacles."""
+    at: Pose2
+    """Of the base, in the costmap's frame."""
+    dt: float
+    """Control period [s]."""
+
+    @property
+    def grid(self) -> Costmap:
+        """The costmap, or one that is free everywhere."""
+        return self.costmap or _NO_COSTMAP
+
+    @property
+    def at_grid(self) -> Pose2:
+        """The base from the costmap's lower left corner."""
+        origin = self.grid.origin
+        return Pose2(self.at.x - origin[0], self.at.y - origin[1], self.at.yaw)
+
+
+class Controller(ABC):
     """Follows one path at a time; a new path array starts it over."""
 
     config: Any
     """Its parameters, frozen; see `configure`."""
-    carrot: tuple[float, float] | None
+    carrot: tuple[float, float] | None = None
     """The point that the last command steered for, in the path's frame [m]; None if it steers for none."""
+
+    def __init__(self, *, config: Any, footprint: Array | None = None) -> None:
+        """Take a footprint of shape (n, 2) [m]; without one the centre is checked for inscribed cost."""
+        self.footprint = np.array(np.zeros((1, 2)) if footprint is None else footprint, np.float64, order="C")
+        self._tolerance = 0.25
+        self._take(config)
 
     @property
     def trajectory(self) -> Array | None:
         """Where the last command begins to lead, in the path's frame: shape (n, 3); None if it plans none."""
+        return None
 
     @property
     def candidates(self) -> Array | None:
         """Some of the ways it chose from, in the path's frame, shape (n, m, 2) [m]; None: there were none."""
+        return None
 
     @property
+    @abstractmethod
     def max_speed(self) -> float:
         """The speed that percentages of a speed limit are of [m/s]."""
 
     @property
+    @abstractmethod
     def reverses(self) -> bool:
         """Whether it drives paths backwards where their headings say so."""
 
     def configure(self, config: Any) -> None:
         """Go on with other parameters of the same kind; lifts the speed limit."""
+        self._take(config)
 
+    def _take(self, config: Any) -> None:
+        self.config = config
+        self._limit: float | None = None
+        self._build()
+        self.reset()
+
+    @abstractmethod
+    def _build(self) -> None:
+        """Make what depends on the parameters."""
+
+    @abstractmethod
     def reset(self) -> None:
         """Forget the path, and what was learnt on it."""
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than `limit` [m/s]; None lifts the limit (nav2's SpeedLimit)."""
+        self._limit = limit
+
+    @property
+    def speed(self) -> float:
+        """`max_speed`, or the limit that is below it [m/s]."""
+        return self.max_speed if self._limit is None else min(self._limit, self.max_speed)
 
     def set_goal_tolerance(self, xy: float) -> None:
         """Tell how near the goal counts as there [m]: what only turns at the goal does it from there on."""
+        self._tolerance = xy
 
     def cancel(self) -> bool:
         """Come to rest; return whether the robot may be stopped now (nav2_core::Controller::cancel)."""
+        return True
 
     def compute_velocity(
         self,
@@ -57,15 +122,16 @@ class Controller(Protocol):
         *,
         costmap_pose: Pose2 | None = None,
     ) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]).
+        """Return `command`; the arguments are those of `Situation`.
 
-        Args:
-            pose: Of the base, in the path's frame.
-            velocity: The present (v, w).
-            path: Shape (n, 3): x, y, yaw.
-            costmap: Around the robot; None: nothing is known of obstacles.
-            dt: Control period [s].
-            costmap_pose: Of the base in the costmap's frame; None where that is the path's frame too.
+        Without `costmap_pose` the costmap's frame is the path's.
+        """
+        at = pose if costmap_pose is None else costmap_pose
+        return self.command(Situation(pose=pose, velocity=velocity, path=path, costmap=costmap, at=at, dt=dt))
+
+    @abstractmethod
+    def command(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]).
 
         Raises:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).

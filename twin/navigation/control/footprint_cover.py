@@ -1,14 +1,15 @@
-"""A footprint as the compiled loops take it: points of its outline, and circles that cover it."""
+"""A footprint as the compiled loops take it, outline and circles around, and whether it touches anything."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
+from twin.navigation._jit import fast_jit
 from twin.navigation.costmaps.costmap import Costmap, inflation_costs
 from twin.navigation.costmaps.footprint import radii
 
@@ -18,8 +19,7 @@ _SLACK = math.sqrt(2.0)
 """Between two cells whose points are `d` apart lie at most `d` plus so many cells."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FootprintCover:
+class FootprintCover(NamedTuple):
     """In cells of one resolution."""
 
     outline: F32
@@ -28,8 +28,10 @@ class FootprintCover:
     """The same with the padding around it."""
     circles: F32
     """Shape (m, 2)."""
-    costs: NDArray[np.int64]
-    """The least cost of the centre at which a collision is possible, and that of a circle's centre."""
+    centre_cost: int
+    """The least cost of the centre at which a collision is possible."""
+    circle_cost: int
+    """That of a circle's centre."""
 
     @staticmethod
     def of(
@@ -46,7 +48,7 @@ class FootprintCover:
         """
         if not consider_footprint or len(footprint) < 3:
             none = np.zeros((0, 2), dtype=np.float32)
-            return FootprintCover(outline=none, padded=none, circles=none, costs=np.array([253, 253]))
+            return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
         padded = _padded(footprint, padding)
         centres, radius = _circles(padded)
         outside = radii(padded)[1]
@@ -55,8 +57,76 @@ class FootprintCover:
             outline=(_outline(footprint, spacing) / costmap.resolution).astype(np.float32),
             padded=(_outline(padded, spacing) / costmap.resolution).astype(np.float32),
             circles=(centres / costmap.resolution).astype(np.float32),
-            costs=np.array([_cost(costmap, outside), _cost(costmap, radius)]),
+            centre_cost=_cost(costmap, outside),
+            circle_cost=_cost(costmap, radius),
         )
+
+
+@fast_jit
+def outline_hits(
+    costs: NDArray[np.uint8], outline: F32, x: np.float32, y: np.float32, c: np.float32, s: np.float32
+) -> bool:
+    """Whether a point of the outline, in cells of the base frame, is lethal at a pose in cells."""
+    height, width = costs.shape
+    for i in range(outline.shape[0]):
+        ix = math.floor(x + c * outline[i, 0] - s * outline[i, 1])
+        iy = math.floor(y + s * outline[i, 0] + c * outline[i, 1])
+        if 0 <= ix < width and 0 <= iy < height and costs[iy, ix] == 254:
+            return True
+    return False
+
+
+@fast_jit
+def collides(
+    costs: NDArray[np.uint8],
+    cost: int,
+    cover: FootprintCover,
+    outline: F32,
+    x: np.float32,
+    y: np.float32,
+    c: np.float32,
+    s: np.float32,
+) -> bool:
+    """Whether the footprint touches a lethal cell at a pose in cells; `cost` is that of its centre.
+
+    Circles that cover the footprint are asked first: one look each. Then `outline`, one of the two that the
+    cover has; an empty one checks the centre alone.
+    """
+    if cost == 254:
+        return True
+    if outline.shape[0] == 0:
+        return cost == 253
+    height, width = costs.shape
+    near = False
+    for i in range(cover.circles.shape[0]):
+        ix = math.floor(x + c * cover.circles[i, 0] - s * cover.circles[i, 1])
+        iy = math.floor(y + s * cover.circles[i, 0] + c * cover.circles[i, 1])
+        if 0 <= ix < width and 0 <= iy < height and cover.circle_cost <= costs[iy, ix] < 255:
+            near = True
+            break
+    return near and outline_hits(costs, outline, x, y, c, s)
+
+
+class CoverOf:
+    """The cover of a footprint, made again only when a costmap is inflated or resolved otherwise."""
+
+    def __init__(self, footprint: Array, *, consider_footprint: bool, padding: float = 0.0) -> None:
+        self._footprint = footprint
+        self._consider_footprint, self._padding = consider_footprint, padding
+        self._key: tuple[float, ...] | None = None
+
+    def on(self, costmap: Costmap) -> FootprintCover:
+        """Return `FootprintCover.of`."""
+        key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
+        if key != self._key:
+            self._key = key
+            self._cover = FootprintCover.of(
+                self._footprint,
+                costmap,
+                consider_footprint=self._consider_footprint,
+                padding=self._padding,
+            )
+        return self._cover
 
 
 def _cost(costmap: Costmap, distance: float) -> int:

@@ -24,8 +24,8 @@ from twin.navigation.control.progress_checker import (
     ProgressCheckerConfig,
     SimpleProgressChecker,
 )
-from twin.navigation.control.regulated_pure_pursuit import RegulatedPurePursuit
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
 from twin.navigation.control.rotation_shim import RotationShim, RotationShimConfig
 
 ControllerConfig = RegulatedPurePursuitConfig | MPPIConfig | DWBConfig | RotationShimConfig

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.control.controller import Controller
+from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
-from twin.navigation.control.regulated_pure_pursuit_config import RegulatedPurePursuitConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
-from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, Costmap, footprint_cost
+from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, footprint_cost
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,20 +49,17 @@ class RotationShimConfig:
     """Whether the path's headings count, not where its poses are."""
 
 
-@dataclass(kw_only=True)
-class RotationShim:
+class RotationShim(Controller):
     """Wraps any controller."""
 
     config: RotationShimConfig
-    primary: Controller
-    footprint: Array = field(default_factory=lambda: np.zeros((1, 2)))
-    """Shape (n, 2) [m]."""
-    carrot: tuple[float, float] | None = field(init=False, default=None)
-    """The point of the path that the robot turns to, or that the primary controller steers for."""
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self, *, config: RotationShimConfig, primary: Controller, footprint: Array | None = None
+    ) -> None:
+        self.primary = primary
+        super().__init__(config=config, footprint=footprint)
         self._tolerance = 0.0
-        self._begin()
 
     @property
     def trajectory(self) -> Array | None:
@@ -85,27 +82,20 @@ class RotationShim:
         return self.primary.max_speed
 
     def configure(self, config: RotationShimConfig) -> None:
-        """Go on with other parameters; lifts the speed limit."""
-        self.config = config
+        """Go on with other parameters, those of the primary controller too; lifts the speed limit."""
         self.primary.configure(config.primary_controller)
-        self._begin()
+        super().configure(config)
+
+    def _build(self) -> None:
+        self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
 
     def reset(self) -> None:
         """Forget the path."""
-        self._forget()
         self.primary.reset()
-
-    def _begin(self) -> None:
-        self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
-        self._forget()
-
-    def _forget(self) -> None:
         self._handler.reset()
-        self._turning = False
-        self._aligned = False
-        self._at_goal = False
+        self._turning = self._aligned = self._at_goal = self._driving = False
         self._last_w: float | None = None
-        self.carrot, self._driving = None, False
+        self.carrot = None
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Pass the limit [m/s] on."""
@@ -120,35 +110,19 @@ class RotationShim:
         """Leave it to the primary controller."""
         return self.primary.cancel()
 
-    def compute_velocity(
-        self,
-        pose: Pose2,
-        velocity: tuple[float, float],
-        path: Array,
-        costmap: Costmap | None,
-        dt: float,
-        *,
-        costmap_pose: Pose2 | None = None,
-    ) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity`.
-
-        Raises:
-            InvalidPath: the path is empty, not finite or not of shape (n, 3).
-            NoValidControl: the primary controller finds no command.
-        """
+    def command(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
         before = self._handler.path
-        if self._handler.accept(path):
-            same = before is not None and len(before) > 0 and np.array_equal(before[-1], path[-1])
+        if self._handler.accept(now.path):
+            same = before is not None and len(before) > 0 and np.array_equal(before[-1], now.path[-1])
             self._aligned &= same and self.config.rotate_to_heading_once
             self._turning = self._at_goal = False
-        angle = self._angle(pose, path)
-        w = 0.0 if angle is None else self._turn_rate(angle, velocity[1], dt)
+        angle = self._angle(now.pose, now.path)
+        w = 0.0 if angle is None else self._turn_rate(angle, now.velocity[1], now.dt)
         # Where there is no room to turn the primary controller may know a way, as in Nav2.
-        if angle is None or self._collides(costmap_pose or pose, w, angle, dt, costmap):
+        if angle is None or self._collides(now, w, angle):
             self._turning = False
-            command = self.primary.compute_velocity(
-                pose, velocity, path, costmap, dt, costmap_pose=costmap_pose
-            )
+            command = self.primary.command(now)
             self.carrot, self._driving = self.primary.carrot, True
         else:
             command, self._driving = (0.0, w), False
@@ -193,14 +167,14 @@ class RotationShim:
             acceleration=config.max_angular_accel,
         )
 
-    def _collides(self, pose: Pose2, w: float, angle: float, dt: float, costmap: Costmap | None) -> bool:
+    def _collides(self, now: Situation, w: float, angle: float) -> bool:
         """Return whether the footprint hits something while it turns."""
-        if costmap is None or w == 0.0:
+        if now.costmap is None or w == 0.0:
             return False
-        steps = math.ceil(min(self.config.simulate_ahead_time, abs(angle / w)) / dt)
+        steps = math.ceil(min(self.config.simulate_ahead_time, abs(angle / w)) / now.dt)
         for step in range(1, steps + 1):
-            at = Pose2(pose.x, pose.y, pose.yaw + w * dt * step)
-            cost = footprint_cost(costmap, self.footprint, at)
+            at = Pose2(now.at.x, now.at.y, now.at.yaw + w * now.dt * step)
+            cost = footprint_cost(now.costmap, self.footprint, at)
             if self.config.max_cost_threshold <= cost != NO_INFORMATION:
                 return True
         return False

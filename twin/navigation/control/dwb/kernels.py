@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.navigation._jit import fast_jit
-from twin.navigation.control.mppi.kernels import F32, collides
+from twin.navigation.control.footprint_cover import FootprintCover, collides
 
 BASE, FOOTPRINT, PATH_DIST, PATH_ALIGN, GOAL_DIST, GOAL_ALIGN, TWIRLING, BACKWARD = range(8)
 """Columns of the raw scores."""
@@ -40,9 +40,7 @@ def drive_all(
     granularity: Array,
     costs: NDArray[np.uint8],
     per_metre: float,
-    check: NDArray[np.int64],
-    circles: F32,
-    outline: F32,
+    cover: FootprintCover,
     path: Array,
     goals: Array,
     forward: Array,
@@ -60,9 +58,7 @@ def drive_all(
         granularity: Least distance [m] and angle [rad] between poses.
         costs: The costmap.
         per_metre: Cells per metre.
-        check: Whether the outline counts, least cost of a collision, circles' least cost.
-        circles: Shape (m, 2): centres of circles that cover the footprint, in cells.
-        outline: Shape (k, 2): points of the outline, in cells.
+        cover: Of the footprint; without an outline the centre alone counts.
         path: Shape (2, p): the local path.
         goals: x, y of GoalDist and of GoalAlign.
         forward: How far before the robot PathAlign and GoalAlign look [m].
@@ -91,11 +87,9 @@ def drive_all(
             cost = 255
             if 0.0 <= ux < width and 0.0 <= uy < height:
                 cost = int(costs[int(uy), int(ux)])
-            if cost != 255 and cost >= check[1]:
+            if cost != 255 and cost >= cover.centre_cost:
                 c, s = np.float32(math.cos(yaw)), np.float32(math.sin(yaw))
-                if (check[0] == 0 and cost >= 253) or (
-                    check[0] == 1 and collides(costs, cost, circles, check[2], outline, ux, uy, c, s)
-                ):
+                if collides(costs, cost, cover, cover.outline, ux, uy, c, s):
                     legal[i] = False
                     break
             if cost == 255:

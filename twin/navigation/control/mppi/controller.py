@@ -9,23 +9,22 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from twin.geometry import Array, Pose2
+from twin.geometry import Array
+from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.detour import DetouringPathHandler, free_points
-from twin.navigation.control.footprint_cover import FootprintCover
-from twin.navigation.control.mppi import kernels
+from twin.navigation.control.footprint_cover import F32, CoverOf
+from twin.navigation.control.mppi import controls
+from twin.navigation.control.mppi.arrays import Ground
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.noise import NoiseBank
 from twin.navigation.control.mppi.pursuit import pursue
 from twin.navigation.control.mppi.rollouts import Rollouts
 from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
 from twin.navigation.control.mppi.scoring import CostTables
 from twin.navigation.control.path_handler import PathHandlerConfig
-from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import NoValidControl
 
 _EXACT = 3
@@ -35,22 +34,12 @@ _FILTERS = {
     2: (np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231.0).astype(np.float32),
 }
 """Savitzky-Golay, by order."""
-_NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
 
 
-@dataclass(kw_only=True)
-class MPPI:
-    """Follows one path at a time; a new path array goes on with the controls it has."""
+class MPPI(Controller):
+    """Goes on with the controls it has when a new path comes."""
 
     config: MPPIConfig
-    footprint: Array = field(default_factory=lambda: np.zeros((1, 2)))
-    """Shape (n, 2) [m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
-    carrot: tuple[float, float] | None = field(init=False, default=None)
-    """The pose of the path that the rollouts are drawn to, in the path's frame [m]."""
-
-    def __post_init__(self) -> None:
-        self.footprint = np.array(self.footprint, dtype=np.float64, order="C")
-        self.configure(self.config)
 
     @property
     def trajectory(self) -> Array | None:
@@ -80,15 +69,15 @@ class MPPI:
         """Whether it drives backwards."""
         return self.config.enforce_path_inversion and self.config.vx_min < 0.0
 
-    def configure(self, config: MPPIConfig) -> None:
-        """Go on with other parameters, from rest; lifts the speed limit."""
-        self.config = config
+    def _build(self) -> None:
+        config, critic = self.config, self.config.CostCritic
         self._noise = NoiseBank(config)
-        self._limit: float | None = None
         self._rollouts = Rollouts(config)
         self._tables = CostTables(config)
         self._leads = np.zeros((config.time_steps, 3))
-        self._cover: tuple[tuple[float, ...], FootprintCover] | None = None
+        self._cover = CoverOf(
+            self.footprint, consider_footprint=critic.consider_footprint, padding=critic.footprint_padding
+        )
         self._handler = DetouringPathHandler(
             PathHandlerConfig(
                 prune_distance=config.prune_distance,
@@ -99,7 +88,6 @@ class MPPI:
             ),
             detours=config.detours,
         )
-        self.reset()
 
     def reset(self) -> None:
         """Forget the path, and the controls found for it."""
@@ -108,37 +96,17 @@ class MPPI:
         self._scene: Scene | None = None
         self._forget_controls()
 
-    def set_speed_limit(self, limit: float | None) -> None:
-        """Drive no faster than `limit` [m/s]; None lifts the limit."""
-        self._limit = limit
-
-    def set_goal_tolerance(self, xy: float) -> None:
-        """Ignore it: the critics of the goal draw to its middle."""
-
-    def cancel(self) -> bool:
-        """Return True: there is nothing to bring to an end."""
-        return True
-
-    def compute_velocity(
-        self,
-        pose: Pose2,
-        velocity: tuple[float, float],
-        path: Array,
-        costmap: Costmap | None,
-        dt: float,
-        *,
-        costmap_pose: Pose2 | None = None,
-    ) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity`.
+    def command(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.command`.
 
         Raises:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
             NoValidControl: every rollout collides, also after a start from rest.
         """
-        self._handler.accept(path)
-        scene = self._look(pose, velocity, costmap, costmap_pose or pose, dt)
+        self._handler.accept(now.path)
+        scene = self._look(now)
         for _ in range(self.config.retry_attempt_limit + 1):
-            if self._optimize(scene, dt):
+            if self._optimize(scene, now.dt):
                 break
             self._forget_controls()
         else:
@@ -147,7 +115,7 @@ class MPPI:
         command = float(self._mean[0, 0]), float(self._mean[1, 0])
         self._remember(command)
         self._scene = scene
-        self._shift(dt)
+        self._shift(now.dt)
         return command
 
     # Preparation
@@ -159,44 +127,30 @@ class MPPI:
         self._last: tuple[float, float] | None = None
         self._noise.reset()
 
-    def _look(
-        self, pose: Pose2, velocity: tuple[float, float], costmap: Costmap | None, at: Pose2, dt: float
-    ) -> Scene:
-        local = self._handler.local(pose, costmap, at)
-        grid, limits = costmap or _NO_COSTMAP, limits_of(self.config, self._limit)
-        to_grid = Pose2(at.x - grid.origin[0], at.y - grid.origin[1], at.yaw) @ pose.inverse()
+    def _look(self, now: Situation) -> Scene:
+        local = self._handler.local(now.pose, now.costmap, now.at)
+        grid, limits = now.grid, limits_of(self.config, self._limit)
+        to_grid = now.at_grid @ now.pose.inverse()
         points = to_grid.apply(local.poses[:, :2])
         path = np.array([points[:, 0], points[:, 1], local.poses[:, 2] + to_grid.yaw], dtype=np.float32)
         step = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
         near_goal = local.ends_at_goal and local.length < self.config.CostCritic.near_goal_distance
-        v, w = expected_speed(self.config, velocity, self._last, dt)
+        v, w = expected_speed(self.config, now.velocity, self._last, now.dt)
         return Scene(
-            start=np.array([*to_grid.apply(pose[:2]), at.yaw, v, w], dtype=np.float32),
+            start=np.array([*to_grid.apply(now.pose[:2]), now.at.yaw, v, w], dtype=np.float32),
             path=path,
             along=np.concatenate([[0.0], np.cumsum(step)]).astype(np.float32),
             valid=free_points(grid, points + grid.origin),
             local=local,
-            costmap=grid,
             limits=limits,
-            tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits[0])),
+            ground=Ground(
+                costs=grid.costs,
+                per_metre=np.float32(1.0 / grid.resolution),
+                tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits.vx_max)),
+                cover=self._cover.on(grid),
+            ),
             to_grid=to_grid,
-            cover=self._cover_for(grid),
         )
-
-    def _cover_for(self, costmap: Costmap) -> FootprintCover:
-        key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
-        if self._cover is None or self._cover[0] != key:
-            critic = self.config.CostCritic
-            self._cover = (
-                key,
-                FootprintCover.of(
-                    self.footprint,
-                    costmap,
-                    consider_footprint=critic.consider_footprint,
-                    padding=critic.footprint_padding,
-                ),
-            )
-        return self._cover[1]
 
     # Optimization
 
@@ -209,13 +163,13 @@ class MPPI:
             noise[:, :, 1] = -self._mean
             noise[:, :, 2] = pursuit - self._mean
             self._rollouts.simulate(scene, noise, self._mean, self._under_way)
-            if self._rollouts.hit.all():
+            if self._rollouts.batch.hit.all():
                 return False
             at = self._rollouts.score(scene)
             self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
             before = self._mean.copy()
             config = self.config
-            best = kernels.average(
+            best = controls.average(
                 noise,
                 self._mean,
                 self._rollouts.total,
@@ -234,20 +188,18 @@ class MPPI:
         return True
 
     def _pursuit(self, scene: Scene) -> F32:
-        controls = np.zeros_like(self._mean)
+        written = np.zeros_like(self._mean)
         pursue(
             scene.path,
             scene.along,
             scene.start,
             scene.limits,
             np.float32(self.config.model_dt),
-            scene.costmap.costs,
-            np.float32(1.0 / scene.costmap.resolution),
-            scene.tables[2],
+            scene.ground,
             scene.local.reversing and self.reverses,
-            controls,
+            written,
         )
-        return controls
+        return written
 
     # The controls
 
@@ -256,30 +208,18 @@ class MPPI:
         if self.config.time_steps <= 20:
             return
         past = np.array(self._sent, dtype=np.float32).T
-        kernels.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
+        controls.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)
-        kernels.constrain(self._mean, scene.start, scene.limits, np.float32(dt), model_dt)
-        kernels.simulate(
+        controls.constrain(self._mean, scene.start, scene.limits, np.float32(dt), model_dt)
+        controls.simulate(
             self._mean, self._under_way, self._rollouts.delays, scene.start, model_dt, self._leads
         )
 
     def _collides(self, scene: Scene) -> bool:
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
-        check = np.array([1, *scene.cover.costs])
-        return bool(
-            kernels.first_collision(
-                self._leads,
-                scene.costmap.costs,
-                np.float32(1.0 / scene.costmap.resolution),
-                check,
-                scene.cover.circles,
-                scene.cover.outline,
-                steps,
-            )
-            >= 0
-        )
+        return bool(controls.first_collision(self._leads, scene.ground, steps) >= 0)
 
     def _remember(self, command: tuple[float, float]) -> None:
         self._last = command

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from twin.navigation.control.footprint_cover import F32
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 
 _BLOCKS = 8
 """So many different noises are drawn for `regenerate_noises`."""

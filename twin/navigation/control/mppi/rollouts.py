@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from twin.geometry import Array
-from twin.navigation.control.mppi import kernels
+from twin.navigation.control.footprint_cover import F32
+from twin.navigation.control.mppi import arrays
+from twin.navigation.control.mppi.arrays import Batch, Commands, Wanted
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.mppi.path_critics import (
     follow_target,
+    furthest_reached,
     score_align,
     score_angle,
     score_follow,
 )
+from twin.navigation.control.mppi.rollout_kernel import roll_out
 from twin.navigation.control.mppi.scene import Scene
 from twin.navigation.control.mppi.scoring import Totals
 
@@ -25,11 +28,12 @@ class Rollouts:
         self._config = config
         self._totals = Totals(config)
         steps, batch = config.time_steps, config.batch_size
-        self._state = np.zeros((8, batch), dtype=np.float32)
-        self._points = np.zeros((3, steps, batch), dtype=np.float32)
-        self._raw = np.zeros((kernels.CRITIC_COUNT, batch), dtype=np.float32)
-        self.hit = np.zeros(batch, dtype=np.uint8)
-        """Which of them collide."""
+        self.batch = Batch(
+            state=np.zeros((8, batch), dtype=np.float32),
+            points=np.zeros((3, steps, batch), dtype=np.float32),
+            raw=np.zeros((arrays.CRITIC_COUNT, batch), dtype=np.float32),
+            hit=np.zeros(batch, dtype=np.uint8),
+        )
         self.total = np.zeros(batch, dtype=np.float32)
         """What each scores; less is better."""
         self.delays = np.array(
@@ -46,56 +50,43 @@ class Rollouts:
             mean: The controls, shape (2, time_steps).
             under_way: Commands that had no effect yet, shape (2, n), the latest last.
         """
-        config, local = self._config, scene.local
-        goal, angle = config.GoalCritic, config.GoalAngleCritic
-        near = [
-            config.scores("GoalCritic") and local.length <= goal.threshold_to_consider,
-            config.scores("GoalAngleCritic") and local.length <= angle.threshold_to_consider,
-            angle.symmetric_yaw_tolerance,
-        ]
-        dead = config.VelocityDeadbandCritic.deadband_velocities
-        if not config.scores("VelocityDeadbandCritic"):
-            dead = (0.0, 0.0, 0.0)
-        kernels.roll_out(
-            noise,
-            mean,
-            under_way,
-            self.delays,
-            scene.start,
-            scene.limits,
-            np.float32(config.model_dt),
-            scene.costmap.costs,
-            np.float32(1.0 / scene.costmap.resolution),
-            scene.tables,
-            np.array([config.CostCritic.trajectory_point_step, *scene.cover.costs]),
-            scene.cover.circles,
-            scene.cover.outline,
-            scene.cover.padded,
-            np.float32(config.CostCritic.critical_cost),
-            np.array([*scene.path[:, -1], *near, local.length], dtype=np.float32),
-            np.array([config.scores("TwirlingCritic"), dead[0], dead[2]], dtype=np.float32),
-            self._state,
-            self._points,
-            self._raw,
-            self.hit,
+        commands = Commands(noise=noise, mean=mean, history=under_way, delays=self.delays)
+        dt = np.float32(self._config.model_dt)
+        roll_out(commands, scene.start, scene.limits, dt, scene.ground, self._wanted(scene), self.batch)
+
+    def _wanted(self, scene: Scene) -> Wanted:
+        config, length = self._config, scene.local.length
+        goal, angle, dead = config.GoalCritic, config.GoalAngleCritic, config.VelocityDeadbandCritic
+        v, _, w = dead.deadband_velocities if config.scores("VelocityDeadbandCritic") else (0.0, 0.0, 0.0)
+        return Wanted(
+            goal=np.ascontiguousarray(scene.path[:, -1]),
+            length=np.float32(length),
+            position=config.scores("GoalCritic") and length <= goal.threshold_to_consider,
+            heading=config.scores("GoalAngleCritic") and length <= angle.threshold_to_consider,
+            symmetric=angle.symmetric_yaw_tolerance,
+            twirling=config.scores("TwirlingCritic"),
+            deadband=np.array([v, w], dtype=np.float32),
+            look_every=config.CostCritic.trajectory_point_step,
+            near_cost=np.float32(config.CostCritic.critical_cost),
         )
 
     def score(self, scene: Scene) -> int:
         """Write `total`; return the pose of the local path that the rollouts are drawn to."""
-        config, length, raw = self._config, scene.local.length, self._raw
+        config, length = self._config, scene.local.length
+        state, points, raw, hit = self.batch
         stride = max(1, config.batch_size // 256)
-        furthest = kernels.furthest_reached(self._state, scene.path, scene.along, stride)
+        furthest = furthest_reached(state, scene.path, scene.along, stride)
         at = follow_target(config, scene, furthest)
         active = {
             "GoalCritic": length <= config.GoalCritic.threshold_to_consider,
             "GoalAngleCritic": length <= config.GoalAngleCritic.threshold_to_consider,
-            "PathAlignCritic": score_align(config, scene, furthest, self._points, self.hit, raw),
-            "PathFollowCritic": score_follow(config, scene, at, self._state, raw),
-            "PathAngleCritic": score_angle(config, scene, furthest, self._state, raw),
+            "PathAlignCritic": score_align(config, scene, furthest, points, hit, raw),
+            "PathFollowCritic": score_follow(config, scene, at, state, raw),
+            "PathAngleCritic": score_angle(config, scene, furthest, state, raw),
             "PreferForwardCritic": length >= config.PreferForwardCritic.threshold_to_consider
             and not scene.local.reversing,
         }
-        self._totals.write(raw, self.hit, active, self.total)
+        self._totals.write(raw, hit, active, self.total)
         return at
 
     def every(self, trajectories: int, steps: int) -> Array:
@@ -103,4 +94,4 @@ class Rollouts:
 
         Shape (n, m, 2).
         """
-        return self._points[:2, ::steps, ::trajectories].transpose(2, 1, 0).astype(np.float64)
+        return self.batch.points[:2, ::steps, ::trajectories].transpose(2, 1, 0).astype(np.float64)

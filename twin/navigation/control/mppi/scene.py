@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Pose2
-from twin.navigation.control.footprint_cover import FootprintCover
+from twin.navigation.control.footprint_cover import F32
+from twin.navigation.control.mppi.arrays import Ground, Limits
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.control.path_handler import LocalPath
-from twin.navigation.costmaps.costmap import Costmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,22 +26,18 @@ class Scene:
     valid: np.ndarray
     """Which of its poses are free, shape (n)."""
     local: LocalPath
-    costmap: Costmap
-    limits: F32
-    """vx_max, vx_min, wz_max, ax_max, ax_min, az_max, least turning radius."""
-    tables: F32
-    """Of the costs; see `scoring.cost_tables`."""
+    limits: Limits
+    ground: Ground
     to_grid: Pose2
     """From the path's frame to the costmap's corner."""
-    cover: FootprintCover
 
 
-def limits_of(config: MPPIConfig, speed_limit: float | None) -> F32:
-    """Return `Scene.limits`, under a limit of speed [m/s]; as in Nav2, turning is slowed as much."""
+def limits_of(config: MPPIConfig, speed_limit: float | None) -> Limits:
+    """Return the limits, under a limit of speed [m/s]; as in Nav2, turning is slowed as much."""
     ratio = 1.0 if speed_limit is None else min(1.0, max(0.0, speed_limit) / config.vx_max)
     radius = config.min_turning_r if config.motion_model == "Ackermann" else 0.0
-    speeds = [config.vx_max * ratio, config.vx_min * ratio, config.wz_max * ratio]
-    return np.array([*speeds, config.ax_max, config.ax_min, config.az_max, radius], dtype=np.float32)
+    speeds = config.vx_max * ratio, config.vx_min * ratio, config.wz_max * ratio
+    return Limits(*map(np.float32, (*speeds, config.ax_max, config.ax_min, config.az_max, radius)))
 
 
 def expected_speed(

@@ -7,24 +7,25 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.navigation.control.mppi import kernels
+from twin.navigation._jit import fast_jit
+from twin.navigation.control.footprint_cover import F32
+from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.kernels import F32
 from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 
 ROWS = {
-    "ConstraintCritic": kernels.CONSTRAINT,
-    "CostCritic": kernels.COST,
-    "ObstaclesCritic": kernels.OBSTACLES,
-    "GoalCritic": kernels.GOAL,
-    "GoalAngleCritic": kernels.GOAL_ANGLE,
-    "PathAlignCritic": kernels.ALIGN,
-    "PathFollowCritic": kernels.FOLLOW,
-    "PathAngleCritic": kernels.ANGLE,
-    "PreferForwardCritic": kernels.FORWARD,
-    "TwirlingCritic": kernels.TWIRLING,
-    "VelocityDeadbandCritic": kernels.DEADBAND,
-    "SpeedCritic": kernels.SPEED,
+    "ConstraintCritic": arrays.CONSTRAINT,
+    "CostCritic": arrays.COST,
+    "ObstaclesCritic": arrays.OBSTACLES,
+    "GoalCritic": arrays.GOAL,
+    "GoalAngleCritic": arrays.GOAL_ANGLE,
+    "PathAlignCritic": arrays.ALIGN,
+    "PathFollowCritic": arrays.FOLLOW,
+    "PathAngleCritic": arrays.ANGLE,
+    "PreferForwardCritic": arrays.FORWARD,
+    "TwirlingCritic": arrays.TWIRLING,
+    "VelocityDeadbandCritic": arrays.DEADBAND,
+    "SpeedCritic": arrays.SPEED,
 }
 
 
@@ -90,4 +91,28 @@ class Totals:
             out: Written.
         """
         terms = self._terms[:, [active.get(name, True) for name in self._names]]
-        kernels.weigh(raw, terms, hit, self._collision, out)
+        _weigh(raw, terms, hit, self._collision, out)
+
+
+@fast_jit
+def _weigh(raw: F32, terms: F32, hit: NDArray[np.uint8], collision: np.float32, out: F32) -> None:
+    """Write the sum of (weight * raw score)^power to `out`, shape (batch).
+
+    Args:
+        raw: Shape (CRITIC_COUNT, batch).
+        terms: Row of `raw`, weight and power of each critic, shape (3, n).
+        hit: Which rollouts collide, shape (batch).
+        collision: What these pay more.
+        out: Written.
+    """
+    batch = out.shape[0]
+    for k in range(batch):
+        out[k] = collision if hit[k] != 0 else np.float32(0.0)
+    for i in range(terms.shape[1]):
+        row, weight, power = raw[int(terms[0, i])], terms[1, i], int(terms[2, i])
+        if power == 1:
+            for k in range(batch):
+                out[k] += weight * row[k]
+        else:
+            for k in range(batch):
+                out[k] += (weight * row[k]) ** power

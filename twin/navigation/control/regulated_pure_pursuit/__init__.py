@@ -1,0 +1,1 @@
+"""Path following by the arc to a point ahead, after Nav2."""

@@ -1,0 +1,168 @@
+"""Path following: Nav2's Regulated Pure Pursuit (Macenski, Singh, Martín, Ginés 2023, arXiv 2305.20026)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.control.controller import Controller, Situation
+from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
+from twin.navigation.control.regulated_pure_pursuit.collision_check import CollisionCheck
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation import turn_rate
+
+_STILL_THERE = 0.25
+"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
+
+
+class RegulatedPurePursuit(Controller):
+    """Drives the arc to a point of the path ahead; plans nothing."""
+
+    config: RegulatedPurePursuitConfig
+
+    @property
+    def max_speed(self) -> float:
+        """desired_linear_vel [m/s]."""
+        return self.config.desired_linear_vel
+
+    @property
+    def reverses(self) -> bool:
+        """Whether it drives backwards."""
+        return self.config.allow_reversing
+
+    def _build(self) -> None:
+        config = self.config
+        self._tolerance = config.xy_goal_tolerance
+        self._collisions = CollisionCheck(config, self.footprint)
+        self._handler = PathHandler(
+            config=PathHandlerConfig(
+                prune_distance=math.inf,
+                max_robot_pose_search_dist=config.max_robot_pose_search_dist,
+                enforce_path_inversion=config.allow_reversing,
+                inversion_xy_tolerance=config.inversion_xy_tolerance,
+                inversion_yaw_tolerance=config.inversion_yaw_tolerance,
+            )
+        )
+
+    def reset(self) -> None:
+        """Forget the path."""
+        self._handler.reset()
+        self._reached_xy = False
+        self._cancelling = self._stopped = False
+        self.carrot = None
+
+    def cancel(self) -> bool:
+        """Brake along the path if use_cancel_deceleration; return whether the robot may be stopped."""
+        self._cancelling = True
+        return self._stopped or not self.config.use_cancel_deceleration
+
+    def command(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
+        config = self.config
+        if self._handler.accept(now.path):
+            self._reached_xy = False
+        ahead = self._handler.local(now.pose)
+        sign = -1.0 if ahead.reversing and config.allow_reversing else 1.0
+        local = now.pose.inverse().apply(ahead.poses[:, :2])
+        x, y = _lookahead_point(local, self._lookahead(now.velocity[0]))
+        self.carrot = (now.pose @ Pose2(x, y, 0.0))[:2]
+        distance = math.hypot(x, y)
+        if config.use_fixed_curvature_lookahead:
+            x, y = self._curvature_point(local)
+        bearing = math.atan2(sign * y, sign * x)
+        turn = self._turn_in_place(now, ahead, math.hypot(*local[-1]), bearing)
+        if turn is None:
+            curvature = 2.0 * y / (x * x + y * y) if x * x + y * y > 0.001 else 0.0
+            v = sign * self._regulate(now, curvature, local, ahead.length)
+            if self._cancelling and config.use_cancel_deceleration:
+                v = sign * max(0.0, sign * now.velocity[0] - config.cancel_deceleration * now.dt)
+            w = v * curvature
+        else:
+            v, w = 0.0, turn
+        self._stopped = self._cancelling and v == 0.0
+        if now.costmap is None or not config.use_collision_detection:
+            return v, w
+        look = now.at, now.costmap, distance, self._collisions.way_to_stop(now.velocity[0])
+        if config.turn_before_collision and v > 0.0:
+            return self._collisions.first_free(v, w, self._turn_rate(bearing, now), *look)
+        self._collisions.check(v, w, *look)
+        return v, w
+
+    def _curvature_point(self, local: Array) -> tuple[float, float]:
+        """Return the point that curvature is taken at; beyond the goal, if that is asked for."""
+        distance = self.config.curvature_lookahead_dist
+        if self.config.interpolate_curvature_after_goal and len(local) > 1:
+            along = local[-1] - local[-2]
+            beyond = local[-1] + along / max(float(np.hypot(*along)), 1e-9) * 2.0 * distance
+            local = np.vstack([local, beyond])
+        return _lookahead_point(local, distance)
+
+    def _lookahead(self, v: float) -> float:
+        config = self.config
+        if not config.use_velocity_scaled_lookahead_dist:
+            return config.lookahead_dist
+        return min(max(abs(v) * config.lookahead_time, config.min_lookahead_dist), config.max_lookahead_dist)
+
+    def _turn_in_place(self, now: Situation, ahead: LocalPath, off: float, bearing: float) -> float | None:
+        """Return the rate of a turn to the goal's heading, or to a carrot aside; None: drive.
+
+        Args:
+            now: The situation.
+            ahead: The local path.
+            off: Distance to its end [m].
+            bearing: Of the carrot [rad].
+        """
+        self._reached_xy |= ahead.ends_at_goal and off < self._tolerance
+        self._reached_xy &= off < self._tolerance + _STILL_THERE
+        if not self.config.use_rotate_to_heading:
+            return None
+        if self._reached_xy:
+            return self._turn_rate(wrap_angle(float(now.path[-1, 2]) - now.pose.yaw), now)
+        return (
+            self._turn_rate(bearing, now) if abs(bearing) > self.config.rotate_to_heading_min_angle else None
+        )
+
+    def _turn_rate(self, angle: float, now: Situation) -> float:
+        """Return w for turning in place by `angle`: reachable from the present one, able to stop in time."""
+        return turn_rate(
+            angle,
+            now.velocity[1],
+            now.dt,
+            max_rate=self.config.rotate_to_heading_angular_vel,
+            acceleration=self.config.max_angular_accel,
+        )
+
+    def _regulate(self, now: Situation, curvature: float, local: Array, length: float) -> float:
+        """Return the linear velocity: slower in turns, near obstacles and at the end."""
+        config = self.config
+        v = limit = self.speed
+        if config.use_regulated_linear_velocity_scaling and curvature != 0.0:
+            v = min(v, limit * abs(1.0 / curvature) / config.regulated_linear_scaling_min_radius)
+        if config.use_cost_regulated_linear_velocity_scaling and now.costmap is not None:
+            way = self._collisions.way_to_stop(now.velocity[0])
+            clearance = self._collisions.clearance(now.at, local, now.costmap, way)
+            if clearance < config.cost_scaling_dist:
+                v = min(v, limit * config.cost_scaling_gain * clearance / config.cost_scaling_dist)
+        v = max(v, config.regulated_linear_scaling_min_speed)
+        approach = config.approach_velocity_scaling_dist
+        if length < approach:
+            remaining = math.hypot(*local[-1])
+            v = min(v, max(v * remaining / approach, config.min_approach_linear_velocity))
+        return min(v, limit)
+
+
+def _lookahead_point(local: Array, distance: float) -> tuple[float, float]:
+    """Return where the path, shape (n, 2) in the base frame, leaves the circle of radius `distance`."""
+    far = np.hypot(local[:, 0], local[:, 1]) >= distance
+    i = int(np.argmax(far))
+    if not far[i]:
+        return float(local[-1, 0]), float(local[-1, 1])
+    if i == 0:
+        return float(local[0, 0]), float(local[0, 1])
+    (ax, ay), (bx, by) = local[i - 1].tolist(), local[i].tolist()
+    dx, dy = bx - ax, by - ay
+    a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - distance * distance
+    t = (-b + math.sqrt(b * b - a * c)) / a
+    return ax + t * dx, ay + t * dy
