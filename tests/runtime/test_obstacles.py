@@ -14,7 +14,7 @@ from twin.navigation.costmaps.footprint import rectangle
 from twin.runtime.obstacles import Outline, Walker
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
-from twin.scenario.world import Obstacle
+from twin.scenario.world import Obstacle, PoseConfig
 
 TEXT = """
 name: crate
@@ -85,6 +85,33 @@ def test_a_walker_does_not_walk_into_a_robots_corner_that_its_base_is_no_nearer_
         blind.walk(0.02, [beside])
         careful.walk(0.02, [beside], [outline])
     assert blind.pose.x + 0.6 > nose[0] > careful.pose.x + 0.6 + 0.25
+
+
+def test_how_far_an_outline_is_from_a_box() -> None:
+    outline, box = Outline.of(rectangle(0.8, 0.6)), (0.4, 0.4)
+    assert outline.gap(Pose2(1.0, 0.1, 0.0), box) == pytest.approx(0.4)
+    assert outline.gap(Pose2(0.1, -1.0, np.pi / 2), box) == pytest.approx(0.4)
+    assert outline.gap(Pose2(1.0, 0.0, np.arctan2(0.3, 0.4)), box) == pytest.approx(0.3), "its corner leads"
+    assert outline.gap(Pose2(0.0, 0.0, 0.6) @ Pose2(0.0, 1.0, 0.0), box) == pytest.approx(
+        0.7 - 0.2 * (np.cos(0.6) + np.sin(0.6))
+    ), "the box's corner before its side"
+    assert outline.gap(Pose2(0.55, 0.0, 0.0), box) == pytest.approx(-0.05), "inside"
+    assert Outline.of(np.zeros((1, 2))).gap(Pose2(1.0, 0.0, 0.3), box) == pytest.approx(0.8), "a point"
+
+
+@pytest.mark.parametrize("y", [0.54, 0.52], ids=["beside its way", "over its way"])
+def test_a_walker_does_not_squeeze_along_a_robot_that_comes_into_its_way(y: float) -> None:
+    outline = Outline.of(rectangle(0.82, 0.57))
+    walker = Walker(WALKER.model_copy(update={"route": ((-3.0, 0.0),), "pose": PoseConfig(x=3.0)}))
+    while walker.pose.x > 1.27:  # when the robot comes, the walker is beside its tail
+        walker.walk(0.02, [])
+    robot = Pose2(1.09, y, -2.91)
+    for step in range(300):
+        if step < 80:  # its nose crosses the way
+            robot = robot @ Pose2(0.004, 0.0, 0.0)
+        walker.walk(0.02, [robot], [outline])
+        assert outline.gap(walker.pose.inverse() @ robot, (0.4, 0.4)) > 0.0
+    assert walker.pose.x > 1.5, "patience is over, and there is a way back"
 
 
 def test_a_walker_is_seen_by_the_lidar_where_it_walks(

@@ -12,7 +12,6 @@ import numpy as np
 
 from twin.geometry import Array, Pose2, Pose3
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.planning.planner import filled
 from twin.scenario.world import Obstacle
 from twin.sim.world import World
 
@@ -70,17 +69,34 @@ class ObstacleSchedule:
 
 
 class Outline(NamedTuple):
-    """A robot's outline on the floor."""
+    """A robot's outline on the floor; dents in it count as filled."""
 
-    points: Array
-    """At most 5 cm apart, in the base frame, shape (n, 2) [m]."""
+    corners: Array
+    """In the base frame, shape (n, 2) [m]."""
+    normals: Array
+    """Of its edges, of length 1, shape (m, 2)."""
     reach: float
-    """Of the farthest from the base [m]."""
+    """Of the farthest corner from the base [m]."""
 
     @classmethod
     def of(cls, footprint: Array) -> Outline:
         """Return that of a footprint, shape (n, 2) [m]."""
-        return cls(filled(np.vstack([footprint, footprint[:1]]), 0.05), radii(footprint)[1])
+        edges = footprint - np.roll(footprint, 1, axis=0)
+        lengths = np.hypot(*edges.T)
+        edges = edges[lengths > 0.0] / lengths[lengths > 0.0, None]
+        return cls(footprint, np.column_stack([-edges[:, 1], edges[:, 0]]), radii(footprint)[1])
+
+    def gap(self, T_box_base: Pose2, size: tuple[float, float]) -> float:
+        """Return how far the outline is from a box of a size about the origin [m]; negative: how deep in it.
+
+        By the separating axis theorem: corner to corner it is further than so. It changes with every
+        step, along a side that slants a little, too, and inside.
+        """
+        corners = T_box_base.apply(self.corners)
+        axes = np.vstack([np.eye(2), Pose2(0.0, 0.0, T_box_base.yaw).apply(self.normals)])
+        half = np.abs(axes) @ (np.array(size) / 2.0)
+        along = corners @ axes.T
+        return float(np.maximum(along.min(axis=0) - half, -half - along.max(axis=0)).max())
 
 
 class Walker:
@@ -126,16 +142,16 @@ class Walker:
         return moved
 
     def _is_blocked(self, along: float, bases: Sequence[Pose2], outlines: Sequence[Outline]) -> bool:
-        """Whether a robot is near, and would be nearer after the step: its base, or some corner of it."""
+        """Whether a robot is near, and would be nearer after the step: its base, or some part of it."""
         here, there = self.pose, self._at(along)
         for base, outline in zip_longest(bases, outlines):
             then = _distance(self.obstacle, there, base)
             if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
                 return True
             if outline is not None and then < outline.reach + _GAP:
-                points = base.apply(outline.points)
-                gap = _gap(self.obstacle, there, points)
-                if gap < _GAP and gap < _gap(self.obstacle, here, points):
+                size = self.obstacle.size[:2]
+                gap = outline.gap(there.inverse() @ base, size)
+                if gap < _GAP and gap < outline.gap(here.inverse() @ base, size):
                     return True
         return False
 
@@ -153,12 +169,6 @@ class Walker:
 
 def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:
     return Pose3.from_pose2(pose, obstacle.size[2] / 2.0)
-
-
-def _gap(obstacle: Obstacle, pose: Pose2, points: Array) -> float:
-    """Return how far the nearest of points, shape (n, 2) [m], is from the footprint of an obstacle [m]."""
-    away = np.abs(pose.inverse().apply(points)) - np.array(obstacle.size[:2]) / 2.0
-    return float(np.hypot(*np.maximum(away, 0.0).T).min())
 
 
 def _distance(obstacle: Obstacle, pose: Pose2, base: Pose2) -> float:
