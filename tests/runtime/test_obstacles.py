@@ -114,6 +114,19 @@ def test_a_walker_does_not_squeeze_along_a_robot_that_comes_into_its_way(y: floa
     assert walker.pose.x > 1.5, "patience is over, and there is a way back"
 
 
+def test_a_walker_does_not_walk_through_a_corner_that_reaches_into_its_way() -> None:
+    outline = Outline.of(rectangle(0.82, 0.57))
+    walker = Walker(WALKER.model_copy(update={"route": ((-3.0, 0.0),), "pose": PoseConfig(x=3.0)}))
+    while walker.pose.x > 0.6:
+        walker.walk(0.02, [])
+    robot = Pose2(0.6, 0.0, -2.92) @ Pose2(-0.41, -0.285, 0.0)  # with its nose's left corner over the way
+    robot = Pose2(robot.x, robot.y + 0.19, robot.yaw)
+    assert outline.gap(walker.pose.inverse() @ robot, (0.4, 0.4)) == pytest.approx(-0.01)
+    for _ in range(100):
+        walker.walk(0.02, [robot], [outline])
+    assert walker.pose.x == pytest.approx(0.6, abs=0.02)
+
+
 def test_a_walker_is_seen_by_the_lidar_where_it_walks(
     scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
 ) -> None:

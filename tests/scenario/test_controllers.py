@@ -61,6 +61,11 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
         ),
         ({"vx_max": 0.5}, "not of regulated_pure_pursuit without rotation shim"),
         ({"angular_dist_threshold": 0.5}, "'angular_dist_threshold' is of the rotation shim"),
+        ({"required_movement_angle": 0.5}, "needs 'progress_checker: pose' beside it"),
+        (
+            {"goal_checker": "position", "yaw_goal_tolerance": 0.5},
+            "not looked at with 'goal_checker: position'",
+        ),
     ],
 )
 def test_a_key_of_another_plugin_is_refused(keys: dict[str, object], told: str) -> None:

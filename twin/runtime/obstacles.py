@@ -17,6 +17,10 @@ from twin.sim.world import World
 
 _GAP = 0.3
 """Nobody walks nearer to any part of a robot than so [m]."""
+_BESIDE = 0.1
+"""Nearer than this to a part of a robot there is no way along it, only away from it [m]."""
+_AWAY = 1e-6
+"""A step that gains less than this does not lead away [m]."""
 _BELOW_M = 20.0
 """An obstacle that is not there waits so far below its place, where no ray and no robot comes."""
 
@@ -151,7 +155,8 @@ class Walker:
             if outline is not None and then < outline.reach + _GAP:
                 size = self.obstacle.size[:2]
                 gap = outline.gap(there.inverse() @ base, size)
-                if gap < _GAP and gap < outline.gap(here.inverse() @ base, size):
+                gain = gap - outline.gap(here.inverse() @ base, size)
+                if (gap < _GAP and gain < 0.0) or (gap < _BESIDE and gain < _AWAY):
                     return True
         return False
 

@@ -197,6 +197,16 @@ class ControllerParameters(
                 told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
                 yield Fault((name,), f"'{name}' is of {owner}, not of {told}; {nearest(name, sorted(valid))}")
 
+        if "required_movement_angle" in self.model_fields_set and self.progress_checker != "pose":
+            yield Fault(
+                ("required_movement_angle",),
+                "'required_movement_angle' needs 'progress_checker: pose' beside it",
+            )
+        if "yaw_goal_tolerance" in self.model_fields_set and self.goal_checker == "position":
+            yield Fault(
+                ("yaw_goal_tolerance",), "'yaw_goal_tolerance' is not looked at with 'goal_checker: position'"
+            )
+
     def overrides(self) -> dict[str, Any]:
         """Return only the parameters that the file gives, by name; a critic's as a mapping."""
         found = super().overrides()

@@ -159,6 +159,7 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
             "turn_before_collision": True,
             "max_linear_decel": 0.0,
             "failure_tolerance": 0.3,
+            "progress_checker": "pose",
             "required_movement_radius": 0.2,
             "movement_time_allowance": 2.5,
             "rotate_to_heading_min_angle": 1.2,
