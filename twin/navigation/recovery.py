@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.costmaps.kernels import escapes, steps_to_collision
+from twin.navigation.costmaps.costmap import Costmap, collision_step
+from twin.navigation.costmaps.kernels import escapes
 
 COLLISION_AHEAD = "collision_ahead"
 TIMEOUT = "timeout"
@@ -95,19 +95,7 @@ class _Behavior:
         time = min(self.config.simulate_ahead_time, remaining / speed)
         size = costmap.resolution / 2.0 if v else math.radians(5.0)
         steps = max(1, math.ceil(time * speed / size))
-        hit = steps_to_collision(
-            costmap.costs,
-            self._footprint,
-            float(pose.x),
-            float(pose.y),
-            float(pose.yaw),
-            float(v),
-            float(w),
-            time / steps,
-            math.inf,
-            steps,
-            *costmap.frame,
-        )
+        hit = collision_step(costmap, self._footprint, pose, (v, w), time / steps, steps)
         if hit != 0:
             return hit > 0
         # The present pose is a collision: a robot that touches something may move away, not further in.
@@ -221,19 +209,8 @@ class AssistedTeleop(_Behavior):
             return 1.0
         config = self.config
         steps = max(1, round(config.projection_time / config.simulation_time_step))
-        hit = steps_to_collision(
-            costmap.costs,
-            self._footprint,
-            float(pose.x),
-            float(pose.y),
-            float(pose.yaw),
-            float(v),
-            float(w),
-            float(config.simulation_time_step),
-            math.inf,
-            steps,
-            *costmap.frame,
-        )
+        step = float(config.simulation_time_step)
+        hit = collision_step(costmap, self._footprint, pose, (v, w), step, steps)
         if hit == -1:
             return 1.0
         return 0.0 if hit <= 1 else hit / steps

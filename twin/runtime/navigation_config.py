@@ -76,8 +76,6 @@ def navigation_parameters(
         scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
-    linear = config.max_linear_speed or drive.max_linear_velocity or 1.0
-    angular = config.max_angular_speed or drive.max_angular_velocity or 1.5
     layers = CostmapConfig(
         footprint=polygon,
         footprint_padding=0.0,  # it is in the footprint already
@@ -94,22 +92,7 @@ def navigation_parameters(
         obstacle_max_range=3.0,
         expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
     )
-    # No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
-    smoother = VelocitySmootherConfig(
-        linear=_limits(
-            linear,
-            config.max_linear_acceleration or 0.8,
-            config.max_linear_deceleration or 1.2,
-            drive.max_linear_acceleration,
-        ),
-        angular=_limits(
-            angular,
-            config.max_angular_acceleration or 2.0,
-            config.max_angular_acceleration or 3.0,
-            drive.max_angular_acceleration,
-        ),
-        scale_velocities=True,
-    )
+    smoother = _smoother(config, drive)
     return NavigationParameters(
         smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
@@ -132,6 +115,28 @@ def navigation_parameters(
         docking=docking_config(config.docking),
         navigator=_navigator(config.navigator.overrides()),
         waypoints=WaypointFollowerConfig(),
+    )
+
+
+def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherConfig:
+    """Return the limits of what is commanded.
+
+    No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
+    """
+    return VelocitySmootherConfig(
+        linear=_limits(
+            config.max_linear_speed or drive.max_linear_velocity or 1.0,
+            config.max_linear_acceleration or 0.8,
+            config.max_linear_deceleration or 1.2,
+            drive.max_linear_acceleration,
+        ),
+        angular=_limits(
+            config.max_angular_speed or drive.max_angular_velocity or 1.5,
+            config.max_angular_acceleration or 2.0,
+            config.max_angular_acceleration or 3.0,
+            drive.max_angular_acceleration,
+        ),
+        scale_velocities=True,
     )
 
 

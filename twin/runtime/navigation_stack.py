@@ -14,13 +14,13 @@ from twin.nodes.navigation.controller_server import ControllerServerNode
 from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.docking_server import DockingServerNode
 from twin.nodes.navigation.planner_server import PlannerServerNode
-from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
 from twin.runtime.nav2_parameters import monitor_with_file, with_file, with_plugins
-from twin.runtime.navigation_config import navigation_parameters
+from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
 from twin.runtime.stack_context import StackContext
 from twin.runtime.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
@@ -37,29 +37,14 @@ def build_navigation(
         pose: What the robot believes about its pose.
         footprint: Corners in the base frame, shape (n, 2) [m].
     """
-    bus, namespace, description = context.bus, context.namespace, context.handle.description
-    assert description.drive is not None
-    localisation = context.config.localisation
-    mapping = localisation is not None and localisation.type == "slam"
+    bus, namespace, drive = context.bus, context.namespace, context.handle.description.drive
+    assert drive is not None
     config = with_plugins(config, namespace)
-    lidars = [s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == "scan"]
-    parameters = navigation_parameters(
-        config,
-        description.drive,
-        footprint,
-        pose.frames,
-        mapping=mapping,
-        scan_rate=lidars[0].rate_hz if lidars else None,
-    )
+    parameters = _defaults(context, config, drive, footprint, pose.frames)
     parameters, not_understood = with_file(parameters, config, namespace)
     period_ns = context.control_period_ns
-    build_commands(
-        context,
-        monitor_with_file(config, namespace),
-        pose,
-        footprint,
-        _drive_limits(parameters.smoother, description.drive),
-    )
+    limits = _drive_limits(parameters.smoother, drive)
+    build_commands(context, monitor_with_file(config, namespace), pose, footprint, limits)
     VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
     build_zones(bus, config, pose.frames.map, namespace=namespace)
     in_map = with_filters(parameters.global_costmap, config, speed=False)
@@ -85,13 +70,34 @@ def build_navigation(
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
-    if lidars:
+    if _lidar(context) is not None:
         DockingServerNode(bus, pose, parameters.docking, namespace=namespace)
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
     return navigator
+
+
+def _defaults(
+    context: StackContext, config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+) -> NavigationParameters:
+    """Return the parameters without those of a file."""
+    localisation, lidar = context.config.localisation, _lidar(context)
+    return navigation_parameters(
+        config,
+        drive,
+        footprint,
+        frames,
+        mapping=localisation is not None and localisation.type == "slam",
+        scan_rate=None if lidar is None else lidar.rate_hz,
+    )
+
+
+def _lidar(context: StackContext) -> LidarSpec | None:
+    """Return the lidar that navigation looks at, if the robot has it."""
+    sensors = context.handle.description.sensors
+    return next((s for s in sensors if isinstance(s, LidarSpec) and s.topic == "scan"), None)
 
 
 def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.kernels import Cells, outline_cost
+from twin.navigation.costmaps.kernels import Cells, outline_cost, steps_to_collision
 
 FREE_SPACE = 0
 MAX_NON_OBSTACLE = 252
@@ -69,6 +69,33 @@ def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
     """
     corners = np.array(footprint, dtype=np.float64, order="C")
     return outline_cost(costmap.costs, corners, float(pose.x), float(pose.y), float(pose.yaw), *costmap.frame)
+
+
+def collision_step(
+    costmap: Costmap,
+    footprint: Array,
+    pose: Pose2,
+    command: tuple[float, float],
+    dt: float,
+    max_steps: int,
+    max_distance: float = math.inf,
+) -> int:
+    """Return after how many steps a command drives the outline into something; -1 if never.
+
+    Args:
+        costmap: The grid.
+        footprint: As `outline_cost` takes it: shape (n, 2) [m], C-contiguous; with a single corner the
+            inscribed cost of the centre is a collision.
+        pose: Of the base, in the costmap's frame.
+        command: v [m/s], w [rad/s], kept up.
+        dt: Of a step [s].
+        max_steps: Where the projection ends at the latest.
+        max_distance: From the pose [m]; it ends there, too.
+    """
+    (x, y, yaw), (v, w) = map(float, pose), map(float, command)
+    return steps_to_collision(
+        costmap.costs, footprint, x, y, yaw, v, w, dt, max_distance, max_steps, *costmap.frame
+    )
 
 
 def inflation_costs(

@@ -67,22 +67,13 @@ class RangeSensorLayer:
             field_of_view: Full angle of the cone [rad].
             frame: Origin x, y and resolution of the grid [m].
         """
-        least, greatest = limits
-        if least == greatest:
-            if not math.isinf(distance) or (distance > 0.0 and not self.config.clear_on_max_reading):
-                return NOTHING
-            clearing, distance = distance > 0.0, least
-        elif not least <= distance <= greatest:
+        reading = self._reading(distance, *limits)
+        if reading is None:
             return NOTHING
-        else:
-            clearing = distance >= greatest and self.config.clear_on_max_reading
+        distance, clearing = reading
         half = 0.5 * field_of_view
         # As nav2, a fifth further than the reading, so that the far side of the object is weighed, too.
-        reach = 1.2 * distance
-        xs = [sensor.x, *(sensor.x + reach * math.cos(sensor.yaw + side * half) for side in (-1, 1))]
-        ys = [sensor.y, *(sensor.y + reach * math.sin(sensor.yaw + side * half) for side in (-1, 1))]
-        columns = [math.floor((x - frame[0]) / frame[2]) for x in xs]
-        rows = [math.floor((y - frame[1]) / frame[2]) for y in ys]
+        columns, rows = _triangle(sensor, 1.2 * distance, half, frame)
         window = Window(min(columns), min(rows), max(columns) + 1, max(rows) + 1).clipped(
             self.probabilities.shape
         )
@@ -104,6 +95,16 @@ class RangeSensorLayer:
         )
         return window
 
+    def _reading(self, distance: float, least: float, greatest: float) -> tuple[float, bool] | None:
+        """Return a reading's distance [m], and whether it tells that nothing is there; None: no reading."""
+        if least == greatest:
+            if not math.isinf(distance) or (distance > 0.0 and not self.config.clear_on_max_reading):
+                return None
+            return least, distance > 0.0
+        if not least <= distance <= greatest:
+            return None
+        return distance, distance >= greatest and self.config.clear_on_max_reading
+
     def costs(self, window: Window) -> Cells:
         """Return the costs of a window's cells: lethal, free, or unknown where the readings do not decide."""
         costs: Cells = self._table[self.probabilities[window.slices]]
@@ -122,6 +123,17 @@ class RangeSensorLayer:
     def move(self, dx: int, dy: int) -> None:
         """Follow a grid that rolls by (dx, dy) cells."""
         self.probabilities = shifted(self.probabilities, dx, dy, _EVEN)
+
+
+def _triangle(
+    sensor: Pose2, reach: float, half: float, frame: tuple[float, float, float]
+) -> tuple[list[int], list[int]]:
+    """Return columns and rows of the corners of a cone of half an angle [rad], the sensor first."""
+    xs = [sensor.x, *(sensor.x + reach * math.cos(sensor.yaw + side * half) for side in (-1, 1))]
+    ys = [sensor.y, *(sensor.y + reach * math.sin(sensor.yaw + side * half) for side in (-1, 1))]
+    columns = [math.floor((x - frame[0]) / frame[2]) for x in xs]
+    rows = [math.floor((y - frame[1]) / frame[2]) for y in ys]
+    return columns, rows
 
 
 @jit

@@ -67,7 +67,27 @@ def fit_wall(
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     if len(xy) < 5:
         return None
-    some = xy[np.linspace(0, len(xy) - 1, min(HYPOTHESIS_POINTS, len(xy))).astype(np.int64)]
+    line = _best_line(xy, tolerance, facing, max_yaw)
+    if line is None:
+        return None
+    normal, offset = line
+    for _ in range(3):
+        inliers = np.abs(xy @ normal - offset) <= tolerance
+        if np.count_nonzero(inliers) < 5:
+            return None
+        normal, offset, rms = _total_least_squares(xy[inliers])
+    if offset < 0.0:
+        normal, offset = -normal, -offset
+    yaw = math.atan2(normal[1], normal[0])
+    reach = float(np.ptp(xy[inliers] @ np.array([-normal[1], normal[0]])))
+    if abs(wrap_angle(yaw - facing)) > max_yaw or reach < min_length:
+        return None
+    return WallFit(distance=offset, yaw=yaw, rms=rms, inliers=inliers)
+
+
+def _best_line(points: Array, tolerance: float, facing: float, max_yaw: float) -> tuple[Array, float] | None:
+    """Return unit normal and offset [m] of the line through two points that most lie on; see `fit_wall`."""
+    some = points[np.linspace(0, len(points) - 1, min(HYPOTHESIS_POINTS, len(points))).astype(np.int64)]
     i, j = np.triu_indices(len(some), k=1)
     along = some[j] - some[i]
     length = np.hypot(along[:, 0], along[:, 1])
@@ -84,19 +104,7 @@ def fit_wall(
     normals, offsets = normals[may_be], offsets[may_be]
     squared = (normals @ some.T - offsets[:, None]) ** 2
     best = int(np.argmin(np.minimum(squared, tolerance**2).sum(axis=1)))
-    normal, offset = normals[best], float(offsets[best])
-    for _ in range(3):
-        inliers = np.abs(xy @ normal - offset) <= tolerance
-        if np.count_nonzero(inliers) < 5:
-            return None
-        normal, offset, rms = _total_least_squares(xy[inliers])
-    if offset < 0.0:
-        normal, offset = -normal, -offset
-    yaw = math.atan2(normal[1], normal[0])
-    reach = float(np.ptp(xy[inliers] @ np.array([-normal[1], normal[0]])))
-    if abs(wrap_angle(yaw - facing)) > max_yaw or reach < min_length:
-        return None
-    return WallFit(distance=offset, yaw=yaw, rms=rms, inliers=inliers)
+    return normals[best], float(offsets[best])
 
 
 def find_box_faces(

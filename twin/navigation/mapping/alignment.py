@@ -18,8 +18,6 @@ BUCKET = 0.5
 """Edge of the cells in which lines are looked up [m]."""
 REACHES = (0.5, 0.35, 0.25, 0.2, 0.15, 0.12, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
 """How far [m] a point may be from its line, iteration by iteration."""
-INLIER = 0.1
-"""A point this near to a line lies on it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -90,10 +90,7 @@ class CorrelationGrid:
         if not len(points):
             return None
         points = np.ascontiguousarray(points[:: math.ceil(len(points) / MOST_POINTS)])
-        farthest = float(np.sqrt(np.max(np.sum(points * points, axis=1))))
-        step = min(max(self.resolution / max(farthest, 1.0), 0.004), 0.05)
-        half = math.ceil(window.half_angle / step)
-        turns: Array = np.arange(-half, half + 1, dtype=np.float64) * step
+        turns = self._turns(points, window.half_angle)
         cells = np.empty((len(turns), len(points), 2), dtype=np.int32)
         _place(points, guess.x, guess.y, guess.yaw + turns, self.resolution, self._low, cells)
         reach = round(window.half_width / self.resolution)
@@ -120,6 +117,13 @@ class CorrelationGrid:
             guess.yaw + float(turns[int(best[1])]),
         )
         return Correlation(pose=pose, response=float(best[4]))
+
+    def _turns(self, points: Array, half_angle: float) -> Array:
+        """Return the angles to try, shape (n,) [rad]: the farthest point moves by a cell between two."""
+        farthest = float(np.sqrt(np.max(np.sum(points * points, axis=1))))
+        step = min(max(self.resolution / max(farthest, 1.0), 0.004), 0.05)
+        half = math.ceil(half_angle / step)
+        return np.arange(-half, half + 1, dtype=np.float64) * step
 
 
 def _kernel(resolution: float, deviation: float) -> NDArray[np.uint8]:

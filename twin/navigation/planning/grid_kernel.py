@@ -95,6 +95,41 @@ def distance(nx: int, ny: int, any_angle: bool) -> float:
 
 
 @jit
+def _on_grid(x: int, y: int, width: int, height: int) -> bool:
+    return 0 <= x < width and 0 <= y < height
+
+
+@jit
+def _buckets(prices: Array) -> tuple[float, int]:
+    """Return width [cells] and number, a power of two, of the buckets that keys wait in."""
+    top = 1.0
+    for row in range(2):
+        for level in range(256):
+            if top < prices[row, level] < math.inf:
+                top = prices[row, level]
+    # No step raises a key by more than its own cost and the way back.
+    longest = _ROOT2 * (top + 1.0)
+    bucket_width = max(_WIDTH, 2.0 * longest / _MAX_BUCKETS)
+    size = 4
+    while size * bucket_width < longest + 2.0 * bucket_width:
+        size *= 2
+    return bucket_width, size
+
+
+@jit
+def _entries(following: Ints, cells: Ints, g: Array, capacity: int) -> tuple[Ints, Ints, Array]:
+    """Return room for so many entries, with those that there are; the rest is a chain of unused ones."""
+    more_following, more_cells, more_g = (
+        np.empty(capacity, np.int32), np.empty(capacity, np.int32), np.empty(capacity, np.float64)
+    )  # fmt: skip
+    for i in range(capacity):
+        more_following[i] = i + 1
+    for i in range(following.shape[0]):
+        more_following[i], more_cells[i], more_g[i] = following[i], cells[i], g[i]
+    return more_following, more_cells, more_g
+
+
+@jit
 def search(
     costs: Cells,
     prices: Array,
@@ -136,23 +171,11 @@ def search(
     """
     height = costs.shape[0] // width
     goal_x, goal_y = goal % width, goal // width
-    top = 1.0
-    for row in range(2):
-        for level in range(256):
-            if top < prices[row, level] < math.inf:
-                top = prices[row, level]
-    # No step raises a key by more than its own cost and the way back.
-    longest = _ROOT2 * (top + 1.0)
-    bucket_width = max(_WIDTH, 2.0 * longest / _MAX_BUCKETS)
-    size = 4
-    while size * bucket_width < longest + 2.0 * bucket_width:
-        size *= 2
+    bucket_width, size = _buckets(prices)
     heads = np.full(size, -1, np.int32)
     capacity = 256
-    following = np.empty(capacity, np.int32)
-    entry_cell, entry_g = np.empty(capacity, np.int32), np.empty(capacity, np.float64)
-    for i in range(capacity):
-        following[i] = i + 1
+    none = np.empty(0, np.int32)
+    following, entry_cell, entry_g = _entries(none, none, np.empty(0, np.float64), capacity)
     side, steps = np.empty(4), np.empty(8, np.int64)
     for k in range(8):
         steps[k] = _DX[k] + _DY[k] * width
@@ -185,20 +208,15 @@ def search(
         price = prices[row, costs[cell]]
         above = parent[cell]
         for k in range(8):
-            if k == 0:
-                reachable = x + 1 < width
-            elif k == 1:
-                reachable = y + 1 < height
-            elif k == 2:
-                reachable = x > 0
-            elif k == 3:
-                reachable = y > 0
-            else:
-                reachable = side[k - 4] < math.inf and side[(k - 3) & 3] < math.inf
             near = cell + steps[k]
-            there = prices[row, costs[near]] if reachable else math.inf
             if k < 4:
+                there = (
+                    prices[row, costs[near]] if _on_grid(x + _DX[k], y + _DY[k], width, height) else math.inf
+                )
                 side[k] = there
+            else:
+                beside = side[k - 4] < math.inf and side[(k - 3) & 3] < math.inf
+                there = prices[row, costs[near]] if beside else math.inf
             if there == math.inf:
                 continue
             cost = here + 0.5 * (price + there) * (1.0 if k < 4 else _ROOT2)
@@ -223,15 +241,8 @@ def search(
                 if slack == 0.0:
                     continue
             if unused == capacity:
-                more_following = np.empty(2 * capacity, np.int32)
-                more_cell, more_g = np.empty(2 * capacity, np.int32), np.empty(2 * capacity, np.float64)
-                for i in range(capacity):
-                    more_following[i] = following[i]
-                    more_cell[i], more_g[i] = entry_cell[i], entry_g[i]
-                for i in range(capacity, 2 * capacity):
-                    more_following[i] = i + 1
-                following, entry_cell, entry_g = more_following, more_cell, more_g
                 capacity *= 2
+                following, entry_cell, entry_g = _entries(following, entry_cell, entry_g, capacity)
             entry, unused = unused, following[unused]
             entry_cell[entry], entry_g[entry] = near, cost
             slot = max(bucket, int((key - lowest) / bucket_width)) & (size - 1)

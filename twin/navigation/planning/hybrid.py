@@ -176,10 +176,7 @@ class HybridPlanner:
 
     def _expanded(self, frame: _Frame, first: Array, last: Array) -> tuple[Array, Ints, Array]:
         """Return the nodes of the way: poses, moves into them, costs."""
-        config, costs = self.config, frame.costmap.costs
-        price = np.full((2, 256), 1.0 + config.cost_penalty * np.arange(256) / MAX_NON_OBSTACLE)
-        price[:, INSCRIBED_INFLATED_OBSTACLE:NO_INFORMATION] = math.inf
-        price[:, NO_INFORMATION] = 1.0 + config.cost_penalty if config.allow_unknown else math.inf
+        config, costs, price = self.config, frame.costmap.costs, self._prices()
         width = costs.shape[1]
         here, there = (math.floor(pose[1]) * width + math.floor(pose[0]) for pose in (first, last))
         if not self._search.run(costs, price, there, here, slack=_SLACK):
@@ -217,6 +214,14 @@ class HybridPlanner:
         order = np.array(nodes[::-1])
         self._arc = arc
         return poses[order], move[order], g[order]
+
+    def _prices(self) -> Array:
+        """Return what a cell's width costs by its cost, as `grid_kernel.search` has it."""
+        config = self.config
+        price = np.full((2, 256), 1.0 + config.cost_penalty * np.arange(256) / MAX_NON_OBSTACLE)
+        price[:, INSCRIBED_INFLATED_OBSTACLE:NO_INFORMATION] = math.inf
+        price[:, NO_INFORMATION] = 1.0 + config.cost_penalty if config.allow_unknown else math.inf
+        return price
 
     def _pieces(self, frame: _Frame, anchors: Array, moves: Ints, g: Array) -> list[tuple[int, float]]:
         """Return the path as turns and lengths [radii], with cheaper curves in place of parts if smoothed."""

@@ -139,6 +139,80 @@ def move_factor(turn: int, way: int, last_turn: int, last_way: int, penalties: A
 
 
 @jit
+def _pushed(keys: Array, items: Ints, waiting: int, key: float, item: int) -> int:
+    """Put an item into a binary heap of so many; return how many it has now."""
+    hole = waiting
+    while hole > 0:
+        above = (hole - 1) // 2
+        if keys[above] <= key:
+            break
+        keys[hole], items[hole] = keys[above], items[above]
+        hole = above
+    keys[hole], items[hole] = key, item
+    return waiting + 1
+
+
+@jit
+def _popped(keys: Array, items: Ints, waiting: int) -> tuple[int, int]:
+    """Take the least item out of a binary heap of so many; return how many it has now, and the item."""
+    least = items[0]
+    waiting -= 1
+    key, item = keys[waiting], items[waiting]
+    hole = 0
+    while True:
+        child = 2 * hole + 1
+        if child >= waiting:
+            break
+        if child + 1 < waiting and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[hole], items[hole] = keys[child], items[child]
+        hole = child
+    keys[hole], items[hole] = key, item
+    return waiting, least
+
+
+@jit
+def _slot(table: Ints, bin_of: NDArray[np.int64], code: int) -> int:
+    """Return where in a hash table the node of a bin stands, or would."""
+    slot = (code * 2654435761 >> 7) % table.shape[0]
+    while table[slot] >= 0 and bin_of[table[slot]] != code:
+        slot = (slot + 1) % table.shape[0]
+    return slot
+
+
+@jit
+def _rehashed(table: Ints, bin_of: NDArray[np.int64]) -> Ints:
+    """Return a hash table with four times the slots; no two of its nodes are of one bin."""
+    larger = np.full(4 * table.shape[0], -1, np.int32)
+    for node in table:
+        if node >= 0:
+            larger[_slot(larger, bin_of, bin_of[node])] = node
+    return larger
+
+
+@jit
+def _curve_length(
+    x: float,
+    y: float,
+    yaw: float,
+    goal: Array,
+    radius: float,
+    reverse: bool,
+    turns: NDArray[np.int64],
+    lengths: Array,
+) -> float:
+    """Return the length [cells] of the shortest curve to the goal; 0 where that hardly tells anything."""
+    dx, dy = (goal[0] - x) / radius, (goal[1] - y) / radius
+    if dx * dx + dy * dy >= 100.0:  # so far away the turns at both ends hardly matter
+        return 0.0
+    c, s = math.cos(yaw), math.sin(yaw)
+    shortest, _ = shortest_curve(c * dx + s * dy, c * dy - s * dx, goal[2] - yaw, reverse, turns, lengths)
+    return shortest * radius
+
+
+@jit
 def expand(
     costs: Cells,
     corners: Array,
@@ -190,36 +264,21 @@ def expand(
     poses, g = np.empty((capacity, 3)), np.empty(capacity)
     parent, move = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
     closed = np.zeros(capacity, np.bool_)
-    cell_of = np.empty(capacity, np.int64)
-    slots = 4096
-    table = np.full(slots, -1, np.int32)
+    bin_of = np.empty(capacity, np.int64)
+    table = np.full(4096, -1, np.int32)
     keys, items = np.empty(capacity), np.empty(capacity, np.int32)
     turns, lengths = np.empty(5, np.int64), np.empty(5)
     nodes, waiting, expanded, until_curve = 1, 1, 0, 0
     best, best_g, last_chance = -1, math.inf, most
     bin_size = 2.0 * math.pi / bins
     poses[0], g[0], parent[0], move[0] = start, 0.0, -1, 1
-    cell_of[0] = (math.floor(start[1]) * width + math.floor(start[0])) * bins + round(
+    bin_of[0] = (math.floor(start[1]) * width + math.floor(start[0])) * bins + round(
         (start[2] % (2.0 * math.pi)) / bin_size
     ) % bins
-    table[(cell_of[0] * 2654435761 >> 7) % slots] = 0
+    table[_slot(table, bin_of, bin_of[0])] = 0
     keys[0], items[0] = 0.0, 0
     while waiting > 0:
-        node = items[0]
-        waiting -= 1
-        key, item = keys[waiting], items[waiting]
-        hole = 0
-        while True:  # sift the last entry down from the top
-            child = 2 * hole + 1
-            if child >= waiting:
-                break
-            if child + 1 < waiting and keys[child + 1] < keys[child]:
-                child += 1
-            if keys[child] >= key:
-                break
-            keys[hole], items[hole] = keys[child], items[child]
-            hole = child
-        keys[hole], items[hole] = key, item
+        waiting, node = _popped(keys, items, waiting)
         if closed[node]:
             continue
         closed[node] = True
@@ -269,9 +328,7 @@ def expand(
                     continue
                 new_yaw %= 2.0 * math.pi
                 code = (row * width + column) * bins + round(new_yaw / bin_size) % bins
-                slot = (code * 2654435761 >> 7) % slots
-                while table[slot] >= 0 and cell_of[table[slot]] != code:
-                    slot = (slot + 1) % slots
+                slot = _slot(table, bin_of, code)
                 known = table[slot]
                 if known >= 0 and closed[known]:
                     continue
@@ -295,49 +352,27 @@ def expand(
                     continue
                 flat = row * width + column
                 left = to_go[flat] if to_go_mark[flat] == to_go_generation else beyond
-                dx, dy = (goal[0] - new_x) / radius, (goal[1] - new_y) / radius
-                if dx * dx + dy * dy < 100.0:  # further away the turns at both ends hardly matter
-                    c, s = math.cos(new_yaw), math.sin(new_yaw)
-                    shortest, _ = shortest_curve(
-                        c * dx + s * dy, c * dy - s * dx, goal[2] - new_yaw, reverse, turns, lengths
-                    )
-                    left = max(left, shortest * radius)
+                curve = _curve_length(new_x, new_y, new_yaw, goal, radius, reverse, turns, lengths)
+                left = max(left, curve)
             if nodes == capacity or waiting == capacity:
                 more = 2 * capacity
                 poses, g = _longer2(poses, more), _longer(g, more)
                 parent, move, items = _longer(parent, more), _longer(move, more), _longer(items, more)
-                cell_of, keys, closed = _longer(cell_of, more), _longer(keys, more), _longer(closed, more)
+                bin_of, keys, closed = _longer(bin_of, more), _longer(keys, more), _longer(closed, more)
                 closed[capacity:] = False
                 capacity = more
             # A pose reached better becomes a node of its own: what came from the worse one keeps its way.
             fresh = nodes
             nodes += 1
             poses[fresh, 0], poses[fresh, 1], poses[fresh, 2] = new_x, new_y, new_yaw
-            g[fresh], parent[fresh], move[fresh], cell_of[fresh] = g[node] + cost, node, option, code
+            g[fresh], parent[fresh], move[fresh], bin_of[fresh] = g[node] + cost, node, option, code
             if option < 6:
                 if known >= 0:
                     closed[known] = True
                 table[slot] = fresh
-                if 2 * nodes > slots:
-                    slots *= 4
-                    old = table
-                    table = np.full(slots, -1, np.int32)
-                    for entry in old:
-                        if entry >= 0:
-                            slot = (cell_of[entry] * 2654435761 >> 7) % slots
-                            while table[slot] >= 0:
-                                slot = (slot + 1) % slots
-                            table[slot] = entry
-            key = g[fresh] + left
-            hole = waiting
-            waiting += 1
-            while hole > 0:
-                above = (hole - 1) // 2
-                if keys[above] <= key:
-                    break
-                keys[hole], items[hole] = keys[above], items[above]
-                hole = above
-            keys[hole], items[hole] = key, fresh
+                if 2 * nodes > table.shape[0]:
+                    table = _rehashed(table, bin_of)
+            waiting = _pushed(keys, items, waiting, g[fresh] + left, fresh)
     if best >= 0:
         return FOUND, best, poses, g, parent, move
     return OUT_OF_NODES if expanded == most else UNREACHABLE, 0, poses, g, parent, move

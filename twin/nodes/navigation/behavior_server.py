@@ -12,6 +12,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Empty, Twist, duration, new, ns
 from twin.bridge.types import ActionType
+from twin.geometry import Pose2
 from twin.navigation import recovery
 from twin.navigation.warm_up import warm_up_behaviors
 from twin.nodes.navigation.costmap import CostmapNode
@@ -34,6 +35,14 @@ class _Served(NamedTuple):
     feedback: str
     """Field that tells the progress."""
     is_valid: Callable[[Any], bool] = lambda goal: True
+
+
+class _Failed(Exception):
+    """Ends a behaviour for a reason that has an error code."""
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(detail or reason.replace("_", " "))
+        self.reason = reason
 
 
 class BehaviorServerNode:
@@ -131,15 +140,21 @@ class BehaviorServerNode:
         if self._teleop is not None:
             self._teleop.is_over = True
 
-    def _execution(self, name: str, served: _Served) -> Callable[[GoalHandle], Generator[None, None, Any]]:
-        def failed(handle: GoalHandle, reason: str, detail: str = "") -> Any:
-            handle.abort()
-            text = f"{name}: {detail or reason.replace('_', ' ')}"
-            return new(served.action.Result, error_code=served.codes[reason], error_msg=text)
+    def _step(self, served: _Served, behavior: Behavior, pose: Pose2) -> recovery.BehaviorStep:
+        """Return what to do in this period; raises _Failed where nothing may be done."""
+        fault = self._costmap.fault if self._costmap else ""
+        if fault and served.action is not Wait:
+            raise _Failed(_UNKNOWN, f"the local costmap is not current: {fault}")
+        costmap = self._costmap.costmap if self._costmap else None
+        step = behavior.update(pose, self._period_ns * 1e-9, costmap)
+        if step.failed_reason is not None:
+            raise _Failed(step.failed_reason)
+        return step
 
+    def _execution(self, name: str, served: _Served) -> Callable[[GoalHandle], Generator[None, None, Any]]:
         def execute(handle: GoalHandle) -> Generator[None, None, Any]:
             if not served.is_valid(handle.request):
-                return failed(handle, _INVALID_INPUT)
+                return _aborted(handle, name, served, _Failed(_INVALID_INPUT))
             behavior = served.make(handle.request)
             started = due = self.node.now_ns
             try:
@@ -152,28 +167,29 @@ class BehaviorServerNode:
                         continue
                     pose = self._robot_pose.in_odom()
                     if pose is None and self.node.now_ns - due > _POSE_TIMEOUT_NS:
-                        return failed(handle, _TF_ERROR)
+                        raise _Failed(_TF_ERROR)
                     if pose is None:
                         yield
                         continue
                     due = max(due, self.node.now_ns - self._period_ns) + self._period_ns
-                    if self._costmap and self._costmap.fault and served.action is not Wait:
-                        text = f"the local costmap is not current: {self._costmap.fault}"
-                        return failed(handle, _UNKNOWN, text)
-                    costmap = self._costmap.costmap if self._costmap else None
-                    step = behavior.update(pose, self._period_ns * 1e-9, costmap)
+                    step = self._step(served, behavior, pose)
                     if step.done:
                         elapsed = duration(self.node.now_ns - started)
                         return new(served.action.Result, total_elapsed_time=elapsed)
-                    if step.failed_reason is not None:
-                        return failed(handle, step.failed_reason)
                     self._publisher.publish(twist_from_planar(step.v, step.w))
                     handle.publish_feedback(_feedback(served, behavior.progress))
                     yield
+            except _Failed as failure:
+                return _aborted(handle, name, served, failure)
             finally:
                 self._publisher.publish(twist_from_planar(0.0, 0.0))
 
         return execute
+
+
+def _aborted(handle: GoalHandle, name: str, served: _Served, failure: _Failed) -> Any:
+    handle.abort()
+    return new(served.action.Result, error_code=served.codes[failure.reason], error_msg=f"{name}: {failure}")
 
 
 def _feedback(served: _Served, progress: float) -> Any:

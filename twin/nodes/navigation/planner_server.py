@@ -59,6 +59,18 @@ class PlannerParameters:
     smoother: SmootherConfig
 
 
+def _by_id(chosen: PlannerPluginConfig) -> dict[str, PlannerPluginConfig]:
+    """Return the configs of all planners: the chosen one under its own name, too, the others like it."""
+    configs = {DEFAULT_ID: chosen}
+    for name, plugin in PLUGINS.items():
+        configs[name] = (
+            chosen
+            if isinstance(chosen, plugin)
+            else plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
+        )
+    return configs
+
+
 class PlannerServerNode:
     """Plans on request; publishes `plan`.
 
@@ -82,13 +94,7 @@ class PlannerServerNode:
         self.node = bus.create_node("planner_server", namespace)
         self._robot_pose = robot_pose
         self._costmap = costmap
-        chosen = config or PLUGINS[DEFAULT]()
-        self._configs: dict[str, PlannerPluginConfig] = {DEFAULT_ID: chosen}
-        for name, plugin in PLUGINS.items():
-            if isinstance(chosen, plugin):
-                self._configs[name] = chosen
-            else:
-                self._configs[name] = plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
+        self._configs = _by_id(config or PLUGINS[DEFAULT]())
         self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
         self._tried: list[Array] = []
         self._last: tuple[Pose2, Array] | None = None

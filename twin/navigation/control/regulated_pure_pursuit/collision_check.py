@@ -15,9 +15,11 @@ from twin.navigation.costmaps.costmap import (
     LETHAL_OBSTACLE,
     NO_INFORMATION,
     Costmap,
+    collision_step,
+    footprint_cost,
 )
 from twin.navigation.costmaps.footprint import radii
-from twin.navigation.costmaps.kernels import escapes, outline_cost, steps_to_collision
+from twin.navigation.costmaps.kernels import escapes
 from twin.navigation.failures import NoValidControl
 
 _ESCAPE_TURN = 0.5
@@ -72,7 +74,7 @@ class CollisionCheck:
             self.check(v, w, pose, costmap, carrot, least)
         except NoValidControl:
             at = float(pose.x), float(pose.y), float(pose.yaw)
-            if outline_cost(costmap.costs, self._footprint, *at, *costmap.frame) == LETHAL_OBSTACLE:
+            if footprint_cost(costmap, self._footprint, pose) == LETHAL_OBSTACLE:
                 ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
                 for way in ways:
                     if escapes(costmap.costs, self._footprint, *at, *way, 0.05, 10, *costmap.frame):
@@ -103,18 +105,6 @@ class CollisionCheck:
         if least > 0.0 and abs(v) >= 0.01:
             allowed = max(allowed, least / abs(v))
             carrot = max(carrot, least)
-        hit = steps_to_collision(
-            costmap.costs,
-            self._footprint,
-            float(pose.x),
-            float(pose.y),
-            float(pose.yaw),
-            float(v),
-            float(w),
-            step,
-            carrot,
-            int(allowed / step),
-            *costmap.frame,
-        )
+        hit = collision_step(costmap, self._footprint, pose, (v, w), step, int(allowed / step), carrot)
         if hit >= 0:
             raise NoValidControl(f"collision in {hit * step:.2f} s at {v:.2f} m/s, {w:.2f} rad/s")
