@@ -10,6 +10,7 @@ import pytest
 from twin.geometry import Pose2
 from twin.navigation.exploration.explorer import Explorer, ExplorerConfig
 from twin.navigation.exploration.frontiers import FrontierConfig, FrontierMap
+from twin.navigation.exploration.line_of_sight import seen_from
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 CELL = 0.1
@@ -71,6 +72,41 @@ def test_the_view_of_a_frontier_lies_before_it_on_known_ground_and_looks_at_it()
     view = seen.view_of(seen.frontiers[1], standoff=0.5)
     assert view.x == pytest.approx(at(0, 39)[0] - 0.5, abs=0.11)
     assert abs(view.yaw) < 0.1
+
+
+def test_a_frontier_round_a_corner_is_looked_at_from_where_it_is_in_view() -> None:
+    data = np.full((40, 60), -1)
+    data[0:40, 0:46] = 100
+    data[1:30, 1:30] = data[12:22, 30:33] = 0  # a room and its door
+    data[12:26, 33:45] = 0  # a corridor that goes on to the left behind it
+    data[26:, 33:45] = -1
+    seen = FrontierMap(grid(data), at(15, 5), CONFIG)
+    (frontier,) = (frontier for frontier in seen.frontiers if frontier.target[1] > at(20, 0)[1])
+    in_view = seen_from(data == 0, *frontier.gate, CONFIG.view_distance / CELL)
+    for standoff in (2.0, 0.0):  # two metres before it on the way, the wall hides it
+        view = seen.view_of(frontier, standoff)
+        column, row = grid(data).world_to_cell((view.x, view.y))
+        assert in_view[row, column]
+
+
+def test_a_goal_keeps_away_from_obstacles_where_there_is_room() -> None:
+    data = corridor()
+    data[13:-1, 37:40] = 100  # the corridor's end is narrower
+    seen = FrontierMap(grid(data), at(10, 20), CONFIG)
+    view = seen.view_of(seen.frontiers[1], standoff=0.0)
+    rows, columns = np.nonzero(data == 100)
+    clearance = min(math.dist((view.x, view.y), at(r, c)) for r, c in zip(rows, columns, strict=True))
+    assert clearance > CONFIG.robot_radius + CONFIG.goal_clearance
+
+
+def test_what_is_seen_from_a_cell_ends_at_what_is_in_the_way() -> None:
+    clear = np.ones((11, 21), dtype=bool)
+    clear[0:8, 10] = False
+    seen = seen_from(clear, 5, 5, 12.0)
+    assert seen[5, :10].all()
+    assert not seen[5, 10:].any()
+    assert seen[10, 11], "past the end of the wall"
+    assert not seen_from(clear, 5, 5, 3.0)[5, 9], "too far"
 
 
 def test_the_robot_may_stand_on_unknown_ground() -> None:

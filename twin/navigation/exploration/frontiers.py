@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from twin.geometry import Array, Pose2
+from twin.navigation.exploration.line_of_sight import seen_from
 from twin.navigation.exploration.wavefront import travel_distances, way_back
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 
@@ -29,7 +30,9 @@ class FrontierConfig:
     inscribed_radius: float = 0.3
     """Unknown cells this near to obstacles are none that matter [m]."""
     view_distance: float = 2.0
-    """A frontier in a passage too narrow to turn in is looked at from outside, so far away at most [m]."""
+    """A frontier that the robot cannot drive up to is looked at from afar, so far away at most [m]."""
+    goal_clearance: float = 0.1
+    """Goals keep so much more than `robot_radius` from obstacles, where there is room [m]."""
     lethal_threshold: int = 65
     """Occupancy from which a cell of the map is an obstacle."""
 
@@ -93,6 +96,7 @@ class FrontierMap:
             travel_distances(roomy, self._distance)
         self.reachable: NDArray[np.bool_] = np.isfinite(self._distance)
         """Cells that the robot's centre can get to on known ground, shape (h, w)."""
+        self._comfortable = self.reachable & (clearance > config.robot_radius + config.goal_clearance)
         passages = clearance > config.inscribed_radius
         travel_distances(~unknown & passages, self._distance)
         wanted = unknown & passages & ~self._near(leave_out, around)
@@ -100,8 +104,21 @@ class FrontierMap:
         """In the order of their cells in the map: from its lower left."""
 
     def view_of(self, frontier: Frontier, standoff: float) -> Pose2:
-        """Return a pose on the way to a frontier that looks at its target from `standoff` [m] before it."""
+        """Return a pose from which the robot looks at a frontier's target.
+
+        It lies on the way there, `standoff` [m] before it; if something hides the target from there, where
+        the target is first in view, or for no standoff where it is nearest.
+        """
         row, column = self._stand(frontier.gate, standoff)
+        reach = self._config.view_distance / self._grid.resolution
+        free = (self._grid.data != UNKNOWN) & (self._grid.data < self._config.lethal_threshold)
+        seen = seen_from(free, *frontier.gate, max(reach, standoff / self._grid.resolution))
+        views = np.argwhere(seen & self._comfortable)
+        if len(views) and not (seen[row, column] and self._comfortable[row, column]):
+            way = self._distance[tuple(views.T)]
+            row, column = views[
+                int(np.argmin(way if standoff > 0.0 else np.hypot(*(views - frontier.gate).T)))
+            ]
         x, y = self._grid.cell_to_world((column, row))
         yaw = math.atan2(frontier.target[1] - y, frontier.target[0] - x)
         return Pose2(float(x), float(y), yaw)
