@@ -407,11 +407,11 @@ velocity_smoother:
     max_velocity: ["fast", "slow", "slow"]
 """
     assert _said(tmp_path, text) == [
+        "controller_server: FollowPath.motion_model must be 'DiffDrive' or 'Ackermann', not 'Omni'",
+        "controller_server has no critic 'CostCritc'; did you mean 'CostCritic'?",
+        "controller_server: FollowPath.CostCritic.cost_weight must be greater than or equal to 0, not -3.0",
         "planner_server: GridBased.motion_model_for_search must be 'DUBIN' or 'REEDS_SHEPP', not 'LATTICE'",
         "planner_server: GridBased.minimum_turning_radius must be greater than 0, not 0.0",
-        "controller_server: FollowPath.motion_model must be 'DiffDrive' or 'Ackermann', not 'Omni'",
-        "controller_server: FollowPath.CostCritic.cost_weight must be greater than or equal to 0, not -3.0",
-        "controller_server has no critic 'CostCritc'; did you mean 'CostCritic'?",
     ]
 
 

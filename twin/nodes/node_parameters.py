@@ -12,7 +12,7 @@ from twin.bridge.msgs import ParameterDescriptor
 from twin.bridge.node import Node
 from twin.bridge.parameters.values import Parameter
 from twin.bridge.types.default_values import new
-from twin.errors import BridgeError
+from twin.errors import BridgeError, TwinError
 
 C = TypeVar("C")
 
@@ -159,8 +159,10 @@ def overlay(
             path, unit, old = found[name]
             try:
                 config = _with(config, path, unit.read(_as(value, unit.tell(old))))
-            except (ValueError, ZeroDivisionError) as error:
-                refused[name] = str(error) if isinstance(error, ValueError) else "must be more than zero"
+            except ZeroDivisionError:
+                refused[name] = "must be more than zero"
+            except (ValueError, TwinError) as error:
+                refused[name] = str(error)
         if len(refused) == len(left):
             break
         # Some are valid only with others: a least number that is above the old greatest one.

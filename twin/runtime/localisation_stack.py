@@ -6,24 +6,23 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from twin.errors import ScenarioError
+from twin.bridge.msgs import LaserScan
 from twin.geometry import Pose2
-from twin.models.specs import ImuSpec
+from twin.models.specs import LidarSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
-from twin.nodes.navigation.ekf import EkfNode, EkfNodeConfig, for_robot
-from twin.nodes.navigation.ekf_sources import EkfSource
 from twin.nodes.navigation.map_saver import MapSaverNode
 from twin.nodes.navigation.map_server import MapServerNode
-from twin.nodes.navigation.robot_pose import Frames, RobotPose
+from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 from twin.nodes.navigation.static_localisation import StaticLocalisationNode
 from twin.runtime.nav2_parameters import amcl_with_file
-from twin.runtime.navigation_config import overridden
+from twin.runtime.overrides import overridden
+from twin.runtime.slam_file import slam_with_file
 from twin.runtime.stack_context import StackContext
+from twin.runtime.unheard import tell_unheard
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
-from twin.scenario.localisation_parameters import EkfParameters
 from twin.sim.noise import NoiseStream
 
 _MAP_UPDATE_INTERVAL = 2.0
@@ -70,54 +69,26 @@ def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, gues
 
 def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> SlamToolboxNode:
     """Create `/slam_toolbox`; its map's frame is the world's, unless the scenario gives another start."""
-    start = context.start if config.map_start_pose is None else config.map_start_pose.pose
-    guess = _initial_guess(start, config.initial_pose_error, context.seed, context.handle.name)
     overrides = config.parameters.overrides()
-    interval = overrides.pop("map_update_interval", _MAP_UPDATE_INTERVAL)
-    node_config = SlamNodeConfig(
-        mode=config.mode,
-        map_file_name=config.pose_graph or "",
-        map_start_pose=(guess.x, guess.y, guess.yaw),
-        map_update_interval_ns=round(interval * 1e9),
-        slam=overridden(SlamConfig(), overrides),
+    overrides.setdefault("map_update_interval", _MAP_UPDATE_INTERVAL)
+    for name in ("map_update_interval", "transform_timeout"):
+        if overrides.get(name) is not None:
+            overrides[f"{name}_ns"] = round(overrides[name] * 1e9)
+    node_config = overridden(
+        SlamNodeConfig(mode=config.mode, map_file_name=config.pose_graph or ""), overrides
     )
-    return SlamToolboxNode(context.bus, pose, node_config, namespace=context.namespace)
-
-
-def build_odometry_filter(context: StackContext, frames: Frames) -> None:
-    """Create the filter that fuses wheels and IMU, if the scenario's `odometry` asks for it.
-
-    Raises:
-        ScenarioError: the robot has no drive or no IMU.
-    """
-    if context.config.odometry.type == "wheels":
-        return
-    description = context.handle.description
-    imus = [spec for spec in description.sensors if isinstance(spec, ImuSpec)]
-    if description.drive is None or not imus:
-        raise ScenarioError(
-            f"robot '{context.handle.name}' has no {'drive' if description.drive is None else 'IMU'}; "
-            "odometry of type ekf needs both, type wheels needs no IMU"
-        )
-    config = for_robot(
-        frames.odom, frames.base, context.control_period_ns, imus[0].topic, imus[0].gyro_bias_stddev
-    )
-    EkfNode(
-        context.bus, _with_overrides(config, context.config.odometry.parameters), namespace=context.namespace
-    )
-
-
-def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNodeConfig:
-    """Return a filter's config with the scenario's overrides, sources by name."""
-    sources = dict(config.sources)
-    for name, given in parameters.sources.items():
-        changes = {key: value for key, value in given.overrides().items() if value is not None}
-        try:
-            sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
-        except TypeError:
-            raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
-    ekf = overridden(config.ekf, parameters.overrides())
-    return replace(config, ekf=ekf, sources=sources)
+    node_config = replace(node_config, slam=overridden(SlamConfig(), overrides))
+    node_config, in_map, told = slam_with_file(node_config, context.config, pose.frames, context.namespace)
+    start = config.map_start_pose.pose if config.map_start_pose else in_map or context.start
+    guess = _initial_guess(start, config.initial_pose_error, context.seed, context.handle.name)
+    node_config = replace(node_config, map_start_pose=(guess.x, guess.y, guess.yaw))
+    node = SlamToolboxNode(context.bus, pose, node_config, namespace=context.namespace)
+    for sentence in told:
+        node.node.get_logger().warn(sentence)
+    lidars = {spec.topic for spec in context.handle.description.sensors if isinstance(spec, LidarSpec)}
+    if node_config.scan_topic not in lidars:
+        tell_unheard(node.node, {"scan_topic": (node_config.scan_topic, LaserScan)})
+    return node
 
 
 def _initial_guess(start: Pose2, error: Any, seed: int, name: str) -> Pose2:

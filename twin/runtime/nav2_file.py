@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterator, Mapping
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import BaseModel
 
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
 from twin.nodes.node_parameters import overlay, parameter_names
-from twin.runtime.nav2_checks import why_not, wrong_critics
+from twin.runtime.absent_parameters import Absent
+from twin.runtime.file_lines import lines_of
+from twin.runtime.nav2_checks import refusals, sentence, wrong_critics
 from twin.runtime.nav2_names import (
     LISTS,
     Value,
@@ -23,7 +25,6 @@ from twin.runtime.nav2_names import (
     converted,
     flat,
     is_same,
-    local_name,
     renamed,
 )
 
@@ -64,9 +65,11 @@ class Nav2Parameters:
             self._sections = files.read(path)
         except TwinError as error:
             raise NavigationError(error.problems) from error
-        self._lines = _lines(path)
+        self._lines = lines_of(path)
         self._problems: list[Problem] = []
         self._ignored: dict[str, list[str]] = {}
+        self._idle: dict[str, list[str]] = {}
+        self._absent: dict[str, Absent] = {}
         self._nodes: set[str] = set()
         self._understood: set[tuple[str, str]] = set()
 
@@ -79,6 +82,8 @@ class Nav2Parameters:
         prefix: str = "",
         keep: frozenset[str] = frozenset(),
         limits: type[BaseModel] | None = None,
+        rename: Callable[[str], str] = str,
+        absent: Absent | None = None,
     ) -> C:
         """Return a node's config with the file's values.
 
@@ -89,9 +94,12 @@ class Nav2Parameters:
             prefix: Of all parameters of this config, such as 'GridBased.'.
             keep: Parameters, without their sections, that the scenario gives: they stay.
             limits: What a scenario may give of them.
+            rename: The file's name of a parameter -> the one here.
+            absent: What the ROS node has beyond the one here.
         """
         self._nodes.add(node)
-        values = self._values(node, config, names or {}, prefix)
+        self._absent[node] = absent or Absent()
+        values = self._values(node, config, names or {}, prefix, rename)
         known = tuple(prefix + name for name in parameter_names(config, names or {}))
         taken = {
             name.removeprefix(prefix): entry.value
@@ -100,12 +108,10 @@ class Nav2Parameters:
         }
         config, refused = overlay(config, taken, names or {})
         if limits is not None:
-            impossible = {name: why_not(limits, local_name(name), value) for name, value in taken.items()}
-            refused = {**{name: why for name, why in impossible.items() if why}, **refused}
+            refused = refusals(limits, taken, refused)
         for name, why in refused.items():
             entry = values[prefix + name]
-            said = why if why.startswith(f"{node}: ") else f"{node}: {entry.said} {why}"
-            self._problems.append(Problem(said, self.path, entry.line))
+            self._problems.append(Problem(sentence(node, entry.said, why), self.path, entry.line))
         self._check_critics(node, values, known)
         self._tell(node, values, known)
         return config
@@ -121,9 +127,13 @@ class Nav2Parameters:
         return "robot_radius" in said and "footprint" not in said
 
     def values(self, node: str) -> dict[str, Any]:
-        """Return all that the file says of a node, by the names that it uses."""
+        """Return all that the file says of a node by its name, by the names that it uses."""
         self._nodes.add(node)
         return {name: entry.value for name, entry in self._said(node).items() if not entry.is_general}
+
+    def effective(self, node: str) -> dict[str, Any]:
+        """Return what holds for a node, what the file says of all nodes included."""
+        return {name: entry.value for name, entry in self._said(node).items()}
 
     def relative(self, topic: str) -> str:
         """Return a topic's name in the robot's namespace."""
@@ -151,11 +161,9 @@ class Nav2Parameters:
             NavigationError: every value that cannot be, every name that is a likely typing mistake.
         """
         if self._problems:
-            raise NavigationError(self._problems)
-        return [
-            f"{self.path.name}: {node} does not have {', '.join(what)}"
-            for node, what in self._ignored.items()
-        ]
+            raise NavigationError(sorted(self._problems, key=lambda problem: problem.line or 0))
+        nodes = dict.fromkeys((*self._ignored, *self._idle))
+        return [f"{self.path.name}: {self._unread(node)}" for node in nodes]
 
     def finish(self, elsewhere: Collection[str] = ()) -> list[str]:
         """Return what `ignored` does, and which nodes of the file nobody read.
@@ -172,12 +180,41 @@ class Nav2Parameters:
         absent = [name for name in others if self._without_namespace(name) not in read]
         return [*told, f"{self.path.name}: not read for {', '.join(absent)}"] if absent else told
 
+    def nodes_with(self, pattern: str, usual: str) -> list[str]:
+        """Return the robot's nodes of which the file gives a parameter that a pattern describes.
+
+        Args:
+            pattern: Regular expression of a parameter's whole name.
+            usual: Alone, if it is among them, or if what is for all nodes has such a parameter.
+        """
+
+        def fits(names: Collection[str]) -> bool:
+            return any(re.fullmatch(pattern, name) for name in names)
+
+        named = [
+            self._without_namespace(section.node.strip("/"))
+            for section in self._sections
+            if not section.is_pattern and fits(section.values)
+        ]
+        own = [name for name in dict.fromkeys(named) if "/" not in name or not self._namespace]
+        return [usual] if usual in own or (not own and fits(self._said(usual))) else own
+
+    def _unread(self, node: str) -> str:
+        """Return the sentence about what was not read of a node."""
+        missed, idle = (", ".join(what.get(node, ())) for what in (self._ignored, self._idle))
+        if not missed:
+            return f"{idle} of {node} would change nothing here"
+        return f"{node} does not have {missed}" + (f"; {idle} would change nothing here" if idle else "")
+
     def _without_namespace(self, name: str) -> str:
         return name.removeprefix(self._namespace.strip("/") + "/") if self._namespace else name
 
-    def _values(self, node: str, config: Any, names: Mapping[str, str], prefix: str) -> dict[str, Value]:
+    def _values(
+        self, node: str, config: Any, names: Mapping[str, str], prefix: str, rename: Callable[[str], str]
+    ) -> dict[str, Value]:
         """Return the node's values by the names that this config has for them."""
         values = converted(by_axis(renamed(self._said(node))))
+        values = {rename(name): entry for name, entry in values.items()}
         known = tuple(prefix + name for name in parameter_names(config, names))
         if "costmap" in node or node == "behavior_server":
             values = flat(values, known)
@@ -233,11 +270,19 @@ class Nav2Parameters:
 
     def _unknown(self, node: str, name: str, entry: Value, known: tuple[str, ...]) -> None:
         section, _, last = name.rpartition(".")
+        absent = self._absent.get(node, Absent())
+        if last in absent:
+            unread = self._idle if absent.makes_no_difference(last, entry.value) else self._ignored
+            unread.setdefault(node, []).append(entry.said)
+            return
         beside = [other.rpartition(".")[2] for other in known if other.rpartition(".")[0] == section]
         close = difflib.get_close_matches(last, beside, n=1, cutoff=_TYPO)
         sideways = bool(close) and last.replace("y", "x") == close[0].replace("y", "x")
         if close and not sideways and last not in _ONLY_NAV2S:
-            said = f"{node} has no parameter {entry.said}; did you mean '{close[0]}'?"
+            whole = (
+                f"{entry.said.removesuffix(last)}{close[0]}" if entry.said.endswith(f"_{last}") else close[0]
+            )
+            said = f"{node} has no parameter {entry.said}; did you mean '{whole}'?"
             self._problems.append(Problem(said, self.path, entry.line))
         else:
             self._ignored.setdefault(node, []).append(entry.said)
@@ -249,24 +294,3 @@ def _plugins(config: Any, names: Mapping[str, str]) -> Iterator[tuple[str, Any]]
         value = getattr(config, field.name)
         inside = value.items() if isinstance(value, Mapping) else [(names.get(field.name, field.name), value)]
         yield from ((f"{name}.", inner) for name, inner in inside if is_dataclass(inner))
-
-
-def _lines(path: Path) -> dict[tuple[str, str], int]:
-    """Return the line of every value: (node, parameter) -> line."""
-    root = yaml.compose(path.read_text("utf-8"), Loader=yaml.SafeLoader)
-    return dict(_walk(root, "", None)) if root is not None else {}
-
-
-def _walk(node: yaml.Node, name: str, parameter: str | None) -> Iterator[tuple[tuple[str, str], int]]:
-    if not isinstance(node, yaml.MappingNode):
-        return
-    for key, value in node.value:
-        text = str(key.value)
-        if parameter is None and text == files.KEY:
-            yield from _walk(value, name, "")
-        elif parameter is None:
-            yield from _walk(value, f"{name}/{text.strip('/')}", None)
-        else:
-            full = f"{parameter}.{text}" if parameter else text
-            yield (name, full), key.start_mark.line + 1
-            yield from _walk(value, name, full)

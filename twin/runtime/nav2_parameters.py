@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -125,9 +126,18 @@ def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMoni
 
 
 def with_file(
-    parameters: NavigationParameters, config: NavigationConfig, namespace: str
+    parameters: NavigationParameters,
+    config: NavigationConfig,
+    namespace: str,
+    elsewhere: Collection[str] = (),
 ) -> tuple[NavigationParameters, list[str]]:
     """Return a robot's parameters with those of its file, and what of the file was not understood.
+
+    Args:
+        parameters: What holds without the file.
+        config: What the scenario says.
+        namespace: Of the robot.
+        elsewhere: Further nodes of the file that are read on another occasion.
 
     Raises:
         NavigationError: the file is wrong.
@@ -173,7 +183,7 @@ def with_file(
     )
     if config.collision_monitor is None:
         monitor_of(file)
-    return changed, file.finish(elsewhere=("amcl", "collision_monitor"))
+    return changed, file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))
 
 
 def _given(group: ParameterGroup) -> frozenset[str]:

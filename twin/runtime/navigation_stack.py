@@ -19,6 +19,7 @@ from twin.nodes.navigation.smoother_server import SmootherServerNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.commands import build_commands
+from twin.runtime.localisation_files import localisation_nodes
 from twin.runtime.nav2_parameters import monitor_with_file, with_file, with_plugins
 from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
 from twin.runtime.stack_context import StackContext
@@ -41,7 +42,9 @@ def build_navigation(
     assert drive is not None
     config = with_plugins(config, namespace)
     parameters = _defaults(context, config, drive, footprint, pose.frames)
-    parameters, not_understood = with_file(parameters, config, namespace)
+    parameters, not_understood = with_file(
+        parameters, config, namespace, localisation_nodes(context.config, namespace)
+    )
     period_ns = context.control_period_ns
     limits = _drive_limits(parameters.smoother, drive)
     build_commands(context, monitor_with_file(config, namespace), pose, footprint, limits)

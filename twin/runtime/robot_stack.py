@@ -20,8 +20,9 @@ from twin.nodes.sensor_publishers import SensorPublisher
 from twin.nodes.tote_detector import ToteDetectorNode
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import derive
-from twin.runtime.localisation_stack import build_localisation, build_odometry_filter
+from twin.runtime.localisation_stack import build_localisation
 from twin.runtime.navigation_stack import build_navigation
+from twin.runtime.odometry_filter import odometry_filter, tell_unheard_sources
 from twin.runtime.stack_context import StackContext
 
 
@@ -43,8 +44,10 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        self.drive = self._build_drive(description)
-        build_odometry_filter(context, self.frames)
+        fusion = odometry_filter(context, self.frames)
+        wheels_tell = fusion is None or not fusion.config.publish_tf
+        self.drive = self._build_drive(description, enable_odom_tf=wheels_tell)
+        fused = None if fusion is None else fusion.build(context)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
@@ -66,8 +69,12 @@ class RobotStack:
                 namespace=namespace,
             )
         self._build_arm(description)
+        if fused is not None:
+            tell_unheard_sources(context, fused)
 
-    def _build_drive(self, description: RobotDescription) -> DiffDriveControllerNode | None:
+    def _build_drive(
+        self, description: RobotDescription, *, enable_odom_tf: bool
+    ) -> DiffDriveControllerNode | None:
         drive, context = description.drive, self._context
         if drive is None:
             return None
@@ -83,7 +90,7 @@ class RobotStack:
                 noise=odometry_noise(drive, description),
                 period_ns=context.control_period_ns,
                 use_imu=getattr(context.config.localisation, "use_imu", False),
-                enable_odom_tf=context.config.odometry.type == "wheels",
+                enable_odom_tf=enable_odom_tf,
             ),
             namespace=context.namespace,
         )

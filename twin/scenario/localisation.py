@@ -32,8 +32,10 @@ class EkfOdometry(StrictModel):
 
     type: Literal["ekf"]
     """`ekf`"""
+    params_file: FileBeside | None = None
+    """A parameter file of robot_localization; absent: that of `navigation`, if it has a filter."""
     parameters: EkfParameters = EkfParameters()
-    """Overrides of the filter's parameters."""
+    """Overrides of the filter's parameters, and of the file's."""
 
 
 Odometry = Annotated[WheelOdometry | EkfOdometry, Field(discriminator="type")]
@@ -78,6 +80,8 @@ class SlamLocalisation(StrictModel):
 
     type: Literal["slam"]
     """`slam`"""
+    params_file: FileBeside | None = None
+    """A parameter file of slam_toolbox; absent: that of `navigation`, if it has such a node."""
     mode: Literal["mapping", "localization"] = "mapping"
     """`mapping` makes a map, or goes on with that of `pose_graph`; `localization` leaves it as it is."""
     pose_graph: FileBeside | None = None
@@ -87,11 +91,11 @@ class SlamLocalisation(StrictModel):
     initial_pose_error: InitialPoseError = InitialPoseError()
     """How wrong that is."""
     parameters: SlamParameters = SlamParameters()
-    """Overrides of the node's parameters."""
+    """Overrides of the node's parameters, and of the file's."""
 
     @model_validator(mode="after")
     def _has_a_graph(self) -> SlamLocalisation:
-        if self.mode == "localization" and self.pose_graph is None:
+        if self.mode == "localization" and self.pose_graph is None and self.params_file is None:
             raise ValueError("localization needs a pose_graph; without one only mapping is possible")
         return self
 

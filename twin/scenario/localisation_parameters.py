@@ -95,6 +95,10 @@ class SlamParameters(ParameterGroup):
     """Edge of a cell of the map [m]."""
     map_update_interval: Annotated[Seconds, Positive] | None = None
     """Time between two maps [s]."""
+    throttle_scans: Annotated[int, Positive] | None = None
+    """Every so many scans one is looked at."""
+    transform_timeout: Annotated[Seconds, NotNegative] | None = None
+    """`map` → `odom` is stamped this far ahead [s]."""
     min_laser_range: Annotated[Metres, NotNegative] | None = None
     """Shorter readings are not used [m]."""
     max_laser_range: Annotated[Metres, Positive] | None = None
@@ -143,6 +147,8 @@ class EkfSourceParameters(ParameterGroup):
     """The same of its velocities."""
     linear_acceleration_rejection_threshold: Annotated[float, Positive] | None = None
     """The same of its accelerations."""
+    queue_size: Annotated[int, Positive] | None = None
+    """Messages that may wait until the filter looks at them."""
     remove_gravitational_acceleration: bool | None = None
     """Whether gravity is in its accelerations, and to be taken off."""
     estimate_bias: bool | None = None
@@ -152,6 +158,12 @@ class EkfSourceParameters(ParameterGroup):
 class EkfParameters(ParameterGroup):
     """Parameters of `/ekf_filter_node`."""
 
+    frequency: Annotated[float, Positive] | None = None
+    """How often it publishes [Hz]; absent: once per period of the drive's controller."""
+    publish_tf: bool | None = None
+    """Whether it publishes odom → base; if not, the drive's controller does."""
+    transform_time_offset: Seconds | None = None
+    """That transform is stamped this far ahead [s]."""
     two_d_mode: bool | None = None
     """Whether z, roll, pitch and what moves along them stay zero."""
     process_noise_covariance: Covariance | None = None

@@ -26,7 +26,7 @@ from twin.bridge.msgs import (
     new,
     ns,
 )
-from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.qos import SENSOR_DATA, QoS
 from twin.bridge.srvs import SetEkfPose
 from twin.bridge.tf import TransformBroadcaster, TransformBuffer, TransformListener, transform_stamped
 from twin.geometry import Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
@@ -64,6 +64,8 @@ class EkfNodeConfig:
     period_ns: int = 20_000_000
     """Between outputs; as `frequency` [Hz]."""
     publish_tf: bool = True
+    transform_time_offset_ns: int = 0
+    """The transform is stamped this far ahead [ns]."""
     map_frame: str = "map"
     odom_frame: str = "odom"
     base_link_frame: str = "base_footprint"
@@ -125,7 +127,8 @@ class EkfNode:
             if isinstance(message, Odometry):
                 self._tell_wheels(message)
 
-        self.node.create_subscription(kind, source.topic, on_message, SENSOR_DATA if kind is Imu else 10)
+        qos = replace(SENSOR_DATA if kind is Imu else QoS(), depth=source.queue_size)
+        self.node.create_subscription(kind, source.topic, on_message, qos)
 
     def _tell_wheels(self, message: Odometry) -> None:
         """Tell all gyroscopes what wheels do: while they stand, what is measured is bias."""
@@ -195,8 +198,9 @@ class EkfNode:
         )
         if config.publish_tf:
             pose = Pose3(state[states.POSITION].copy(), np.array([w, x, y, z]))
+            stamp_ns = now_ns + config.transform_time_offset_ns
             self._tf.send_transform(
-                transform_stamped(config.world_frame, config.base_link_frame, now_ns, pose)
+                transform_stamped(config.world_frame, config.base_link_frame, stamp_ns, pose)
             )
 
 

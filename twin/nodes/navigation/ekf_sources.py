@@ -54,6 +54,8 @@ class EkfSource:
     """Mahalanobis distance; so are the next two."""
     twist_rejection_threshold: float = 1e9
     linear_acceleration_rejection_threshold: float = 1e9
+    queue_size: int = 10
+    """Messages that may wait until the filter looks at them."""
     remove_gravitational_acceleration: bool = True
     estimate_bias: bool = True
     """Whether a gyroscope's bias is learnt while the wheels stand (robot_localization does not)."""
