@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from twin.bridge.topics import Sample
 from twin.errors import NavigationError
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Slam
@@ -232,11 +234,7 @@ def test_navigation_s_file_serves_all(write: Write) -> None:
     assert localisation_nodes(wheels, "") == ()
 
 
-def test_a_run_with_a_file_and_a_scenario_that_knows_better(
-    scenario: Callable[[str], Scenario], make_run: Callable[..., Run], write: Write
-) -> None:
-    write(EKF.replace("NODE", "ekf_node").replace("publish_tf: true", "publish_tf: false"))
-    text = """\
+RUN = """\
 name: filtered
 duration: 1 s
 world: {}
@@ -246,11 +244,47 @@ robots:
       type: ekf
       params_file: params.yaml
       parameters: {frequency: 20.0, sources: {odom0: {topic: odom}}}
+mission: {type: velocity_profile, robot: warehouse_bot, steps: [{duration: 1 s, linear: 0.5, angular: 0.5}]}
 checks: [{no_collision: }]
 """
-    run = make_run(scenario(text))
+
+
+def test_a_run_with_a_file_and_a_scenario_that_knows_better(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run], write: Write
+) -> None:
+    write(EKF.replace("NODE", "ekf_node").replace("publish_tf: true", "publish_tf: false"))
+    run = make_run(scenario(RUN))
     node = next(node for node in run.bus.nodes if node.name == "ekf_filter_node")
     assert node.get_parameter("frequency").value == 20.0
     assert node.get_parameter("odom0").value == "odom"
     wheels = next(node for node in run.bus.nodes if node.name == "diff_drive_controller")
     assert wheels.get_parameter("enable_odom_tf").value is True  # for the filter does not
+
+
+def test_unread_values_change_nothing_but_what_is_told(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run], write: Write
+) -> None:
+    heard: list[list[tuple[str, bytes]]] = []
+    told: list[list[str]] = []
+    for more in ("", "    use_control: true\n    debug: true\n    imu0_nodelay: true\n"):
+        text = EKF.replace("NODE", "ekf_node").replace("    use_control: false\n", "")
+        write(text + more)
+        messages, said = [], []
+
+        def tap(sample: Sample[Any], messages: Any = messages, said: Any = said) -> None:
+            if sample.topic == "/rosout":
+                said.append(sample.message.msg)
+            else:
+                messages.append((sample.topic, bytes(sample.payload)))
+
+        run = make_run(scenario(RUN), taps=[tap])
+        while not run.over:
+            run.tick()
+        heard.append(messages)
+        told.append(said)
+    assert any(topic == "/odometry/filtered" for topic, _ in heard[0])
+    assert heard[0] == heard[1]
+    assert told[0] != told[1]
+    assert (
+        "twist0: nobody publishes /flow; there is no geometry_msgs/msg/TwistWithCovarianceStamped" in told[0]
+    )
