@@ -105,6 +105,16 @@ def test_a_goal_that_somebody_stands_on_is_sent_again_after_another_one(bench: B
     assert node.failed == 0
 
 
+def test_what_was_put_off_is_told_at_the_end(bench: Bench) -> None:
+    robot, logs = Robot(bench, open_room()), bench.logs()
+    navigator, node = Navigator(bench, gives_up=True), mission(bench, robot, distance=0.3)
+    drive_in_circles(bench)
+    bench.until(lambda: node.done, 30.0)
+    bench.tick()
+    (goal,) = navigator.goals
+    assert f"0 goals reached, 0 given up, put off ({goal.x:.2f}, {goal.y:.2f})" in logs
+
+
 def test_a_map_without_room_is_told(bench: Bench) -> None:
     robot = Robot(bench, open_room())
     Navigator(bench)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -9,9 +10,9 @@ import pytest
 
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
-from twin.geometry import Pose2
+from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps.footprint import rectangle
-from twin.runtime.obstacles import Outline, Walker
+from twin.runtime.obstacles import ObstacleSchedule, Outline, Walker
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 from twin.scenario.world import Obstacle, PoseConfig
@@ -125,6 +126,34 @@ def test_a_walker_does_not_walk_through_a_corner_that_reaches_into_its_way() -> 
     for _ in range(100):
         walker.walk(0.02, [robot], [outline])
     assert walker.pose.x == pytest.approx(0.6, abs=0.02)
+
+
+class Floor:
+    """A world of nothing but time and what walks in it."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+        self.at = Pose2(0.0, 0.0, 0.0)
+
+    def place(self, _name: str, pose: Pose3) -> None:
+        self.at = pose.to_pose2()
+
+
+def test_a_walker_lets_a_robot_pass_that_cannot_stop_any_more() -> None:
+    floor = Floor()
+    walker = WALKER.model_copy(update={"route": ((6.0, 0.0),)})
+    schedule = ObstacleSchedule(floor, [walker], [rectangle(0.82, 0.57)])  # type: ignore[arg-type]
+    outline = Outline.of(rectangle(0.82, 0.57))
+    robot, speed, nearest = Pose2(0.0, 1.4, -0.9), 0.8, math.inf
+    for _ in range(200):
+        floor.time_ns += 20_000_000
+        gap = outline.gap(floor.at.inverse() @ robot, (0.4, 0.4))
+        if gap < 0.15:  # then it brakes, at 0.8 m/s²
+            speed = max(0.0, speed - 0.8 * 0.02)
+        robot = robot @ Pose2(speed * 0.02, 0.0, 0.0)
+        schedule.update([robot])
+        nearest = min(nearest, gap)
+    assert nearest > 0.0
 
 
 def test_a_walker_is_seen_by_the_lidar_where_it_walks(

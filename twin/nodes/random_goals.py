@@ -93,6 +93,7 @@ class RandomGoalsNode(MissionNode):
         if self._goal is not None and not self._settle(self._goal):
             return
         if self.driven >= self._config.distance:
+            self._tell_goals()
             self.finish(succeeded=True)
             return
         if self._places is None:
@@ -136,6 +137,10 @@ class RandomGoalsNode(MissionNode):
                 self.finish(succeeded=False)
         del self._tries[self._place]
         return not self.done
+
+    def _tell_goals(self) -> None:
+        left = "".join(f", put off ({goal.x:.2f}, {goal.y:.2f})" for goal in self._put_off)
+        self.node.get_logger().info(f"{self.reached} goals reached, {self.failed} given up{left}")
 
     def _draw(self, robot: Pose2) -> Pose2 | None:
         assert self._places is not None

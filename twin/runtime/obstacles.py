@@ -21,6 +21,8 @@ _BESIDE = 0.1
 """Nearer than this to a part of a robot there is no way along it, only away from it [m]."""
 _AWAY = 1e-6
 """A step that gains less than this does not lead away [m]."""
+_AHEAD_S = (0.3, 0.6)
+"""They look where a robot will be so soon if it drives on as it does: a heavy one cannot stop at once [s]."""
 _BELOW_M = 20.0
 """An obstacle that is not there waits so far below its place, where no ray and no robot comes."""
 
@@ -52,6 +54,7 @@ class ObstacleSchedule:
         self._waiting = [obstacle for obstacle in obstacles if obstacle.appears_within is not None]
         self._walkers = [Walker(obstacle) for obstacle in obstacles if obstacle.route is not None]
         self._time_ns = world.time_ns
+        self._bases: Sequence[Pose2] = ()
 
     @property
     def active(self) -> bool:
@@ -67,8 +70,10 @@ class ObstacleSchedule:
                 self._world.place(obstacle.name, standing_pose(obstacle))
         elapsed = (self._world.time_ns - self._time_ns) * 1e-9
         self._time_ns = self._world.time_ns
+        soon = _soon(self._bases, bases, elapsed)
+        self._bases = bases
         for walker in self._walkers:
-            if walker.walk(elapsed, bases, self._outlines):
+            if walker.walk(elapsed, bases, self._outlines, soon):
                 self._world.place(walker.obstacle.name, _on_floor(walker.obstacle, walker.pose))
 
 
@@ -123,17 +128,24 @@ class Walker:
         """Where its footprint's centre stands; its heading stays that of its start."""
         return self._at(self._along)
 
-    def walk(self, elapsed: float, bases: Sequence[Pose2], outlines: Sequence[Outline] = ()) -> bool:
-        """Walk for `elapsed` [s] unless a robot is in the way; return whether it moved.
+    def walk(
+        self,
+        elapsed: float,
+        bases: Sequence[Pose2],
+        outlines: Sequence[Outline] = (),
+        soon: Sequence[Sequence[Pose2]] = (),
+    ) -> bool:
+        """Walk for `elapsed` [s] unless a robot is in the way, or will be; return whether it moved.
 
         Args:
             elapsed: Since the last call [s].
             bases: The robots' poses.
             outlines: Theirs, in the same order.
+            soon: Poses that they will have had soon, for each of them.
         """
         end = self._knots[-1]
         along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
-        if self._is_blocked(along, bases, outlines):
+        if self._is_blocked(along, bases, outlines, soon):
             self._waited += elapsed
             if self._waited >= self.obstacle.patience:
                 self._waited, self._direction = 0.0, -self._direction
@@ -145,20 +157,32 @@ class Walker:
             self._direction = 1 if along == 0.0 else -1
         return moved
 
-    def _is_blocked(self, along: float, bases: Sequence[Pose2], outlines: Sequence[Outline]) -> bool:
+    def _is_blocked(
+        self,
+        along: float,
+        bases: Sequence[Pose2],
+        outlines: Sequence[Outline],
+        soon: Sequence[Sequence[Pose2]],
+    ) -> bool:
         """Whether a robot is near, and would be nearer after the step: its base, or some part of it."""
         here, there = self.pose, self._at(along)
-        for base, outline in zip_longest(bases, outlines):
+        for base, outline, later in zip_longest(bases, outlines, soon):
             then = _distance(self.obstacle, there, base)
             if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
                 return True
-            if outline is not None and then < outline.reach + _GAP:
-                size = self.obstacle.size[:2]
-                gap = outline.gap(there.inverse() @ base, size)
-                gain = gap - outline.gap(here.inverse() @ base, size)
-                if (gap < _GAP and gain < 0.0) or (gap < _BESIDE and gain < _AWAY):
-                    return True
+            if outline is not None and any(
+                self._comes_too_near(here, there, pose, outline) for pose in (base, *(later or ()))
+            ):
+                return True
         return False
+
+    def _comes_too_near(self, here: Pose2, there: Pose2, base: Pose2, outline: Outline) -> bool:
+        if _distance(self.obstacle, there, base) > outline.reach + _GAP:
+            return False
+        size = self.obstacle.size[:2]
+        gap = outline.gap(there.inverse() @ base, size)
+        gain = gap - outline.gap(here.inverse() @ base, size)
+        return (gap < _GAP and gain < 0.0) or (gap < _BESIDE and gain < _AWAY)
 
     def _at(self, along: float) -> Pose2:
         """Return the pose so far along the route [m]; np.interp would cost ten times as much."""
@@ -170,6 +194,18 @@ class Walker:
         start, length = self._knots[after - 1], self._knots[after] - self._knots[after - 1]
         gone = along - start
         return Pose2((x1 - x0) / length * gone + x0, (y1 - y0) / length * gone + y0, yaw)
+
+
+def _soon(before: Sequence[Pose2], bases: Sequence[Pose2], elapsed: float) -> list[list[Pose2]]:
+    """Return where robots will be if they drive on as in the last `elapsed` seconds, for each of them."""
+    if elapsed <= 0.0:
+        return []
+    found = []
+    for was, base in zip(before, bases, strict=False):
+        moved = was.inverse() @ base
+        steps = (seconds / elapsed for seconds in _AHEAD_S)
+        found.append([base @ Pose2(moved.x * n, moved.y * n, moved.yaw * n) for n in steps])
+    return found
 
 
 def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:

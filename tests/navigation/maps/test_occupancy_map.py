@@ -57,6 +57,8 @@ def test_first_image_row_is_the_highest_y(tmp_path: Path) -> None:
         ("mode: scale", [0, 0, 0, 66, 100]),
         ("mode: raw", [-1, -1, -1, 100, 0]),
         ("free_thresh: 0.25", [0, 0, 0, -1, 100]),
+        ("free_thresh: 0.65", [0, 0, 0, 0, 100]),  # nothing between: Nav2 takes it
+        ("free_thresh: 0.65\nmode: scale\n", [0, 0, 0, 0, 100]),
     ],
 )
 def test_modes(tmp_path: Path, change: str, want: list[int]) -> None:
@@ -66,7 +68,7 @@ def test_modes(tmp_path: Path, change: str, want: list[int]) -> None:
     if "raw" in change:
         path = write(tmp_path, [[254, 206, 101, 100, 0]], path.read_text())
     got = OccupancyMap.load(path).data[0].tolist()
-    if "scale" in change:
+    if change == "mode: scale":
         # round((occupied - free) / (occ - free) * 100) with occupied = 1 - gray / 255
         want = [0, 0, 0, round((1 - 128 / 255 - 0.196) / (0.65 - 0.196) * 100), 100]
     if not change:

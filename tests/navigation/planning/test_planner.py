@@ -141,6 +141,7 @@ def test_unknown_cells() -> None:
         (centre(0, 0), centre(9, 0), GoalOutsideMap, 204),
         (centre(-1, 0), centre(0, 0), StartOutsideMap, 203),
         (centre(0, 0), Pose2(math.nan, 0.0, 0.0), GoalOutsideMap, 204),
+        (centre(0, 0), Pose2(0.5, 0.5, math.nan), GoalOutsideMap, 204),
     ],
 )
 def test_failures_carry_nav2s_codes(

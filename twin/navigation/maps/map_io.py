@@ -48,7 +48,7 @@ def occupancy_from_gray(
         level = np.float32(1.0) - level
     occupied_thresh, free_thresh = np.float32(metadata.occupied_thresh), np.float32(metadata.free_thresh)
     table = np.full(256, UNKNOWN, dtype=np.int8)
-    if metadata.mode == "scale":
+    if metadata.mode == "scale" and free_thresh < occupied_thresh:
         span = np.float32(metadata.occupied_thresh - metadata.free_thresh)
         scaled = (level - free_thresh) / span * np.float32(100.0)
         between = (level > free_thresh) & (level < occupied_thresh)

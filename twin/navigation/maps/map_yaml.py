@@ -65,8 +65,8 @@ class _MetadataReader:
         occupied = self._get("occupied_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
         free = self._get("free_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
         mode: Any = self._get("mode", _mode) if "mode" in self.values else "trinary"
-        if occupied is not None and free is not None and free >= occupied:
-            message = f"is {free}; valid is less than occupied_thresh ({occupied})"
+        if occupied is not None and free is not None and free > occupied:
+            message = f"is {free}; valid is at most occupied_thresh ({occupied})"
             self._report(message, "free_thresh", name=True)
         if self.problems:
             raise MapError(self.problems)

@@ -154,7 +154,9 @@ class Planner:
 def check_inside(costmap: Costmap, start: Pose2, goal: Pose2) -> None:
     """Raise StartOutsideMap or GoalOutsideMap for a pose that is off the costmap, or not finite."""
     for pose, outside in ((start, StartOutsideMap), (goal, GoalOutsideMap)):
-        if not (np.all(np.isfinite(pose)) and costmap.contains(pose.x, pose.y)):
+        if not np.all(np.isfinite(pose)):
+            raise outside(f"({pose.x:g}, {pose.y:g}) with yaw {pose.yaw:g} is not finite")
+        if not costmap.contains(pose.x, pose.y):
             raise outside(f"({pose.x:.2f}, {pose.y:.2f}) is outside the costmap")
 
 
