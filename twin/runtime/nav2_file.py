@@ -1,4 +1,4 @@
-"""One of Nav2's parameter files: names as the nodes here have them, lines, and what became of each value."""
+"""A parameter file as Nav2 has it: names as the nodes here have them, lines, what became of each value."""
 
 from __future__ import annotations
 
