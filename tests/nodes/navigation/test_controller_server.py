@@ -115,7 +115,7 @@ def test_a_blocked_robot_maneuvers_and_goes_on(bench: Bench) -> None:
 def test_a_robot_that_is_blocked_again_and_again_maneuvers_before_it_gives_up(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, reach: float, outcome: int
 ) -> None:
-    checker = ProgressCheckerConfig(required_movement_radius=0.3, movement_time_allowance=3.0)
+    checker = ProgressCheckerConfig(required_movement_radius=0.2, movement_time_allowance=6.0)
     stack, goal = beside_a_box(bench, reach=reach, progress_checkers={"progress_checker": checker})
     (controller,) = stack.controller_server.controllers.values()
     drive, calls, said = controller.compute_velocity, itertools.count(), bench.logs()
