@@ -47,7 +47,7 @@ class Stack:
         )
         config = PlannerConfig(tolerance=0.1, allow_unknown=False)
         PlannerServerNode(bus, pose, self.global_costmap, config=config)
-        ControllerServerNode(
+        self.controller_server = ControllerServerNode(
             bus,
             pose,
             self.local_costmap,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -92,9 +93,9 @@ def test_it_stops_before_what_blocks_its_path(bench: Bench, stack: Stack) -> Non
     assert stack.robot.commands[-1] == (0.0, 0.0)
 
 
-def beside_a_box(bench: Bench, reach: float) -> tuple[Stack, Any]:
+def beside_a_box(bench: Bench, reach: float, **config: Any) -> tuple[Stack, Any]:
     """Follow a path around a box that stands before the robot's nose, too near to turn."""
-    stack = Stack(bench, failure_tolerance_ns=4_000_000_000, maneuver=ManeuverConfig(reach=reach))
+    stack = Stack(bench, failure_tolerance_ns=4_000_000_000, maneuver=ManeuverConfig(reach=reach), **config)
     stack.room.add_box(0.18, -0.6, 0.8, 0.13)
     bench.run(0.5)
     path = np.array([[0.0, 0.0, 1.57], [0.0, 0.45, 0.0], [2.0, 0.45, 0.0]])
@@ -108,6 +109,28 @@ def test_a_blocked_robot_maneuvers_and_goes_on(bench: Bench) -> None:
     assert goal.succeeded, goal.result.error_msg
     assert any(text.startswith("maneuvering: collision in") for text in said)
     assert min(v for v, _ in stack.robot.commands) < -0.05, "it backs up"
+
+
+@pytest.mark.parametrize(("reach", "outcome"), [(1.5, 0), (0.0, 105)])
+def test_a_robot_that_is_blocked_again_and_again_maneuvers_before_it_gives_up(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, reach: float, outcome: int
+) -> None:
+    checker = ProgressCheckerConfig(required_movement_radius=0.2, movement_time_allowance=6.0)
+    stack, goal = beside_a_box(bench, reach=reach, progress_checkers={"progress_checker": checker})
+    (controller,) = stack.controller_server.controllers.values()
+    drive, calls, said = controller.compute_velocity, itertools.count(), bench.logs()
+
+    def every_other_time(*args: Any, **kwargs: Any) -> tuple[float, float]:
+        """Find a turn that is valid but leads nowhere, until a maneuver has begun."""
+        n = next(calls)
+        if n % 2 or "maneuvering: no progress" in said:
+            return drive(*args, **kwargs)
+        return 0.0, 0.02 if n % 4 else -0.02
+
+    monkeypatch.setattr(controller, "compute_velocity", every_other_time)
+    bench.until(lambda: goal.done, 40.0)
+    assert goal.result.error_code == outcome
+    assert ("maneuvering: no progress" in said) == (outcome == 0)
 
 
 def test_without_maneuvers_it_leaves_that_to_recoveries(bench: Bench) -> None:

@@ -13,6 +13,9 @@ from twin.nodes.navigation.controller_goal import CONTROLLER_TIMED_OUT, PATIENCE
 from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode
 
+_AGAIN_NS = 1_000_000_000
+"""A robot that was blocked so short a time ago is blocked again and again."""
+
 
 class Commander:
     """Finds what the robot does next, from the local costmap."""
@@ -73,8 +76,10 @@ class Commander:
                 in_map, velocity, goal.path, costmap, dt, costmap_pose=in_odom
             )
         except NoValidControl as failure:
+            goal.blocked_ns = now
             self._be_patient(goal, failure)
-            self._look_for_a_maneuver(goal, failure, in_odom, in_odom @ in_map.inverse(), ahead)
+            if now - goal.searched_ns >= self._config.maneuver.wait * 1e9:
+                self._look_for_a_maneuver(goal, str(failure), in_map, in_odom, ahead)
             return 0.0, 0.0
         except ControlFailure as failure:
             raise Abort(failure.error_code, str(failure)) from failure
@@ -89,14 +94,28 @@ class Commander:
         if 0 < tolerance < self._node.now_ns - goal.last_valid_ns:
             raise Abort(PATIENCE_EXCEEDED, f"no valid control for {tolerance * 1e-9:g} s: {failure}")
 
+    def frees(self, goal: FollowGoal, in_map: Pose2, in_odom: Pose2, ahead: Array) -> bool:
+        """Whether a maneuver begins for a robot that makes no progress: one that is blocked again and again.
+
+        Now and then it finds a control that is valid, so it never stands blocked for long, and turns to and
+        fro. It is tried once about one place; arguments as those of `command`.
+        """
+        blocked = goal.blocked_ns is not None and self._node.now_ns - goal.blocked_ns < _AGAIN_NS
+        tried = goal.freed_at is not None and goal.freed_at.distance(in_map) < self._config.maneuver.reach
+        if tried or self.maneuver.active or not blocked:
+            return False
+        goal.freed_at = in_map
+        return self._look_for_a_maneuver(goal, "no progress", in_map, in_odom, ahead)
+
     def _look_for_a_maneuver(
-        self, goal: FollowGoal, failure: NoValidControl, at: Pose2, to_costmap: Pose2, ahead: Array
-    ) -> None:
-        """Begin one, if the robot has stood for a while and there is one on to the path ahead."""
-        costmap, now = self._costmap.costmap, self._node.now_ns
-        if costmap is None or now - goal.searched_ns < self._config.maneuver.wait * 1e9:
-            return
-        goal.searched_ns = now
+        self, goal: FollowGoal, why: str, in_map: Pose2, in_odom: Pose2, ahead: Array
+    ) -> bool:
+        """Begin one, if there is one on to the path ahead."""
+        if self._costmap.costmap is None:
+            return False
+        goal.searched_ns = self._node.now_ns
+        to_costmap = in_odom @ in_map.inverse()
         path = np.array([to_costmap @ Pose2(*pose) for pose in ahead.tolist()])
-        if self.maneuver.begin(costmap, at, path):
-            self._node.get_logger().info(f"maneuvering: {failure}")
+        if self.maneuver.begin(self._costmap.costmap, in_odom, path):
+            self._node.get_logger().info(f"maneuvering: {why}")
+        return self.maneuver.active

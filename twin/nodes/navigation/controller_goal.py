@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from twin.geometry import Array
+from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
@@ -46,6 +46,10 @@ class FollowGoal:
     """When there was a valid control last."""
     searched_ns: int
     """When a way out was looked for last, or something was valid."""
+    blocked_ns: int | None
+    """When there was no valid control last."""
+    freed_at: Pose2 | None
+    """Where a maneuver was begun last for want of progress, in the map frame."""
     current_ns: int
     """When the costmap was current last."""
     waiting: bool = False
@@ -93,6 +97,8 @@ def follow_goal(
         handler=handler,
         last_valid_ns=before.last_valid_ns if before else now_ns,
         searched_ns=before.searched_ns if before else now_ns,
+        blocked_ns=before.blocked_ns if before else None,
+        freed_at=before.freed_at if before else None,
         current_ns=now_ns,
     )
 

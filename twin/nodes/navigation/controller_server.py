@@ -158,7 +158,9 @@ class ControllerServerNode:
             self._drive(0.0, 0.0)
             return False
         if not goal.progress_checker.check(in_map, self.node.now_ns):
-            raise Abort(FAILED_TO_MAKE_PROGRESS, "failed to make progress")
+            if not self._commander.frees(goal, in_map, in_odom, ahead):
+                raise Abort(FAILED_TO_MAKE_PROGRESS, "failed to make progress")
+            goal.progress_checker.reset()
         self._drive(*self._commander.command(goal, self._velocity, in_map, in_odom, ahead))
         self._display.show(goal.controller, ahead)
         handle.publish_feedback(
