@@ -33,7 +33,7 @@ class Obstacle(StrictModel):
     speed: Annotated[MetresPerSecond, Positive] = 0.5
     """Of walking [m/s]."""
     yields_within: Length = 1.0
-    """It stops before a robot whose base is this near to its footprint, or any part 0.3 m, now or soon [m] ..."""
+    """It stops before a robot whose base is this near to it, or any part 0.3 m, now or soon [m] ..."""
     patience: Annotated[Seconds, NotNegative] = 3.0
     """... and turns back when that has lasted so long [s]."""
 
