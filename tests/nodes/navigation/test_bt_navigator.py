@@ -128,7 +128,7 @@ BAD_GOALS = [
     ),  # in a pillar
     (Pose2(50.0, 0.0, 0.0), "map", 204, "(50.00, 0.00) is outside the costmap"),
     (Pose2(-3.3, 0.0, 0.0), "map", 206, "nothing is free"),  # unknown
-    (Pose2(math.nan, 0.0, 0.0), "map", 204, "outside the costmap"),
+    (Pose2(math.nan, 0.0, 0.0), "map", 204, "is not finite"),
     (Pose2(1.0, 0.0, 0.0), "moon", 9002, "the goal's frame 'moon' is not connected to the map's"),
 ]
 
