@@ -11,6 +11,7 @@ import typer
 from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.bench import app as bench_app
 from twin.cli.console import print_error
+from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.errors import TwinError
@@ -89,6 +90,7 @@ def run_app() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     except Exception as fault:
+        raise_swallowed()  # Ctrl-C inside of __set_name__ becomes a RuntimeError
         _tell(fault)
         sys.exit(2)  # Python's own exit code for a bug, 1, means a failed check here
 
