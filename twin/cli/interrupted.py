@@ -49,9 +49,14 @@ def _is_callback_of_c(frame: FrameType | None) -> bool:
     return False
 
 
+def was_interrupted() -> bool:
+    """Whether there was a Ctrl-C, whatever it has become since."""
+    return bool(_interrupts)
+
+
 def raise_swallowed() -> None:
     """Raise KeyboardInterrupt if there was a Ctrl-C at a moment that could not raise it."""
-    if _interrupts:
+    if was_interrupted():
         raise KeyboardInterrupt
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
 from twin.cli.folders import make_folder, run_folder
-from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c
+from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
@@ -76,7 +76,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         raise
     except Exception as bug:  # ours, or of a user's node: whoever reads the verdict learns of it, too
         if folder is not None:
-            sentence = f"{type(bug).__name__}: {bug}"
+            sentence = "interrupted" if was_interrupted() else f"{type(bug).__name__}: {bug}"
             Verdict(scenario=name, seed=seed, error=sentence, clock=clock).write(folder)
         raise
     verdict.write(folder)
