@@ -141,7 +141,7 @@ class Walker:
             elapsed: Since the last call [s].
             bases: The robots' poses.
             outlines: Theirs, in the same order.
-            soon: Poses that they will have had soon, for each of them.
+            soon: Poses that they will have soon, for each of them.
         """
         end = self._knots[-1]
         along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
