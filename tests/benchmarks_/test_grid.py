@@ -84,6 +84,9 @@ def test_a_path_that_cuts_a_corner_jumps_or_is_blocked_has_no_length(tmp_path: P
         ("a.json", '{"rows": [".@"], "problems": [[0, 0, 1, 0, 1]]}', "(1, 0), which is not free"),
         ("a.map", "type octile\n", "no problems beside the map; valid is a.map.scen"),
         ("a.scen", "version 1\n0 m.map 5\n", "a.scen:2: the line is no problem"),
+        ("a.scen", "version 1\n0 m.map 5 3 1e999 0 4 0 8\n", "a.scen:2: the line is no problem"),
+        ("a.json", '{"rows": ["..", ".."], "problems": [[0, 0, Infinity, 0, 1]]}', "is not MovingAI JSON"),
+        ("a.json", '{"rows": ["..", ".."], "problems": [[0, 1e999, 1, 0, 1]]}', "is not MovingAI JSON"),
         ("a.scen", "version 1\n0 m.map 1 1 0 0 0 0 0\n", "m.map cannot be read"),
     ],
 )

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -500,3 +503,27 @@ collision_monitor:
     ):
         one = f"collision_monitor: {{ros__parameters: {{polygons: [Stop], {circle}}}}}"
         assert _said(tmp_path, one) == [f"collision_monitor: {said}"]
+
+
+@pytest.mark.parametrize("seed", ["0", "1", "2", "3"])
+def test_of_two_faults_the_same_one_is_told_each_time(tmp_path: Path, seed: str) -> None:
+    text = """\
+collision_monitor:
+  ros__parameters:
+    polygons: [Stop]
+    Stop: {type: circle, action_type: stop, radius: wide, max_points: many}
+"""
+    code = (
+        "import sys; from twin.runtime.nav2_parameters import monitor_with_file as read\n"
+        "from twin.scenario.navigation import NavigationConfig\n"
+        "try: read(NavigationConfig(params_file=sys.argv[1]), '')\n"
+        "except Exception as error: print(error)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code, _file(tmp_path, text)],
+        env={**os.environ, "PYTHONHASHSEED": seed},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert "Stop.radius must be a number, not 'wide'" in told

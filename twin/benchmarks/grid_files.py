@@ -76,7 +76,7 @@ def _read_json(path: Path) -> tuple[list[str], list[GridProblem]]:
         content: Any = json.loads(_text(path))
         rows, problems = content["rows"], content["problems"]
         return [str(row) for row in rows], [_problem(*problem) for problem in problems]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         what = '{"rows": ["..@"], "problems": [[start x, start y, goal x, goal y, optimal length]]}'
         raise MapError(Problem(f"the file is not MovingAI JSON; valid is {what}", path)) from error
 
@@ -121,7 +121,7 @@ def _read_scen(path: Path) -> tuple[str, list[GridProblem]]:
             _bucket, name, _width, _height, *numbers = fields
             problems.append(_problem(*map(float, numbers)))
             names.append(name)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OverflowError) as error:
             message = (
                 "the line is no problem; valid is bucket, map, width, height, x, y, x, y, optimal length"
             )

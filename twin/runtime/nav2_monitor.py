@@ -71,8 +71,8 @@ def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tupl
 def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonConfig | None:
     inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
     given = {key: inside[key] for key in MonitorPolygonConfig.model_fields if key in inside}
-    for key in {"radius", "max_points"} & inside.keys():
-        if type(inside[key]) not in (int, float):
+    for key in ("radius", "max_points"):
+        if key in inside and type(inside[key]) not in (int, float):
             file.wrong(_NODE, f"{name}.{key}", f"must be a number, not {inside[key]!r}")
             return None
     if inside.get("type") == "circle" and "radius" not in inside:

@@ -21,9 +21,9 @@ from twin.geometry import Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.mppi.config import PathAngleCriticConfig, TrajectoryVisualizerConfig
 from twin.navigation.control.mppi.controller import MPPI
-from twin.navigation.control.path_handler import cusps
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
+from twin.navigation.planning.direction import cusps
 from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother

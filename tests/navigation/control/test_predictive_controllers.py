@@ -21,6 +21,7 @@ from twin.navigation.control.mppi.config import (
     SpeedCriticConfig,
 )
 from twin.navigation.control.mppi.controller import MPPI
+from twin.navigation.control.mppi.sent_commands import SentCommands
 from twin.navigation.control.plugins import create_controller
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
@@ -254,3 +255,61 @@ def test_where_there_is_no_room_to_turn_the_primary_controller_drives() -> None:
             costmap.costs[40:42, 45] = 254  # beside the robot: not under it, but where its corner will be
         w = shimmed(DWB_CONFIG).compute_velocity(Pose2(2.0, 2.0, -1.2), (0.0, 0.8), path, costmap, DT)
         assert (w[0] == 0.0) is not blocked
+
+
+@pytest.mark.parametrize("with_shim", [False, True])
+@pytest.mark.parametrize("config", [MPPI_CONFIG, DWB_CONFIG], ids=["mppi", "dwb"])
+def test_who_is_carried_off_at_the_goal_drives_there_anew(
+    config: MPPIConfig | DWBConfig, with_shim: bool
+) -> None:
+    """Localisation is put right by 40 cm while the robot turns: it is not at the goal any more."""
+    if not with_shim and isinstance(config, MPPIConfig):
+        config = replace(config, GoalAngleCritic=GoalAngleCriticConfig())
+    controller = shimmed(config) if with_shim else create_controller(config, FOOTPRINT)
+    controller.set_goal_tolerance(0.05)
+    path = line(2.0, 4.0, 2.0)
+    path[-1, 2] = 0.9
+    for yaw in (0.0, 0.1, 0.2, 0.3):
+        v, _ = controller.compute_velocity(Pose2(4.0, 2.0, yaw), (0.0, 0.0), path, hall(), DT)
+        assert abs(v) < 0.15
+    log = drive(controller, Pose2(3.6, 1.95, 0.35), path, hall(), seconds=20.0)
+    assert np.hypot(*(log[-1, :2] - path[-1, :2])) < 0.1
+
+
+def test_a_speed_limit_holds_backwards_too() -> None:
+    back = line(4.0, 2.0, 2.0)
+    back[:, 2] = 0.0
+    controller = create_controller(replace(DWB_CONFIG, min_vel_x=-0.5), FOOTPRINT)
+    controller.set_goal_tolerance(0.05)
+    controller.set_speed_limit(0.1)
+    assert drive(controller, Pose2(4.0, 2.0, 0.0), back, hall())[:, 3].min() == pytest.approx(-0.1, abs=0.01)
+    controller.set_speed_limit(None)
+    assert drive(controller, Pose2(4.0, 2.0, 0.0), back.copy(), hall())[:, 3].min() < -0.3
+
+
+@pytest.mark.parametrize(
+    ("period", "want"),
+    [
+        (0.05, [4, 5, 6, 7, 8, 9]),
+        (0.1, [7, 7, 8, 8, 9, 9]),
+        (0.075, [6, 6, 7, 8, 8, 9]),
+        (0.025, [0, 0, 2, 4, 6, 8]),
+    ],
+)
+def test_commands_under_way_are_those_of_their_time(period: float, want: list[int]) -> None:
+    """The last of nine has held for one control period when the next is asked for; steps are 0.05 s."""
+    sent = SentCommands(6, 0.05)
+    assert not sent.latest(4).any(), "it stood before"
+    for number in range(1, 10):
+        sent.add((number, -number), period)
+    assert sent.latest(6).tolist() == [want, [-v for v in want]]
+    assert sent.latest(2).tolist() == [want[-2:], [-v for v in want[-2:]]]
+
+
+def test_mppi_knows_what_is_under_way_at_another_period_than_its_models() -> None:
+    config = replace(MPPI_CONFIG, model_dt=0.5 * DT, model_delay_vx=2.0 * DT)
+    controller, v, speeds = MPPI(config=config, footprint=FOOTPRINT), 0.0, []
+    for _ in range(5):
+        v, _ = controller.compute_velocity(Pose2(1.0, 2.0, 0.0), (v, 0.0), line(1.0, 6.5, 2.0), hall(), DT)
+        speeds.append(v)
+    assert controller._under_way[0] == pytest.approx([speeds[-2]] * 2 + [speeds[-1]] * 2)

@@ -294,3 +294,69 @@ def test_rays_clear_only_between_their_ranges() -> None:
     xs = np.arange(80) * 0.05 - 2.0
     assert (row[(xs >= 0.5) & (xs < 1.0)] == 0).all()
     assert (row[(xs < 0.45) | (xs > 1.0)] == 254).all()
+
+
+def test_a_sensor_that_sees_along_a_line_marks_what_it_hits() -> None:
+    layered = LayeredCostmap(config=CostmapConfig(width=4.0, height=4.0, inflation_radius=0.0))
+    sensors = (Pose2(0.025, 0.025, 0.0), Pose2(-0.5, -0.71, 2.3))
+    for sensor in sensors:
+        for _ in range(3):
+            layered.update_range(sensor, 0.8, (0.05, 3.0), 0.0)
+        for ahead, aside, cost in ((0.8, 0.0, 254), (0.4, 0.0, 0), (0.4, 0.1, 255), (0.8, 0.1, 255)):
+            assert layered.costmap.cost_at(*sensor.apply([ahead, aside])) == cost
+    layered.update_range(Pose2(0.0, 0.0, 0.0), 0.0, (0.0, 3.0), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "limits", "field_of_view"),
+    [
+        (0.8, (0.05, 3.0), math.nan),
+        (0.8, (0.05, 3.0), math.inf),
+        (0.8, (0.05, 3.0), -0.3),
+        (math.inf, (0.05, math.inf), 0.3),
+        (-math.inf, (math.inf, math.inf), 0.3),
+    ],
+)
+def test_a_sensor_that_tells_nonsense_is_not_heard(
+    distance: float, limits: tuple[float, float], field_of_view: float
+) -> None:
+    layered = empty(4.0)
+    layered.update_range(Pose2(0.0, 0.0, 0.0), distance, limits, field_of_view)
+    assert not layered.costmap.costs.any()
+
+
+# another map
+
+
+def floor(width: int, height: int, x: float, y: float, resolution: float = 0.05) -> OccupancyMap:
+    data = np.zeros((height, width), dtype=np.int8)
+    return OccupancyMap(data=data, resolution=resolution, origin=Pose2(x, y, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "x", "y"),
+    [(80, 80, -2.0, -2.0), (100, 90, -2.5, -2.25), (60, 70, -1.0, -1.5), (80, 80, -1.49, -2.51)],
+)
+def test_what_was_seen_is_where_it_was_on_a_map_that_has_grown_or_shrunk(
+    width: int, height: int, x: float, y: float
+) -> None:
+    config = CostmapConfig(inflation_radius=0.0)
+    old = LayeredCostmap(config=config, static_map=floor(80, 80, -2.0, -2.0))
+    old.update([[1.512, 0.512], [-1.512, 0.1]], (0.0, 0.512))
+    for _ in range(3):
+        old.update_range(Pose2(0.012, 0.012, 0.0), 0.8, (0.05, 3.0), 0.1)
+    layered = LayeredCostmap(config=config, static_map=floor(width, height, x, y))
+    layered.adopt(old)
+    grid = layered.costmap
+    assert grid.cost_at(1.512, 0.512) == grid.cost_at(0.812, 0.012) == 254
+    assert grid.cost_at(-1.512, 0.1) == (254 if x < -1.1 else 255)
+    assert np.count_nonzero(grid.costs == 254) == np.count_nonzero(old.costmap.costs == 254) - (x >= -1.1)
+
+
+def test_of_a_map_with_other_cells_nothing_is_taken() -> None:
+    config = CostmapConfig(inflation_radius=0.0)
+    old = LayeredCostmap(config=config, static_map=floor(80, 80, -2.0, -2.0))
+    old.update([[1.5, 0.5]], (0.0, 0.5))
+    layered = LayeredCostmap(config=config, static_map=floor(40, 40, -2.0, -2.0, 0.1))
+    layered.adopt(old)
+    assert not layered.costmap.costs.any()

@@ -229,3 +229,19 @@ def test_the_likelihood_field_against_its_definition(yaw: float, depth: float) -
         assert likelihood(x) == pytest.approx(math.log(z / 0.82), abs=0.15)
     assert likelihood(1.5 + depth) == pytest.approx(0.0, abs=1e-3)
     assert likelihood(99.0) == pytest.approx(math.log(0.02 / 0.82), abs=1e-3)
+
+
+@pytest.mark.parametrize("z_hit", [0.8, 0.0])
+def test_without_random_readings_no_pose_is_ruled_out(z_hit: float) -> None:
+    data = np.zeros((40, 60), dtype=np.int8)
+    data[:, 30:40] = 100
+    occupancy = OccupancyMap(data=data, resolution=0.05, origin=NOWHERE)
+    surfaces = SurfaceDistance(occupancy, max_dist=2.0)
+    field = LikelihoodField(surfaces, z_hit=z_hit, z_rand=0.0)
+    beams = chosen_beams([1.3], [0.0], NOWHERE, most=1, min_range=0.0, max_range=200.0)
+    poses = np.array([(0.2, 1.0, 0.0), (0.25, 1.0, 0.0), (0.2, 1.0, math.pi), (50.0, 0.0, 0.0)])
+    fits = field.log_likelihood(poses, beams, 0.0, 0.02)
+    assert np.isfinite(fits).all()
+    assert fits[0] == pytest.approx(0.0, abs=0.05)
+    if z_hit:
+        assert fits[0] > fits[1] > fits[2] == fits[3]

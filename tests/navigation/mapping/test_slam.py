@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -236,3 +237,15 @@ def test_entropy_falls_as_covariance_does():
     unsure = slam.entropy()
     slam.covariance = 0.01 * slam.covariance
     assert slam.entropy() == pytest.approx(unsure + 0.5 * 3 * math.log(0.01))
+
+
+def test_a_long_way_unseen_is_gone_on_with_from_the_last_scan():
+    """Paused while somebody drives it on: farther than scans are looked for back."""
+    truth = ring(0.25)
+    truth, config = truth[:20] + truth[70:], replace(CONFIG, scan_buffer_maximum_scan_distance=4.0)
+    odometry = drifting(truth, HEADING_DRIFT, SCALE)
+    slam = Slam(config)
+    taken = drive(slam, truth, odometry)
+    assert max(a.distance(b) for (a, _), (b, _) in pairwise(taken)) > 4.5
+    true, update = taken[-1]
+    assert update.pose.distance(truth[0].inverse() @ true) < 0.1

@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import scipy.sparse.csgraph
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.geometry import Pose2
+from twin.geometry import Pose2, wrap_angles
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import (
     GoalOccupied,
@@ -22,9 +23,17 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
+from twin.navigation.planning.direction import cusps, one_way_pieces
 from twin.navigation.planning.grid_search import GridSearch
-from twin.navigation.planning.planner import Planner, PlannerConfig, ThetaStarConfig, path_length
-from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother
+from twin.navigation.planning.planner import (
+    Planner,
+    PlannerConfig,
+    ThetaStarConfig,
+    filled,
+    path_length,
+    with_headings,
+)
+from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother, SmootherConfig
 
 EXACT = PlannerConfig(tolerance=0.0)
 
@@ -296,3 +305,56 @@ def test_the_parabola_filter_takes_noise_out_and_keeps_lines_and_ends() -> None:
     assert np.array_equal(smooth[[0, -1], :2], noisy[[0, -1], :2])
     assert path_length(smooth) < path_length(noisy)
     assert np.abs(smooth[:, :2] - line[:, :2]).mean() < np.abs(noisy[:, :2] - line[:, :2]).mean()
+
+
+SMOOTHERS = pytest.mark.parametrize("smoother", [SimpleSmoother(), SavitzkyGolaySmoother()], ids=["simple", "sg"])
+
+
+def out_and_back(noise: float) -> np.ndarray:
+    """Two metres forwards, then backwards along an arc, as a Reeds-Shepp path parks; 5 cm per row."""
+    out, angles = np.linspace(0.0, 2.0, 41), np.linspace(0.05, 1.2, 24)
+    forwards = np.column_stack([out, np.zeros(41), np.zeros(41)])
+    backwards = np.column_stack([2.0 - np.sin(angles), np.cos(angles) - 1.0, angles])
+    path = np.concatenate([forwards, backwards])
+    path[:, :2] += noise * np.random.default_rng(3).standard_normal((len(path), 2))
+    return path
+
+
+@SMOOTHERS
+def test_smoothing_leaves_cusps_and_drives_backwards_what_was_to_be(smoother: Any) -> None:
+    path = out_and_back(0.004)
+    assert one_way_pieces(path) == [(0, 40, False), (40, 64, True)]
+    smooth = smoother.smooth(path)
+    assert one_way_pieces(smooth) == one_way_pieces(path)
+    assert np.array_equal(smooth[[0, 40, -1], :2], path[[0, 40, -1], :2])
+    assert smooth[-1, 2] == path[-1, 2]
+    clean = out_and_back(0.0)
+    turned = np.abs(wrap_angles(smooth[:, 2] - clean[:, 2]))
+    assert turned.max() < 0.35
+    raw = SimpleSmoother(config=SmootherConfig(w_smooth=0.0)).smooth(path)
+    assert turned.mean() < 0.6 * np.abs(wrap_angles(raw[:, 2] - clean[:, 2])).mean()
+
+
+def test_a_sharp_corner_that_is_driven_forwards_is_no_cusp() -> None:
+    corners = filled(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]]), 0.05)
+    path = with_headings(corners)
+    assert cusps(path)
+    assert one_way_pieces(path) == [(0, len(path) - 1, False)]
+    assert SimpleSmoother().smooth(path)[:, 0].max() < 0.99, "it is rounded"
+
+
+@SMOOTHERS
+def test_what_lies_off_the_map_is_not_smoothed_into_an_obstacle(smoother: Any) -> None:
+    """Rows of a path beside the map, whose first and last rows of cells are lethal."""
+    costs = np.zeros((20, 20), dtype=np.uint8)
+    costs[[0, -1]] = 254
+    costmap = Costmap(costs=costs, resolution=0.05)
+    path = np.column_stack([np.linspace(0.1, 0.9, 17), np.full(17, -0.01), np.zeros(17)])
+    path[8, 1] = -0.3
+    path[[6, 7, 9, 10], 1] = 0.2
+    smooth = smoother.smooth(path, costmap)
+    before = np.array([costmap.cost_at(x, y) for x, y in path[:, :2]])
+    after = np.array([costmap.cost_at(x, y) for x, y in smooth[:, :2]])
+    assert not np.any((after == 254) & (before != 254))
+    free = smoother.smooth(path)
+    assert any(costmap.cost_at(x, y) == 254 for x, y in free[:, :2]), "without the map it would be"

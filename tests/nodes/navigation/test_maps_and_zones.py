@@ -49,7 +49,7 @@ from twin.nodes.navigation.controller_server_config import ControllerServerConfi
 from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.costmap_filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
 from twin.nodes.navigation.map_saver import MapSaverNode
-from twin.nodes.navigation.map_server import MapServerNode, occupancy_map
+from twin.nodes.navigation.map_server import MapServerNode, grid_msg, occupancy_map
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LAYERS = CostmapConfig(
@@ -345,3 +345,33 @@ def test_what_a_costmap_publishes(bench: Bench) -> None:
     corners = [(point.x, point.y) for point in outlines[-1].polygon.points]
     assert np.allclose(corners, FOOTPRINT, atol=1e-6), "odometry begins where the robot starts"
     assert outlines[-1].header.frame_id == "odom"
+
+
+def grown(grid: OccupancyMap, cells: int) -> OccupancyMap:
+    """The same map with so many more unknown cells on every side."""
+    x, y = grid.origin.x - cells * grid.resolution, grid.origin.y - cells * grid.resolution
+    data = np.pad(grid.data, cells, constant_values=-1)
+    return OccupancyMap(data=data, resolution=grid.resolution, origin=Pose2(x, y, 0.0))
+
+
+def test_zones_and_obstacles_stay_when_a_new_map_comes(bench: Bench) -> None:
+    """As with SLAM, whose map grows while the robot drives: no plan leads through what is not looked at."""
+    robot = Robot(bench, open_room())
+    server = MapServerNode(bench.bus, map_of_room())
+    zone = with_zone(empty_mask(map_of_room()), rectangle(-1.0, -1.0, 0.0, -0.5), 100)
+    serve_mask(bench, "keepout", zone)
+    node = costmap(bench, robot, keepout_filter_info_topic="keepout_info")
+    robot.room.add_box(-1.2, 0.8, -1.0, 1.2)
+    bench.run(1.0)
+    robot.blind = True
+    bench.run(0.5)
+    publisher = bench.node.create_publisher(OccupancyGrid, "/map", LATCHED)
+    for grid in (map_of_room(), grown(map_of_room(), 7)):
+        publisher.publish(grid_msg(grid.data, grid.resolution, grid.origin, "map", bench.clock.now_ns))
+        for _ in range(15):
+            bench.tick()
+            assert at(node, -0.5, -0.75) == 254, "the zone"
+            assert at(node, -0.98, 1.0) == 254, "the box"
+        assert node.costmap is not None
+        assert node.costmap.costs.shape == grid.data.shape
+    assert server.message.info.width == 140

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -168,3 +169,15 @@ def test_parameters_change_the_next_plan(bench: Bench, servers: Servers) -> None
     parameters = servers.planner.node.parameters
     assert parameters.get("GridBased.w_traversal_cost").value == 2.0
     assert isinstance(servers.plan(Pose2(2.0, 0.0, 0.0)).result.path, Path)
+
+
+@pytest.mark.parametrize("name", ["simple_smoother", "savitzky_golay"])
+@pytest.mark.parametrize("check", [False, True])
+def test_a_path_that_is_not_finite_is_refused(servers: Servers, name: str, check: bool) -> None:
+    path = np.column_stack([np.linspace(0.0, 1.0, 11), np.zeros(11), np.zeros(11)])
+    for value in (math.nan, math.inf):
+        path[4, 1] = value
+        sent = servers.smooth(path, smoother_id=name, check_for_collisions=check)
+        assert (sent.status, sent.result.error_code) == (GoalStatus.STATUS_ABORTED, 505)
+        assert sent.result.error_msg == "pose 4 of the path is not finite"
+        assert not sent.result.was_completed

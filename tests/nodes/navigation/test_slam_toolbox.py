@@ -226,3 +226,28 @@ def test_the_parameters_have_slam_toolboxs_names(bench: Bench) -> None:
         ("resolution", 0.05),
     ):
         assert node.get_parameter(name).value == value
+
+
+def test_after_a_reset_there_is_no_map_until_the_next_scan(bench: Bench, tmp_path: Path) -> None:
+    mapper = Mapper(bench)
+    mapper.drive(2.0)
+    maps, logs = bench.listen(OccupancyGrid, "/map", LATCHED), bench.logs()
+    bench.run(0.1)
+    before = len(maps)
+    mapper.call(ResetSlam, "reset", pause_new_measurements=True)
+    bench.run(2.5)
+    assert len(maps) == before, "an empty map would be taken for the world"
+    assert bench.call(GetMap, "/dynamic_map", new(GetMap.Request)).map.info.width == 0
+    none, file = String(data=str(tmp_path / "none")), tmp_path / "none.posegraph"
+    assert (
+        mapper.call(SaveSlamMap, "save_map", name=none).result
+        == SaveSlamMap.Response.RESULT_NO_MAP_RECEIEVD
+    )
+    saved = mapper.call(SerializePoseGraph, "serialize_map", filename=str(file))
+    assert saved.result == SerializePoseGraph.Response.RESULT_FAILED_TO_WRITE_FILE
+    assert any("there is no scan to save yet" in line for line in logs)
+    assert not list(tmp_path.iterdir())
+    mapper.call(PauseSlam, "pause_new_measurements")
+    bench.run(0.3)
+    assert len(maps) == before + 1, "the first scan is shown at once"
+    assert maps[-1].info.width > 50

@@ -52,9 +52,16 @@ def is_pointer(text: str) -> bool:
     return len(text) >= 3 and text[0] == "{" and text[-1] == "}"
 
 
-def _number(text: str) -> float:
+def _limit(text: str) -> float:
     value = float(text)
     if math.isnan(value):
+        raise ValueError
+    return value
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
         raise ValueError
     return value
 
@@ -77,6 +84,7 @@ def _bool(text: str) -> bool:
 READERS: dict[str, Callable[[str], Any]] = {
     "string": str,
     "double": _number,
+    "limit": _limit,
     "int": int,
     "unsigned": _unsigned,
     "bool": _bool,
@@ -85,7 +93,8 @@ READERS: dict[str, Callable[[str], Any]] = {
     "any": str,
 }
 _MEANT = {
-    "double": "a number",
+    "double": "a number that is finite",
+    "limit": "a number, or inf for no limit",
     "int": "a whole number",
     "unsigned": "a whole number that is not negative",
     "bool": "true or false",

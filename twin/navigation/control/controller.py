@@ -11,6 +11,8 @@ import numpy as np
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 
+STILL_THERE = 0.25
+"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
 _NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
 
 
@@ -107,6 +109,18 @@ class Controller(ABC):
     def set_goal_tolerance(self, xy: float) -> None:
         """Tell how near the goal counts as there [m]: what only turns at the goal does it from there on."""
         self._tolerance = xy
+
+    def _is_there(self, was_there: bool, off: float, *, at_end: bool) -> bool:
+        """Return whether the robot is at the goal, so that it turns there; it may be carried off again.
+
+        Args:
+            was_there: The last answer.
+            off: Distance to the goal [m].
+            at_end: Whether the goal is what is driven to now: a path may pass by its own end.
+        """
+        if was_there:
+            return off <= self._tolerance + STILL_THERE
+        return at_end and off <= self._tolerance
 
     def cancel(self) -> bool:
         """Come to rest; return whether the robot may be stopped now (nav2_core::Controller::cancel)."""

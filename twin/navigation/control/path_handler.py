@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 from twin.navigation.failures import InvalidPath
+from twin.navigation.planning.direction import cusps, is_reversing
 
 SPACING = 0.05
 """Of the poses of a local path [m]: critics count in them."""
@@ -85,7 +86,7 @@ class PathHandler:
         self._along = _arc_length(self._poses)
         turns = cusps(path) if self.config.enforce_path_inversion else []
         for first, last in itertools.pairwise([0, *turns, len(path) - 1]):
-            self._segments.append((int(knots[last]), _reversing(path[first : last + 1])))
+            self._segments.append((int(knots[last]), is_reversing(path[first : last + 1])))
         return True
 
     @property
@@ -156,16 +157,6 @@ def dense(path: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
     return np.column_stack([columns[0], columns[1], wrap_angles(columns[2])]), knots
 
 
-def cusps(poses: Array) -> list[int]:
-    """Return the indices of poses, shape (n, 3), at which the path turns back by more than a right angle."""
-    if len(poses) < 3:
-        return []
-    step = np.diff(poses[:, :2], axis=0)
-    moved = np.flatnonzero(np.hypot(step[:, 0], step[:, 1]) > 1e-6)
-    a, b = step[moved[:-1]], step[moved[1:]]
-    return [int(i) for i in moved[1:][np.einsum("ij,ij->i", a, b) < 0.0]]
-
-
 def _arc_length(poses: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
 
@@ -175,10 +166,3 @@ def _headed(way: Array, end: Array) -> Array:
     points = np.concatenate([way[:-1], end[None, :2]])
     step = np.diff(points, axis=0)
     return np.column_stack([points, np.append(np.arctan2(step[:, 1], step[:, 0]), end[2])])
-
-
-def _reversing(poses: Array) -> bool:
-    """Whether headings point against the way from one pose to the next; the last one is free to choose."""
-    step = np.diff(poses[:, :2], axis=0)
-    yaw = poses[: len(step), 2]
-    return bool(np.sum(step[:, 0] * np.cos(yaw) + step[:, 1] * np.sin(yaw)) < 0.0)

@@ -185,6 +185,27 @@ class LayeredCostmap:
         self._known = None
         self._stale()
 
+    def adopt(self, old: LayeredCostmap) -> None:
+        """Take what sensors have seen on another costmap in the same frame, where it lies on this one.
+
+        So obstacles stay when a new map comes, as in Nav2 where its geometry is the same; a map that grows
+        while it is made has another one each time. Of cells of another size nothing is taken.
+
+        Args:
+            old: The costmap of the map before.
+        """
+        if not math.isclose(old._resolution, self._resolution, rel_tol=1e-6):
+            return
+        dx, dy = (
+            round((mine - others) / self._resolution)
+            for mine, others in zip(self._grid.origin, old._grid.origin, strict=True)
+        )
+        self._obstacles.adopt(old._obstacles, dx, dy)
+        if old._ranges is not None:
+            self._ranges = RangeSensorLayer(self.shape, self.config.range_sensor_layer)
+            self._ranges.adopt(old._ranges, dx, dy)
+        self._stale()
+
     def clear(self) -> None:
         """Forget every obstacle that the static map and the masks do not hold (clear_entirely)."""
         self._forget(everything(self.shape), outside=False)

@@ -10,7 +10,7 @@ from twin.geometry import Array
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION
 from twin.navigation.costmaps.kernels import Cells, trace_scan
-from twin.navigation.costmaps.window import NOTHING, Window, differing, everything, shifted
+from twin.navigation.costmaps.window import NOTHING, Window, cut_out, differing, everything, shifted
 
 
 class ObstacleLayer:
@@ -88,6 +88,10 @@ class ObstacleLayer:
     def move(self, dx: int, dy: int) -> None:
         """Follow a grid that rolls by (dx, dy) cells."""
         self.cells = shifted(self.cells, dx, dy, NO_INFORMATION)
+
+    def adopt(self, old: ObstacleLayer, dx: int, dy: int) -> None:
+        """Take what was seen on another grid, from whose corner this one's is (dx, dy) cells away."""
+        self.cells = cut_out(old.cells, self.cells.shape, dx, dy, NO_INFORMATION)
 
 
 @jit

@@ -12,7 +12,7 @@ from twin.geometry import Pose2
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION
 from twin.navigation.costmaps.kernels import Cells
-from twin.navigation.costmaps.window import NOTHING, Window, everything, shifted
+from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, shifted
 
 _EVEN = int(0.5 * LETHAL_OBSTACLE)
 """A probability of one half, as nav2's layer stores it."""
@@ -64,14 +64,16 @@ class RangeSensorLayer:
             distance: What was measured [m]; of a sensor whose limits are equal, -inf is "something there" and
                 inf is "nothing there" (sensor_msgs/Range).
             limits: Least and greatest range [m]; readings outside are no readings.
-            field_of_view: Full angle of the cone [rad].
+            field_of_view: Full angle of the cone [rad]; 0: a ray. With a negative or infinite one there is
+                no reading.
             frame: Origin x, y and resolution of the grid [m].
         """
         reading = self._reading(distance, *limits)
-        if reading is None:
+        if reading is None or not (math.isfinite(reading[0]) and 0.0 <= field_of_view < math.inf):
             return NOTHING
         distance, clearing = reading
-        half = 0.5 * field_of_view
+        # No centre of a cell lies on a ray: it reaches a cell to either side where it ends.
+        half = 0.5 * field_of_view or math.atan2(frame[2], distance)
         # As nav2, a fifth further than the reading, so that the far side of the object is weighed, too.
         columns, rows = _triangle(sensor, 1.2 * distance, half, frame)
         window = Window(min(columns), min(rows), max(columns) + 1, max(rows) + 1).clipped(
@@ -123,6 +125,10 @@ class RangeSensorLayer:
     def move(self, dx: int, dy: int) -> None:
         """Follow a grid that rolls by (dx, dy) cells."""
         self.probabilities = shifted(self.probabilities, dx, dy, _EVEN)
+
+    def adopt(self, old: RangeSensorLayer, dx: int, dy: int) -> None:
+        """Take what was measured on another grid, from whose corner this one's is (dx, dy) cells away."""
+        self.probabilities = cut_out(old.probabilities, self.probabilities.shape, dx, dy, _EVEN)
 
 
 def _triangle(

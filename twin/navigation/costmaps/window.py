@@ -83,9 +83,17 @@ def raised(costs: Cells, layer: Cells) -> Cells:
 
 def shifted(cells: Cells, dx: int, dy: int, fill: int) -> Cells:
     """Return the cells as seen from a window moved by (dx, dy) cells; new cells get `fill`."""
-    height, width = cells.shape
-    moved = np.full_like(cells, fill)
-    if abs(dx) < width and abs(dy) < height:
-        target = moved[max(0, -dy) : height - max(0, dy), max(0, -dx) : width - max(0, dx)]
-        target[...] = cells[max(0, dy) : height - max(0, -dy), max(0, dx) : width - max(0, -dx)]
-    return moved
+    return cut_out(cells, cells.shape, dx, dy, fill)
+
+
+def cut_out(cells: Cells, shape: tuple[int, ...], dx: int, dy: int, fill: int) -> Cells:
+    """Return the cells on a grid of `shape` (height, width) that begins (dx, dy) cells behind theirs.
+
+    Cells of it that they do not reach get `fill`.
+    """
+    cut = np.full(shape, fill, dtype=cells.dtype)
+    there = Window(dx, dy, dx + shape[1], dy + shape[0]).clipped(cells.shape)
+    if not there.empty:
+        here = Window(there.x0 - dx, there.y0 - dy, there.x1 - dx, there.y1 - dy)
+        cut[here.slices] = cells[there.slices]
+    return cut

@@ -16,6 +16,8 @@ TABLE_STEP = 0.002
 """Spacing of the tabulated log-likelihood over distance [m]; far below any sigma_hit."""
 _PER_METRE = 1.0 / TABLE_STEP
 _SIGMA, _SIGMA_STEP = 0.1, 0.05
+_LEAST = 1e-12
+"""No beam is less likely than this: without random readings one would rule every pose out."""
 
 
 class LikelihoodField:
@@ -69,7 +71,8 @@ class LikelihoodField:
             hit = self._z_hit * np.exp(-0.5 * (grid / sigma) ** 2)
             rand = self._z_rand * sigma
             # Relative to a perfect hit, so that a weight says how well a pose explains the scan.
-            table = self._tables[step] = np.log((hit + rand) / (self._z_hit + rand))
+            perfect = max(self._z_hit + rand, _LEAST)
+            table = self._tables[step] = np.log(np.maximum(hit + rand, _LEAST) / perfect)
         return table
 
 

@@ -50,12 +50,15 @@ class MappedScans:
         )
 
     def recent(self, guess: Pose2) -> list[int]:
-        """Return the nodes just before, spread over the path."""
+        """Return the nodes just before, spread over the path: those near `guess`, or the last one alone.
+
+        As in Karto, whose running scans never lose the last one: after a long way unseen it is what there is.
+        """
         config = self.config
         nodes = spread(self.graph.poses, range(len(self.graph) - 1, -1, -1), config.scan_buffer_size)
         away = np.hypot(*(self.graph.poses[nodes, :2] - guess[:2]).T)
         near = zip(nodes, (away < config.scan_buffer_maximum_scan_distance).tolist(), strict=True)
-        return [node for node, is_near in near if is_near]
+        return [node for node, is_near in near if is_near] or nodes[:1]
 
     def near(self, guess: Pose2, most: int | None = None) -> list[int]:
         """Return the nodes that most likely have seen what is seen at `guess`: near, looking the same way."""

@@ -52,6 +52,11 @@ class Slam:
         self._map = ScanMap(self.config.resolution, self.config.max_laser_range)
 
     @property
+    def empty(self) -> bool:
+        """Whether there is no node: nothing to draw a map of, or to save."""
+        return not self._mapped.scans
+
+    @property
     def loops_closed(self) -> int:
         """How many edges say that a place was seen again."""
         return self._loops.accepted
@@ -123,7 +128,14 @@ class Slam:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the pose graph with its scans and the parameters to a file."""
+        """Write the pose graph with its scans and the parameters to a file.
+
+        Raises:
+            MapError: there is no scan yet, and a file without any cannot be gone on with.
+            OSError: the file cannot be written.
+        """
+        if self.empty:
+            raise MapError(f"{path}: there is no scan to save yet; valid is a call after the first one")
         Path(path).write_bytes(self.to_bytes())
 
     @staticmethod

@@ -1,16 +1,21 @@
-"""Path smoothing by gradient descent, checked against the costmap."""
+"""Path smoothing, checked against the costmap; what is driven backwards stays so.
+
+As in Nav2, cusps stay where they are: the pieces between them are smoothed one by one.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.geometry import Array
+from twin.geometry import Array, wrap_angles
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
+from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
 
 
@@ -36,7 +41,9 @@ class SimpleSmoother:
     config: SmootherConfig = field(default_factory=SmootherConfig)
 
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
-        """Return the path, shape (n, 3), with the same first and last row and smoother in between.
+        """Return the path, shape (n, 3), smoother between its first and last place, which stay.
+
+        Rows look along the smooth path, but for the last one, which looks where it did.
 
         Args:
             path: Shape (n, 3).
@@ -44,10 +51,12 @@ class SimpleSmoother:
         """
         if len(path) < 3:
             return path.copy()
+        return _smoothed(path, lambda points: self._relaxed(points, costmap))
+
+    def _relaxed(self, points: Array, costmap: Costmap | None) -> Array:
         config = self.config
         costs = np.zeros((0, 0), dtype=np.uint8) if costmap is None else costmap.costs
         frame = (0.0, 0.0, 1.0) if costmap is None else costmap.frame
-        points = np.array(path[:, :2], dtype=np.float64, order="C")
         for _ in range(1 + config.refinement_num):
             points = _relax(
                 points,
@@ -58,7 +67,7 @@ class SimpleSmoother:
                 config.max_its,
                 *frame,
             )
-        return with_headings(points, float(path[-1, 2]))
+        return points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,16 +91,22 @@ class SavitzkyGolaySmoother:
     config: SavitzkyGolayConfig = field(default_factory=SavitzkyGolayConfig)
 
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
-        """Return the path, shape (n, 3), with the same first and last row and smoother in between.
+        """Return the path, shape (n, 3), smoother between its first and last place, which stay.
+
+        Rows look along the smooth path, but for the last one, which looks where it did.
 
         Args:
             path: Shape (n, 3).
             costmap: Where points may go; None lets them go anywhere.
         """
-        half = len(_WINDOW) // 2
-        points = np.array(path[:, :2], dtype=np.float64)
-        if len(points) <= 2 * half:
+        if len(path) < len(_WINDOW):
             return path.copy()
+        return _smoothed(path, lambda points: self._filtered(points, costmap))
+
+    def _filtered(self, points: Array, costmap: Costmap | None) -> Array:
+        half = len(_WINDOW) // 2
+        if len(points) <= 2 * half:
+            return points
         for _ in range(1 + self.config.refinement_num * self.config.do_refinement):
             # Beyond the ends the path goes on mirrored at them, so that the ends stay.
             padded = np.concatenate(
@@ -105,10 +120,27 @@ class SavitzkyGolaySmoother:
             moved[0], moved[-1] = points[0], points[-1]
             if costmap is not None:
                 for i in range(len(points)):
-                    if costmap.cost_at(*moved[i]) >= max(253, costmap.cost_at(*points[i]) + 1):
+                    if costmap.cost_at(*moved[i]) >= max(253, _cost_from(costmap, *points[i]) + 1):
                         moved[i] = points[i]
             points = moved
-        return with_headings(points, float(path[-1, 2]))
+        return points
+
+
+def _cost_from(costmap: Costmap, x: float, y: float) -> int:
+    """Return the cost that a point at (x, y) [m] may keep: off the map, where nothing is known, none."""
+    return costmap.cost_at(x, y) if costmap.contains(x, y) else FREE_SPACE
+
+
+def _smoothed(path: Array, smooth: Callable[[Array], Array]) -> Array:
+    """Return a path, shape (n, 3), whose pieces between cusps are smoothed: points of shape (m, 2)."""
+    result = np.array(path, dtype=np.float64)
+    for first, last, backwards in one_way_pieces(path):
+        rows = slice(first, last + 1)
+        result[rows] = with_headings(smooth(np.ascontiguousarray(result[rows, :2])))
+        if backwards:
+            result[rows, 2] = wrap_angles(result[rows, 2] + math.pi)
+    result[-1, 2] = path[-1, 2]
+    return result
 
 
 @jit
@@ -141,10 +173,14 @@ def _relax(
                 row = math.floor((new_y - origin_y) / resolution)
                 if column < 0 or row < 0 or column >= width or row >= height:
                     continue
-                old = costs[math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)]
                 cost = costs[row, column]
-                if cost >= 253 and cost > old:
-                    continue
+                if cost >= 253:
+                    column = math.floor((x - origin_x) / resolution)
+                    row = math.floor((y - origin_y) / resolution)
+                    on_map = column >= 0 and row >= 0 and column < width and row < height
+                    # Nothing is known off the map: what comes from there may keep no cost either.
+                    if not on_map or cost > costs[row, column]:
+                        continue
             result[i, 0], result[i, 1] = new_x, new_y
             change += abs(new_x - x) + abs(new_y - y)
         if change < tolerance:

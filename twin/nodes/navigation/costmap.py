@@ -138,9 +138,15 @@ class CostmapNode:
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
-            self._layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
+            layers = LayeredCostmap(config=self.config.layers, static_map=occupancy_map(message))
         except MapError as error:
             self.node.get_logger().error(f"map refused: {error}")
+            return
+        if self._layers is not None:
+            layers.adopt(self._layers)
+        self._layers = layers
+        if self._keepout is not None:  # nobody shall plan through a zone before the next update
+            self._keepout.update(layers, self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base))
 
     def _on_known_map(self, message: OccupancyGrid) -> None:
         try:

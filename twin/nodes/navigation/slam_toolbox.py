@@ -78,6 +78,7 @@ class SlamToolboxNode:
         """The last one published."""
         self._count = 0
         self._started = False
+        """Whether a scan was taken since everything was forgotten: the first one is shown at once."""
         declare_config(node, self.config, names={"slam": ""})
         warm_up()
         self.slam = self._begin()
@@ -99,6 +100,7 @@ class SlamToolboxNode:
         T_map_odom = self.slam.T_map_odom
         self.slam = Slam(self.config.slam)
         self.slam.T_map_odom = T_map_odom
+        self._started = False
 
     def load(self, path: Path, mode: Mode, pose: Pose2 | None) -> None:
         """Take a pose graph in place of the present one.
@@ -114,8 +116,8 @@ class SlamToolboxNode:
         self.slam = Slam.load(path, mode=mode, start=pose, config=self.config.slam)
 
     def fresh_map(self) -> OccupancyMap | None:
-        """Return the map with every scan so far; None before the first one."""
-        return self.slam.map() if self._started else None
+        """Return the map with every scan so far; None before the first one, also after `reset`."""
+        return None if self.slam.empty else self.slam.map()
 
     def _begin(self) -> Slam:
         config = self.config

@@ -6,6 +6,8 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from twin.bridge.action_types import SmoothPath
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
@@ -67,6 +69,9 @@ class SmootherServerNode:
             return self._failed(handle, _INVALID_SMOOTHER, f"{request.smoother_id!r} is none; valid: {valid}")
         if len(path) < 2:
             return self._failed(handle, _INVALID_PATH, "the path has no two poses")
+        if not np.isfinite(path).all():
+            row = int(np.argmin(np.isfinite(path).all(axis=1)))
+            return self._failed(handle, _INVALID_PATH, f"pose {row} of the path is not finite")
         smooth = smoother.smooth(path, costmap)
         if request.check_for_collisions and costmap is not None and _collides(smooth, costmap):
             return self._failed(handle, _IN_COLLISION, "the smoothed path collides")

@@ -80,10 +80,9 @@ class DWB(Controller):
 
     def _note_goal(self, now: Situation, local: LocalPath) -> None:
         goal = Pose2(*local.poses[-1].tolist())
-        self._at_goal |= local.ends_at_goal and now.pose.distance(goal) <= self._tolerance
-        self._rotating |= (
-            self._at_goal and abs(now.velocity[0]) <= self.config.RotateToGoal.trans_stopped_velocity
-        )
+        off, stopped = now.pose.distance(goal), self.config.RotateToGoal.trans_stopped_velocity
+        self._at_goal = self._is_there(self._at_goal, off, at_end=local.ends_at_goal)
+        self._rotating = self._at_goal and (self._rotating or abs(now.velocity[0]) <= stopped)
 
     def _samples(self, velocity: tuple[float, float], local: LocalPath) -> Array:
         """Return the commands to try, shape (n, 2): what `sim_time` suffices for."""
@@ -92,7 +91,7 @@ class DWB(Controller):
         # Faster than twice the rest of the path is no help: samples lie closer before the goal.
         most = min(self.speed, 2.0 * local.length / horizon + 0.05)
         fastest = min(most, v + config.acc_lim_x * horizon)
-        slowest = max(min(config.min_vel_x, most), v + config.decel_lim_x * horizon)
+        slowest = max(min(config.min_vel_x, most), -self.speed, v + config.decel_lim_x * horizon)
         left = min(config.max_vel_theta, w + config.acc_lim_theta * horizon)
         right = max(-config.max_vel_theta, w + config.decel_lim_theta * horizon)
         forward = _with_zero(min(slowest, fastest), fastest, config.vx_samples)

@@ -71,7 +71,7 @@ class Commands(NamedTuple):
     mean: F32
     """Shape (2, time_steps): the controls."""
     history: F32
-    """Shape (2, n): commands that had no effect yet, the latest last."""
+    """Shape (2, n): commands that had no effect yet, a step of the model apart, the latest last."""
     delays: NDArray[np.int64]
     """Steps until a command has an effect: of vx, of wz."""
 

@@ -8,7 +8,6 @@ controls by the noise that did well. What Nav2 does differently is named where i
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 
@@ -24,11 +23,14 @@ from twin.navigation.control.mppi.pursuit import pursue
 from twin.navigation.control.mppi.rollouts import Rollouts
 from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
 from twin.navigation.control.mppi.scoring import CostTables
+from twin.navigation.control.mppi.sent_commands import SentCommands
 from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.failures import NoValidControl
 
 _EXACT = 3
 """The first rollouts have no noise: one keeps the controls as they are, one brakes, one pursues the path."""
+_SMOOTHED = 4
+"""So many commands before them weigh in when the controls are smoothed."""
 _FILTERS = {
     1: np.full(9, 1.0 / 9.0, dtype=np.float32),
     2: (np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231.0).astype(np.float32),
@@ -113,7 +115,7 @@ class MPPI(Controller):
             self._scene = None
             raise NoValidControl(f"all {self.config.batch_size} rollouts of MPPI collide")
         command = float(self._mean[0, 0]), float(self._mean[1, 0])
-        self._remember(command)
+        self._remember(command, now.dt)
         self._scene = scene
         self._shift(now.dt)
         return command
@@ -122,8 +124,9 @@ class MPPI(Controller):
 
     def _forget_controls(self) -> None:
         self._mean = np.zeros((2, self.config.time_steps), dtype=np.float32)
-        self._sent = deque([(0.0, 0.0)] * 4, maxlen=4)
-        self._under_way = np.zeros((2, max(1, int(self._rollouts.delays.max()))), dtype=np.float32)
+        delay = max(1, int(self._rollouts.delays.max()))
+        self._sent = SentCommands(max(_SMOOTHED, delay), self.config.model_dt)
+        self._under_way = self._sent.latest(delay)
         self._last: tuple[float, float] | None = None
         self._noise.reset()
 
@@ -207,8 +210,7 @@ class MPPI(Controller):
         """Filter the controls; what was sent before them is their past (Nav2's savitskyGolayFilter)."""
         if self.config.time_steps <= 20:
             return
-        past = np.array(self._sent, dtype=np.float32).T
-        controls.smooth(self._mean, np.ascontiguousarray(past), _FILTERS[self.config.sgf_order])
+        controls.smooth(self._mean, self._sent.latest(_SMOOTHED), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)
@@ -221,11 +223,10 @@ class MPPI(Controller):
         steps = math.ceil(self.config.collision_lookahead_time / self.config.model_dt)
         return bool(controls.first_collision(self._leads, scene.ground, steps) >= 0)
 
-    def _remember(self, command: tuple[float, float]) -> None:
+    def _remember(self, command: tuple[float, float], dt: float) -> None:
         self._last = command
-        self._sent.append(command)
-        self._under_way[:, :-1] = self._under_way[:, 1:]
-        self._under_way[:, -1] = command
+        self._sent.add(command, dt)
+        self._under_way = self._sent.latest(self._under_way.shape[1])
 
     def _shift(self, dt: float) -> None:
         """Move the controls on by one control period; Nav2 asks for a period of model_dt for that."""

@@ -16,11 +16,13 @@ from twin.nodes.navigation.behavior_trees.action_node import (
 from twin.nodes.navigation.behavior_trees.context import fill
 
 _BASIC = ACTION_PORTS + ERROR_PORTS
+_LONGEST = 2.0**31 - 1.0
+"""What a Duration message can hold [s]: 68 years."""
 
 
 def seconds(value: float) -> Any:
-    """Return seconds as a Duration message."""
-    return duration(round(value * 1e9))
+    """Return seconds as a Duration message, the longest there is if they are more."""
+    return duration(round(min(max(value, -_LONGEST), _LONGEST) * 1e9))
 
 
 class _Planning(ActionNode):

@@ -175,7 +175,7 @@ class IsGoalNearby(NavigatorCondition):
 
     PORTS = (
         *inputs(path="message", proximity_threshold=("double", 1.0)),
-        *inputs(max_robot_pose_search_dist=("double", -1.0)),
+        *inputs(max_robot_pose_search_dist=("limit", -1.0)),
         *_FRAMES,
     )
     _path: Any = None
@@ -200,8 +200,8 @@ class IsWithinPathTrackingBounds(NavigatorCondition):
     """Whether the controller tells that the robot is near its path; true while it tells nothing."""
 
     PORTS = (
-        *inputs(max_error_left=("double", 0.5), max_error_right=("double", 0.5)),
-        *inputs(max_error_heading=("double", 3.14), tracking_feedback="message"),
+        *inputs(max_error_left=("limit", 0.5), max_error_right=("limit", 0.5)),
+        *inputs(max_error_heading=("limit", 3.14), tracking_feedback="message"),
     )
 
     def holds(self) -> bool:

@@ -46,11 +46,11 @@ class TruncatePathLocal(NavigatorNode):
     """Keeps the part of a path that lies around the robot."""
 
     PORTS = (
-        *inputs(input_path="message", distance_forward=("double", 8.0), distance_backward=("double", 4.0)),
+        *inputs(input_path="message", distance_forward=("limit", 8.0), distance_backward=("limit", 4.0)),
         *inputs(robot_base_frame="string", global_frame="string", transform_tolerance=("double", 0.2)),
         *inputs(robot_frame="string"),  # what `robot_base_frame` was before Lyrical
         *inputs(pose="message", angular_distance_weight=("double", 0.0)),
-        *inputs(max_robot_pose_search_dist=("double", math.inf)),
+        *inputs(max_robot_pose_search_dist=("limit", math.inf)),
         *outputs(output_path="message"),
     )
 
