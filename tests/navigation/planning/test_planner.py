@@ -307,7 +307,9 @@ def test_the_parabola_filter_takes_noise_out_and_keeps_lines_and_ends() -> None:
     assert np.abs(smooth[:, :2] - line[:, :2]).mean() < np.abs(noisy[:, :2] - line[:, :2]).mean()
 
 
-SMOOTHERS = pytest.mark.parametrize("smoother", [SimpleSmoother(), SavitzkyGolaySmoother()], ids=["simple", "sg"])
+SMOOTHERS = pytest.mark.parametrize(
+    "smoother", [SimpleSmoother(), SavitzkyGolaySmoother()], ids=["simple", "sg"]
+)
 
 
 def out_and_back(noise: float) -> np.ndarray:

@@ -31,7 +31,9 @@ def test_a_time_that_is_not_finite_is_refused_when_the_file_is_read(tmp_path: Pa
     file = tmp_path / "tree.xml"
     leaf = f'<Spin time_allowance="{text}"/>'
     file.write_text(f'<root BTCPP_format="4"><BehaviorTree ID="Main">{leaf}</BehaviorTree></root>')
-    with pytest.raises(NavigationError, match=r"time_allowance='.*' of <Spin> must be a number that is finite"):
+    with pytest.raises(
+        NavigationError, match=r"time_allowance='.*' of <Spin> must be a number that is finite"
+    ):
         TreeBuilder(file, NAVIGATOR_NODES)
 
 

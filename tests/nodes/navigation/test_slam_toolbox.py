@@ -240,8 +240,7 @@ def test_after_a_reset_there_is_no_map_until_the_next_scan(bench: Bench, tmp_pat
     assert bench.call(GetMap, "/dynamic_map", new(GetMap.Request)).map.info.width == 0
     none, file = String(data=str(tmp_path / "none")), tmp_path / "none.posegraph"
     assert (
-        mapper.call(SaveSlamMap, "save_map", name=none).result
-        == SaveSlamMap.Response.RESULT_NO_MAP_RECEIEVD
+        mapper.call(SaveSlamMap, "save_map", name=none).result == SaveSlamMap.Response.RESULT_NO_MAP_RECEIEVD
     )
     saved = mapper.call(SerializePoseGraph, "serialize_map", filename=str(file))
     assert saved.result == SerializePoseGraph.Response.RESULT_FAILED_TO_WRITE_FILE

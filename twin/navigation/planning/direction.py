@@ -20,7 +20,7 @@ def cusps(poses: Array) -> list[int]:
 
 
 def is_reversing(poses: Array) -> bool:
-    """Return whether headings point against the way from one pose to the next; the last one does not count."""
+    """Return whether the headings of all but the last pose point against the way to the next one."""
     step = np.diff(poses[:, :2], axis=0)
     yaw = poses[: len(step), 2]
     return bool(np.sum(step[:, 0] * np.cos(yaw) + step[:, 1] * np.sin(yaw)) < 0.0)

@@ -146,7 +146,9 @@ class CostmapNode:
             layers.adopt(self._layers)
         self._layers = layers
         if self._keepout is not None:  # nobody shall plan through a zone before the next update
-            self._keepout.update(layers, self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base))
+            self._keepout.update(
+                layers, self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
+            )
 
     def _on_known_map(self, message: OccupancyGrid) -> None:
         try:

@@ -20,7 +20,9 @@ class SentCommands:
     def add(self, command: tuple[float, float], period: float) -> None:
         """Take a command (v [m/s], w [rad/s]) that holds for one control period [s]."""
         self._periods = np.concatenate([[period], self._periods])
-        self._commands = np.concatenate([np.array(command, dtype=np.float32)[:, None], self._commands], axis=1)
+        self._commands = np.concatenate(
+            [np.array(command, dtype=np.float32)[:, None], self._commands], axis=1
+        )
         kept = int(np.searchsorted(np.cumsum(self._periods), self._ages[0])) + 1
         self._periods, self._commands = self._periods[:kept], self._commands[:, :kept]
 
