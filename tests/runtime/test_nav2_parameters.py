@@ -505,7 +505,7 @@ collision_monitor:
         assert _said(tmp_path, one) == [f"collision_monitor: {said}"]
 
 
-@pytest.mark.parametrize("seed", ["0", "1", "2", "3"])
+@pytest.mark.parametrize("seed", ["0", "1"])  # which order a set of the two names the other way
 def test_of_two_faults_the_same_one_is_told_each_time(tmp_path: Path, seed: str) -> None:
     text = """\
 collision_monitor:

@@ -269,11 +269,16 @@ def test_who_is_carried_off_at_the_goal_drives_there_anew(
     controller.set_goal_tolerance(0.05)
     path = line(2.0, 4.0, 2.0)
     path[-1, 2] = 0.9
+    controller.compute_velocity(Pose2(3.0, 2.0, 0.0), (0.3, 0.0), path, hall(), DT)
     for yaw in (0.0, 0.1, 0.2, 0.3):
         v, _ = controller.compute_velocity(Pose2(4.0, 2.0, yaw), (0.0, 0.0), path, hall(), DT)
         assert abs(v) < 0.15
     log = drive(controller, Pose2(3.6, 1.95, 0.35), path, hall(), seconds=20.0)
     assert np.hypot(*(log[-1, :2] - path[-1, :2])) < 0.1
+    for yaw in (0.7, 0.75, 0.8) if with_shim else ():  # and once more, to where the goal lies behind it
+        controller.compute_velocity(Pose2(4.0, 2.0, yaw), (0.0, 0.0), path, hall(), DT)
+    if with_shim:
+        drive(controller, Pose2(4.4, 2.1, 0.8), path, hall(), seconds=30.0)
 
 
 def test_a_speed_limit_holds_backwards_too() -> None:

@@ -305,6 +305,9 @@ def test_a_sensor_that_sees_along_a_line_marks_what_it_hits() -> None:
         for ahead, aside, cost in ((0.8, 0.0, 254), (0.4, 0.0, 0), (0.4, 0.1, 255), (0.8, 0.1, 255)):
             assert layered.costmap.cost_at(*sensor.apply([ahead, aside])) == cost
     layered.update_range(Pose2(0.0, 0.0, 0.0), 0.0, (0.0, 3.0), 0.0)
+    coarse = empty(4.0, resolution=0.25)  # centres of cells that are exactly ahead
+    coarse.update_range(Pose2(0.125, 0.125, 0.0), 1.0, (0.05, 3.0), 0.0)
+    assert coarse.costmap.cost_at(1.125, 0.125) == 254
 
 
 @pytest.mark.parametrize(

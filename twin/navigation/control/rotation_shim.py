@@ -134,13 +134,11 @@ class RotationShim(Controller):
         config, local = self.config, self._handler.local(pose)
         goal = Pose2(*path[-1].tolist())
         if config.rotate_to_goal_heading:
-            was_there, off = self._at_goal, pose.distance(goal)
-            self._at_goal = self._is_there(was_there, off, at_end=local.ends_at_goal)
+            off = pose.distance(goal)
+            self._at_goal = self._is_there(self._at_goal, off, at_end=local.ends_at_goal)
             if self._at_goal:
                 self.carrot = goal[:2]
                 return wrap_angle(goal.yaw - pose.yaw)
-            if was_there:  # it looks anywhere by now
-                self._aligned = self._turning = False
         if self._aligned:
             return None
         far = np.hypot(*(local.poses[:, :2] - local.poses[0, :2]).T) >= config.forward_sampling_distance
