@@ -245,3 +245,11 @@ def test_without_random_readings_no_pose_is_ruled_out(z_hit: float) -> None:
     assert fits[0] == pytest.approx(0.0, abs=0.05)
     if z_hit:
         assert fits[0] > fits[1] > fits[2] == fits[3]
+
+
+def test_a_negative_laser_max_range_is_the_lidars_own(hall: Any, hall_map: OccupancyMap) -> None:
+    off = Pose2(0.2, 0.1, 0.1)
+    run = localise(hall, tracking(hall_map, 0, off, laser_max_range=-1.0), WAYPOINTS[:3])
+    xy, yaw = rms(run, skip=10)
+    assert xy < 0.05
+    assert yaw < 1.0
