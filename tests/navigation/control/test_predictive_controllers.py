@@ -12,6 +12,7 @@ from twin.geometry import Pose2, wrap_angle
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import (
+    CRITICS,
     CostCriticConfig,
     GoalAngleCriticConfig,
     GoalCriticConfig,
@@ -19,6 +20,8 @@ from twin.navigation.control.mppi.config import (
     PathAlignCriticConfig,
     PathAngleCriticConfig,
     SpeedCriticConfig,
+    TwirlingCriticConfig,
+    VelocityDeadbandCriticConfig,
 )
 from twin.navigation.control.mppi.controller import MPPI
 from twin.navigation.control.plugins import create_controller
@@ -254,3 +257,44 @@ def test_where_there_is_no_room_to_turn_the_primary_controller_drives() -> None:
             costmap.costs[40:42, 45] = 254  # beside the robot: not under it, but where its corner will be
         w = shimmed(DWB_CONFIG).compute_velocity(Pose2(2.0, 2.0, -1.2), (0.0, 0.8), path, costmap, DT)
         assert (w[0] == 0.0) is not blocked
+
+
+# critics that score only if they are listed
+
+
+def listed(name: str, **critics: object) -> MPPIConfig:
+    return replace(MPPI_CONFIG, critics=(*CRITICS, name), **critics)  # type: ignore[arg-type]
+
+
+def first_command(config: MPPIConfig, start: Pose2, v: float) -> tuple[float, float]:
+    controller = create_controller(config, FOOTPRINT)
+    return controller.compute_velocity(start, (v, 0.0), line(1.0, 6.5, 2.0), hall(), DT)
+
+
+def test_a_twirling_critic_turns_less() -> None:
+    start = Pose2(1.0, 2.4, 0.0)
+    plain = first_command(MPPI_CONFIG, start, 0.5)
+    critic = TwirlingCriticConfig(cost_weight=60.0)
+    calm = first_command(listed("TwirlingCritic", TwirlingCritic=critic), start, 0.5)
+    assert abs(calm[1]) < 0.7 * abs(plain[1])
+    unlisted = first_command(replace(MPPI_CONFIG, TwirlingCritic=critic), start, 0.5)
+    assert unlisted == plain
+
+
+def test_a_deadband_critic_avoids_speeds_that_the_drive_would_not_obey() -> None:
+    critic = VelocityDeadbandCriticConfig(deadband_velocities=(0.0, 0.0, 0.6))
+    start = Pose2(1.0, 2.1, 0.0)
+    plain = first_command(MPPI_CONFIG, start, 0.5)
+    brisk = first_command(listed("VelocityDeadbandCritic", VelocityDeadbandCritic=critic), start, 0.5)
+    assert abs(brisk[1]) > 1.2 * abs(plain[1])
+
+
+def test_an_obstacles_critic_keeps_off_as_the_cost_critic_does() -> None:
+    room, start = hall((2.0, 0.1, 5.0, 1.7)), Pose2(1.0, 2.0, 0.0)
+    blind = tuple(name for name in CRITICS if name not in ("CostCritic", "SpeedCritic"))
+    middle = [
+        drive(shimmed(replace(MPPI_CONFIG, critics=critics)), start, line(1.0, 6.5, 2.0), room)
+        for critics in (blind, (*blind, "ObstaclesCritic"))
+    ]
+    beside = [log[(log[:, 0] > 3.0) & (log[:, 0] < 4.0), 1].mean() for log in middle]
+    assert beside[1] > beside[0] + 0.01
