@@ -37,6 +37,7 @@ class Bed:
         self.ticks = 0
         """How often an AlwaysSuccess was ticked."""
         self._file = folder / "tree.xml"
+        self._publishers: dict[str, Any] = {}
         self._tf = TransformBroadcaster(bench.node)
         self._context = NavigatorContext(
             bench.bus.create_node("navigator"),
@@ -76,7 +77,10 @@ class Bed:
 
     def hear(self, topic: str, message: Any) -> None:
         """Publish a message, and let it arrive."""
-        self.bench.node.create_publisher(type(message), topic, 10).publish(message)
+        if topic not in self._publishers:
+            self._publishers[topic] = self.bench.node.create_publisher(type(message), topic, 10)
+            self.bench.run(0.1)
+        self._publishers[topic].publish(message)
         self.bench.run(2 * TICK_S)
 
     def drive(self, speed: float) -> None:
@@ -309,9 +313,10 @@ def test_cancelling_ends_what_somebody_else_began(bed: Bed, name: str) -> None:
         return new(node.ACTION.Result)
 
     ActionServer(bed.bench.node, node.ACTION, node.SERVER, execute)
-    sent = ActionClient(bed.bench.node, node.ACTION, node.SERVER).send_goal(new(node.ACTION.Goal))
+    client = ActionClient(bed.bench.node, node.ACTION, node.SERVER)
     tree = bed.load(name)
-    assert sent.accepted
+    sent = client.send_goal(new(node.ACTION.Goal))
+    bed.bench.until(lambda: sent.accepted, 1.0)
     bed.bench.until(lambda: tree.tick() is not RUNNING, 1.0)
     assert tree.root.status is SUCCESS
     bed.bench.until(lambda: sent.done, 1.0)
