@@ -42,7 +42,9 @@ def test_limits_that_the_file_has_in_lists(tmp_path: Path) -> None:
     assert (got.linear.max_acceleration, got.linear.max_deceleration) == (0.5, 2.6)
     got = applied(tmp_path, SMOOTHER, {"max_linear_deceleration": 0.6}).smoother
     assert (got.linear.max_acceleration, got.linear.max_deceleration) == (2.5, 0.6)
-    got = applied(tmp_path, SMOOTHER, {"max_angular_acceleration": 0.7, "max_linear_speed": "0.3 m/s"}).smoother
+    got = applied(
+        tmp_path, SMOOTHER, {"max_angular_acceleration": 0.7, "max_linear_speed": "0.3 m/s"}
+    ).smoother
     assert (got.angular.max_acceleration, got.angular.max_deceleration) == (0.7, 0.7), "also when braking"
     assert (got.linear.max_velocity, got.angular.max_velocity) == (0.3, 1.3)
 
@@ -62,12 +64,13 @@ controller_server:
       CostCritic: {cost_weight: 2.0, consider_footprint: true}
     Precise: {vx_max: 0.4, wz_max: 0.7}
 """
+MPPI = {"plugin": "mppi", "rotation_shim": False}
 
 
 def test_further_controllers_have_their_own_keys(tmp_path: Path) -> None:
     config = {
-        "controller": {"vx_max": "0.8 m/s"},
-        "controllers": {"Precise": {"plugin": "mppi", "rotation_shim": False, "wz_max": "0.5 rad/s"}},
+        "controller": {**MPPI, "vx_max": "0.8 m/s"},
+        "controllers": {"Precise": {**MPPI, "wz_max": "0.5 rad/s"}},
     }
     controllers: Any = applied(tmp_path, CONTROLLERS, config).controller_server.controllers
     assert controllers["FollowPath"].vx_max == 0.8
@@ -88,7 +91,7 @@ def test_goal_checkers_of_further_controllers(tmp_path: Path) -> None:
 
 
 def test_of_a_critic_only_the_keys_that_are_given(tmp_path: Path) -> None:
-    config = {"controller": {"CostCritic": {"cost_weight": 6}}}
+    config = {"controller": {**MPPI, "CostCritic": {"cost_weight": 6}}}
     controllers: Any = applied(tmp_path, CONTROLLERS, config).controller_server.controllers
     critic = controllers["FollowPath"].CostCritic
     assert (critic.cost_weight, critic.consider_footprint) == (6.0, True)

@@ -16,8 +16,10 @@ _SMOOTHER = {
     "max_linear_deceleration": ("linear.max_deceleration",),
     "max_angular_acceleration": ("angular.max_acceleration", "angular.max_deceleration"),
 }
-_SERVER_SECTIONS = ("", "FollowPath.", "general_goal_checker.", "progress_checker.")
-"""Where a key under `controller` may belong: the server itself, or one of its plugins."""
+_OF_SERVER = frozenset({"controller_frequency", "failure_tolerance"})
+"""Keys under `controller` that belong to the server itself ..."""
+_SECTIONS = ("FollowPath.", "general_goal_checker.", "progress_checker.")
+"""... and where the others may belong."""
 _CHOICES = frozenset({"goal_checker", "plugin", "progress_checker", "rotation_shim"})
 """What a scenario chooses; the chosen ones' parameters may come from the file."""
 _DOCKS = frozenset({"docks", "pose", "type", "frame"})
@@ -38,7 +40,8 @@ def for_planner(group: ParameterGroup) -> frozenset[str]:
 
 def for_controllers(config: NavigationConfig) -> frozenset[str]:
     """Return what the scenario gives of `/controller_server`, of FollowPath and of controllers by id."""
-    own = {f"{section}{key}" for section in _SERVER_SECTIONS for key in _chosen_keys(config.controller)}
+    keys = set(_chosen_keys(config.controller))
+    own = (keys & _OF_SERVER) | {f"{section}{key}" for section in _SECTIONS for key in keys - _OF_SERVER}
     if config.controller.maneuvers is not None:
         own.add("maneuver.reach")
     further = {f"{name}.{key}" for name, one in config.controllers.items() for key in _chosen_keys(one)}

@@ -183,9 +183,7 @@ def with_file(
     return changed, file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))
 
 
-def _costmap(
-    file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters
-) -> CostmapNodeConfig:
+def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     node, keep = f"{config.name}/{config.name}", nav2_given.for_costmap(group)
     scans, ranges = sources_of(file, node)
     config = replace(

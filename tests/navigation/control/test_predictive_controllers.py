@@ -282,11 +282,26 @@ def test_a_twirling_critic_turns_less() -> None:
 
 
 def test_a_deadband_critic_avoids_speeds_that_the_drive_would_not_obey() -> None:
-    critic = VelocityDeadbandCriticConfig(deadband_velocities=(0.0, 0.0, 0.6))
-    start = Pose2(1.0, 2.1, 0.0)
-    plain = first_command(MPPI_CONFIG, start, 0.5)
-    brisk = first_command(listed("VelocityDeadbandCritic", VelocityDeadbandCritic=critic), start, 0.5)
-    assert abs(brisk[1]) > 1.2 * abs(plain[1])
+    corridor = hall((2.0, 0.1, 6.0, 1.65), (2.0, 2.35, 6.0, 3.9))
+
+    def speed(config: MPPIConfig) -> float:
+        controller, pose, v, w, steps = (
+            create_controller(config, FOOTPRINT),
+            Pose2(3.0, 2.0, 0.0),
+            0.6,
+            0.0,
+            0,
+        )
+        while pose.x < 4.5:
+            v, w = controller.compute_velocity(pose, (v, w), line(1.0, 7.0, 2.0), corridor, DT)
+            pose = pose @ Pose2(v * DT, 0.0, 0.0) @ Pose2(0.0, 0.0, w * DT)
+            steps += 1
+            assert steps < 200
+        return (pose.x - 3.0) / (steps * DT)
+
+    critic = VelocityDeadbandCriticConfig(deadband_velocities=(0.9, 0.0, 0.0))
+    obeyed = speed(listed("VelocityDeadbandCritic", VelocityDeadbandCritic=critic))
+    assert speed(MPPI_CONFIG) < 0.65 < 0.8 < obeyed, "SpeedCritic's is slower"
 
 
 def test_an_obstacles_critic_keeps_off_as_the_cost_critic_does() -> None:

@@ -266,7 +266,9 @@ def test_paths_are_joined(bed: Bed) -> None:
 
 @pytest.mark.parametrize(("index", "x"), [(0, 0.0), (3, 0.3), (-1, 2.0), (99, None)])
 def test_a_pose_of_a_path(bed: Bed, index: int, x: float | None) -> None:
-    tree = bed.load(f'GetPoseFromPath path="{{path}}" index="{index}" pose="{{pose}}"', path=straight(0.0, 2.0))
+    tree = bed.load(
+        f'GetPoseFromPath path="{{path}}" index="{index}" pose="{{pose}}"', path=straight(0.0, 2.0)
+    )
     assert tree.tick() is (FAILURE if x is None else SUCCESS)
     if x is not None:
         assert pose2_from_pose(bed.blackboard.get("pose").pose).x == pytest.approx(x)

@@ -71,7 +71,7 @@ def test_an_obstacle_on_no_map_is_marked_and_cleared_again(bench: Bench, stack: 
 
 @pytest.mark.parametrize("inf_is_valid", [True, False])
 def test_a_ray_without_return_clears_if_inf_is_valid(bench: Bench, inf_is_valid: bool) -> None:
-    pillar, crate = box(-2.0, -0.2, -1.8, 0.2), box(1.0, -0.2, 1.2, 0.2)
+    pillar, crate = box(-2.0, -0.2, -1.8, 0.2), box(1.02, -0.2, 1.2, 0.2)
     room = Room(np.concatenate([pillar, crate]))
     layers = replace(LAYERS, rolling_window=True, track_unknown_space=False, inf_is_valid=inf_is_valid)
     config = CostmapNodeConfig(name="local_costmap", frame="odom", layers=layers)
@@ -81,7 +81,7 @@ def test_a_ray_without_return_clears_if_inf_is_valid(bench: Bench, inf_is_valid:
         room.segments = seen
         bench.run(0.5)
         assert node.costmap is not None
-        costs.append(node.costmap.cost_at(1.01, 0.0))
+        costs.append(node.costmap.cost_at(1.03, 0.0))
     assert costs == [254, 0 if inf_is_valid else 254]
 
 
