@@ -61,9 +61,8 @@ def for_navigator(group: NavigatorParameters) -> frozenset[str]:
 
 
 def for_costmap(group: CostmapParameters) -> frozenset[str]:
-    """Return what the scenario gives of a costmap: with a radius the outline, too."""
-    keys = frozenset(_keys(group))
-    return keys | {"footprint"} if "robot_radius" in keys else keys
+    """Return what the scenario gives of a costmap."""
+    return frozenset(_keys(group))
 
 
 def _chosen_keys(group: ControllerParameters) -> Iterator[str]:
