@@ -74,7 +74,14 @@ def build_navigation(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
     if _lidar(context) is not None:
-        DockingServerNode(bus, pose, parameters.docking, namespace=namespace)
+        DockingServerNode(
+            bus,
+            pose,
+            parameters.docking,
+            costmap=local_costmap,
+            footprint=footprint,
+            namespace=namespace,
+        )
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:

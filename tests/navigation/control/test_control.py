@@ -170,6 +170,15 @@ def test_what_is_not_a_path(path: np.ndarray) -> None:
         rpp().compute_velocity(Pose2(0.0, 0.0, 0.0), (0.0, 0.0), path, None, DT)
 
 
+def test_a_new_path_is_driven_while_it_still_brakes_for_a_cancel() -> None:
+    controller, path = rpp(use_cancel_deceleration=True, cancel_deceleration=0.5), line(3.0)
+    look = Pose2(0.0, 0.0, 0.0), (0.4, 0.0)
+    assert controller.compute_velocity(*look, path, None, DT)[0] == pytest.approx(0.5)
+    assert not controller.cancel()
+    assert controller.compute_velocity(*look, path, None, DT)[0] == pytest.approx(0.4 - 0.5 * DT)
+    assert controller.compute_velocity(*look, line(4.0), None, DT)[0] == pytest.approx(0.5)
+
+
 def test_speed_limit() -> None:
     controller, path = rpp(), line(5.0)
     for limit, want in ((0.3, 0.3), (2.0, 0.5), (None, 0.5)):

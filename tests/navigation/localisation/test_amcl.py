@@ -229,3 +229,11 @@ def test_the_likelihood_field_against_its_definition(yaw: float, depth: float) -
         assert likelihood(x) == pytest.approx(math.log(z / 0.82), abs=0.15)
     assert likelihood(1.5 + depth) == pytest.approx(0.0, abs=1e-3)
     assert likelihood(99.0) == pytest.approx(math.log(0.02 / 0.82), abs=1e-3)
+
+
+def test_a_negative_laser_max_range_is_the_lidars_own(hall: Any, hall_map: OccupancyMap) -> None:
+    off = Pose2(0.2, 0.1, 0.1)
+    run = localise(hall, tracking(hall_map, 0, off, laser_max_range=-1.0), WAYPOINTS[:3])
+    xy, yaw = rms(run, skip=10)
+    assert xy < 0.05
+    assert yaw < 1.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from tests.nodes.conftest import TICK_NS, Bench, Robot, Room, box
 from twin.bridge.action_types import (
     DockRobot,
@@ -17,8 +19,17 @@ from twin.bridge.msgs import (
     new,
 )
 from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.nodes.messages import pose_stamped
+from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingServerConfig, DockingServerNode
+
+FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
+LOCAL_COSTMAP = CostmapNodeConfig(
+    name="local_costmap",
+    frame="odom",
+    layers=CostmapConfig(footprint=FOOTPRINT, rolling_window=True, expected_update_rate=0.35),
+)
 
 
 class Dock:
@@ -27,14 +38,22 @@ class Dock:
     FACE = Pose2(2.0, 0.0, 0.0)
 
     def __init__(
-        self, bench: Bench, *, start: Pose2, shelf: bool = True, config: DockingServerConfig | None = None
+        self,
+        bench: Bench,
+        *,
+        start: Pose2,
+        shelf: bool = True,
+        config: DockingServerConfig | None = None,
+        costmap: bool = False,
     ) -> None:
         self.bench = bench
         room = Room(box(-4.0, -4.0, 4.0, 4.0))
         if shelf:
             room.add_box(2.0, -1.5, 2.6, 1.5)
         self.robot = Robot(bench, room, cmd_vel="cmd_vel_docking", start=start)
-        DockingServerNode(bench.bus, self.robot.pose_lookup, config)
+        pose = self.robot.pose_lookup
+        local = CostmapNode(bench.bus, pose, LOCAL_COSTMAP) if costmap else None
+        DockingServerNode(bench.bus, pose, config, costmap=local, footprint=np.array(FOOTPRINT))
         self.told: list[Any] = []
         self.dock_client = ActionClient(bench.node, DockRobot, "dock_robot")
         self.undock_client = ActionClient(bench.node, UndockRobot, "undock_robot")

@@ -284,6 +284,20 @@ def test_a_tree_switches_the_collision_monitor_and_cuts_paths(
     assert stack.robot.pose.x == pytest.approx(0.5, abs=0.1)
 
 
+def test_an_action_that_is_ticked_after_its_end_keeps_its_result(
+    bench: Bench, stack: Stack, tmp_path: Path
+) -> None:
+    """A PipelineSequence ticks what has ended again and again while the last child is at work."""
+    nodes = """<PipelineSequence>
+        <ComputePathToPose goal="{goal}" path="{path}"/>
+        <FollowPath path="{path}"/>
+    </PipelineSequence>"""
+    sent = stack.go(1.0, 0.0, tree=tree(tmp_path, nodes))
+    stack.until_done(sent)
+    assert sent.succeeded
+    assert stack.robot.pose.x == pytest.approx(1.0, abs=0.06)
+
+
 def test_a_tree_that_is_wrong_or_missing_ends_the_goal_not_the_run(stack: Stack, tmp_path: Path) -> None:
     result = stack.until_done(stack.go(1.0, 0.0, tree=tree(tmp_path, "<Spinn/>")), 1.0)
     assert result.error_code == 9001
@@ -310,6 +324,16 @@ def test_the_log_tells_every_change_of_status(bench: Bench, stack: Stack) -> Non
     assert ("FollowPath", "RUNNING", "SUCCESS") in {
         (c.node_name, c.previous_status, c.current_status) for c in changes
     }
+
+
+def test_of_two_actions_at_once_the_second_is_rejected(bench: Bench, stack: Stack) -> None:
+    first = stack.go(0.5, 0.0)
+    goal = pose_stamped(Pose2(-1.0, 0.0, 0.0), "map", bench.clock.now_ns)
+    second = stack.through.send_goal(new(NavigateThroughPoses.Goal, poses=[goal]))
+    bench.until(lambda: second.done, 1.0)
+    assert second.accepted is False
+    stack.until_done(first)
+    assert first.succeeded
 
 
 def test_through_poses_passes_them_all(bench: Bench, stack: Stack) -> None:

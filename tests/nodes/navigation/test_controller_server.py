@@ -14,6 +14,7 @@ from tests.nodes.navigation.servers import FOOTPRINT, HALF, Stack
 from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionClient
 from twin.bridge.msgs import GoalStatus, MarkerArray, Path, SpeedLimit, new
+from twin.bridge.parameters.values import Parameter
 from twin.geometry import Pose2
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
@@ -239,6 +240,16 @@ def test_a_speed_limit_is_absolute_or_in_percent_until_it_is_lifted(bench: Bench
         bench.run(0.3)
         assert stack.robot.commands[-1][0] == pytest.approx(speed)
     assert any("speed_limit refused" in text for text in said)
+
+
+def test_a_speed_limit_outlives_a_change_of_parameters(bench: Bench, stack: Stack) -> None:
+    limits = bench.node.create_publisher(SpeedLimit, "speed_limit", 1)
+    stack.drive(np.array([[-2, 0, 0], [2, 0, 0]], dtype=float))
+    limits.publish(new(SpeedLimit, speed_limit=0.3))
+    bench.run(0.3)
+    stack.controller_server.node.set_parameters([Parameter("FollowPath.lookahead_dist", value=0.5)])
+    bench.run(0.5)
+    assert stack.robot.commands[-1][0] == pytest.approx(0.3)
 
 
 def test_the_feedback_and_the_local_plan_tell_where_it_goes(bench: Bench, stack: Stack) -> None:

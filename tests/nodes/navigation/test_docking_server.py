@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
 from tests.nodes.conftest import Bench
 from tests.nodes.navigation.docking import Dock
-from twin.bridge.msgs import (
-    GoalStatus,
-)
+from twin.bridge.action_types import DockRobot, UndockRobot
+from twin.bridge.msgs import GoalStatus, new
 from twin.geometry import Pose2
+from twin.nodes.messages import pose_stamped
+from twin.nodes.navigation.docking_server import DockingServerConfig
 
 
 def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:
@@ -108,3 +110,85 @@ def test_a_cancelled_docking_stops(bench: Bench) -> None:
     assert goal.status == GoalStatus.STATUS_CANCELED
     bench.run(0.5)
     assert not dock.robot.joints.velocity.any()
+
+
+# What comes between
+
+
+def driving(bench: Bench, x: float = 0.9, **changes: Any) -> tuple[Dock, Any]:
+    """Return a robot on its way to the dock, which looks at a costmap, and its goal."""
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0), costmap=True, config=DockingServerConfig(**changes))
+    goal = dock.send()
+    bench.until(lambda: dock.robot.pose.x > x, 20.0)
+    return dock, goal
+
+
+def test_without_a_lidar_it_stands_and_says_why(bench: Bench) -> None:
+    dock, goal = driving(bench)
+    dock.robot.blind = True
+    bench.run(0.6)
+    stood = dock.robot.pose
+    assert stood.x < 1.05
+    bench.until(lambda: goal.done, 6.0)
+    assert (goal.result.error_code, goal.result.num_retries) == (905, 0), "it could not drive back either"
+    assert goal.result.error_msg.startswith("the local costmap is not current: no scan for 5.")
+    assert dock.robot.pose.distance(stood) < 1e-6
+
+
+def test_a_lidar_that_comes_back_delays_it_only(bench: Bench) -> None:
+    dock, goal = driving(bench)
+    dock.robot.blind = True
+    bench.run(3.0)
+    dock.robot.blind = False
+    bench.until(lambda: goal.done, 30.0)
+    assert (goal.result.success, goal.result.num_retries) == (True, 0)
+    assert dock.robot.pose.x == pytest.approx(1.45, abs=0.015)
+
+
+def test_it_waits_for_who_stands_before_the_dock(bench: Bench) -> None:
+    dock, goal = driving(bench)
+    room = dock.robot.room
+    empty = room.segments
+    room.add_box(1.2, -0.1, 1.25, 0.1)
+    bench.run(3.0)
+    assert dock.robot.pose.x < 1.0
+    assert not dock.robot.joints.velocity.any()
+    room.segments = empty
+    bench.until(lambda: goal.done, 30.0)
+    assert (goal.result.success, goal.result.num_retries) == (True, 0)
+    assert dock.robot.pose.x == pytest.approx(1.45, abs=0.015)
+
+
+def test_what_stays_before_the_dock_ends_it(bench: Bench) -> None:
+    dock, goal = driving(bench, max_retries=0)
+    dock.robot.room.add_box(1.2, -0.1, 1.25, 0.1)
+    bench.until(lambda: goal.done, 10.0)
+    assert goal.result.error_code == 905
+    assert goal.result.error_msg.startswith("docking failed: something is in the way, 0.")
+    assert dock.robot.pose.x < 1.0
+
+
+def test_undocking_does_not_back_into_what_stands_behind(bench: Bench) -> None:
+    dock = Dock(bench, start=Pose2(1.45, 0.0, 0.0), costmap=True)
+    dock.robot.room.add_box(0.7, -0.2, 0.8, 0.2)
+    bench.run(0.5)
+    goal = dock.undock_client.send_goal(new(UndockRobot.Goal, dock_type="table"))
+    bench.until(lambda: goal.done, 20.0)
+    assert goal.result.error_code == 905
+    assert "something is in the way" in goal.result.error_msg
+    assert dock.robot.pose.x > 0.95 + 0.02
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"use_dock_id": False, "dock_pose": pose_stamped(Pose2(math.nan, 0.0, 0.0), "map", 0)},
+        {"use_dock_id": True, "dock_id": "home", "max_staging_time": math.inf},
+    ],
+    ids=["pose", "time"],
+)
+def test_what_is_no_number_is_rejected(bench: Bench, wrong: dict[str, Any]) -> None:
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0))
+    goal = dock.dock_client.send_goal(new(DockRobot.Goal, **wrong))
+    bench.until(lambda: goal.done, 1.0)
+    assert goal.accepted is False

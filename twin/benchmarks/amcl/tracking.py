@@ -49,11 +49,13 @@ class Tracking:
 class _Log:
     """What is heard on the bus, and the truth of the last second."""
 
+    first: Pose2 | None = None
     truths: dict[int, Pose2] = field(default_factory=dict)
     nees: list[float] = field(default_factory=list)
     scans: list[tuple[int, Array]] = field(default_factory=list)
 
     def remember(self, time_ns: int, truth: Pose2) -> None:
+        self.first = self.first or truth
         self.truths[time_ns] = truth
         self.truths.pop(time_ns - _REMEMBERED_NS, None)
 
@@ -124,7 +126,8 @@ def _filter_cost(bench: Bench, log: _Log, odometry: dict[int, Pose2]) -> float:
     T_base_lidar = bench.stack.robot_pose.relative(bench.stack.frames.base, lidar.link)
     assert T_base_lidar is not None
     amcl = Amcl(AmclConfig(), OccupancyMap.load(named_map("warehouse")), 0)
-    amcl.initialise(next(iter(log.truths.values())), np.diag([0.04, 0.04, 0.01]))
+    assert log.first is not None
+    amcl.initialise(log.first, np.diag([0.04, 0.04, 0.01]))
     angles = np.linspace(-math.radians(135.0), math.radians(135.0), len(log.scans[0][1]))
     start = time.process_time()
     for stamp, ranges in log.scans:

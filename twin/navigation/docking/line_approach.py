@@ -86,6 +86,10 @@ class LineApproach:
         error = self._goal.inverse() @ pose
         return (error.x if self.backward else -error.x), error.y, error.yaw
 
+    def halt(self) -> None:
+        """Take that the robot stands: it speeds up anew."""
+        self._v = self._w = 0.0
+
     def update(self, pose: Pose2, dt: float) -> BehaviorStep:
         """Return the next command; `pose` in the odom frame, `dt` in [s].
 

@@ -133,7 +133,7 @@ class Amcl:
             T_base_lidar,
             most=config.max_beams,
             min_range=config.laser_min_range,
-            max_range=config.laser_max_range,
+            max_range=config.laser_max_range if config.laser_max_range > 0.0 else math.inf,
         )
         prior = None
         if len(beams):

@@ -65,6 +65,8 @@ class ControllerServerNode:
         declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
         self._commander = Commander(node, costmap, footprint, self.config)
         self._velocity = (0.0, 0.0)
+        self._speed_limit: SpeedLimit | None = None
+        """The last that was of use."""
         self._preempted: FollowGoal | None = None
         """What was followed until another path came."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
@@ -80,6 +82,8 @@ class ControllerServerNode:
         for name, plugin in config.controllers.items():
             if plugin != before.controllers[name]:
                 self.controllers[name].configure(plugin)
+        if self._speed_limit is not None:
+            self._on_speed_limit(self._speed_limit)
 
     def _on_odom(self, message: Odometry) -> None:
         v, w = message.twist.twist.linear.x, message.twist.twist.angular.z
@@ -94,6 +98,7 @@ class ControllerServerNode:
         if not (np.isfinite(limit) and limit >= 0.0):
             self.node.get_logger().error(f"speed_limit refused: {limit} is not finite and at least 0")
             return
+        self._speed_limit = message
 
         def limited(speed: float) -> float | None:
             absolute = speed * limit / 100.0 if message.percentage else limit

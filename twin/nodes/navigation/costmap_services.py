@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -87,6 +88,8 @@ class CostmapServices:
         layers = self._layers()
         if layers is None or pose is None:
             self._node.get_logger().error("nothing cleared: there is no map yet, or no transform to the pose")
+        elif not all(map(math.isfinite, (*pose, size))):
+            self._node.get_logger().error("nothing cleared: the pose or the distance is not finite")
         else:
             layers.clear_area(pose.x, pose.y, float(size), outside=outside)
             self._cleared(False)
@@ -95,8 +98,8 @@ class CostmapServices:
         """Answer the cost at a point, or the worst under the footprint's outline; -1 off the costmap."""
         layers = self._layers()
         cost = -1.0
-        if layers is not None and layers.costmap.contains(request.x, request.y):
-            at = Pose2(float(request.x), float(request.y), float(request.theta))
+        at = Pose2(float(request.x), float(request.y), float(request.theta))
+        if layers is not None and all(map(math.isfinite, at)) and layers.costmap.contains(at.x, at.y):
             grid = layers.costmap
             cost = (
                 footprint_cost(grid, layers.config.polygon, at)

@@ -13,6 +13,7 @@ from twin.navigation.docking.dock_estimate import DockEstimate, DockEstimateConf
 from twin.navigation.docking.docks import DockType
 from twin.nodes.navigation.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.scan_input import ScanInput
 
 
 class DockDetection:
@@ -23,6 +24,7 @@ class DockDetection:
         self._type = DockType()
         self._expected = Pose2(0.0, 0.0, 0.0)
         self._estimate: DockEstimate | None = None
+        self._scans = ScanInput(robot_pose, node.now_ns)
         self._told: PoseStamped | None = None
         """The latest on `detected_dock_pose`."""
         node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA)
@@ -76,7 +78,8 @@ class DockDetection:
         self._told = message
 
     def _on_scan(self, message: LaserScan) -> None:
-        if self._estimate is None:
+        usable = self._scans.accept(message, self._node.now_ns)
+        if self._estimate is None or not usable:
             return
         frames = self._robot_pose.frames
         T_base_lidar = self._robot_pose.at_stamp(frames.base, message.header)

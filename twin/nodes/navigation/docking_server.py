@@ -11,25 +11,38 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from twin.bridge.action_types import DockRobot, NavigateToPose, UndockRobot
 from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.bus import Bus
-from twin.bridge.conversions import pose2_from_pose, twist_from_planar
-from twin.bridge.msgs import BatteryState, Twist, duration, new
-from twin.geometry import Pose2
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import BatteryState, new
+from twin.geometry import Array, Pose2
+from twin.navigation.docking.collision_check import DockCollisionConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
 from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
-from twin.navigation.docking.line_approach import LineApproach, LineApproachConfig
+from twin.navigation.docking.line_approach import LineApproachConfig
 from twin.nodes.messages import pose_stamped
+from twin.nodes.navigation.costmap import CostmapNode
 from twin.nodes.navigation.dock_detection import DockDetection
+from twin.nodes.navigation.dock_drive import BlindError, DockDrive
+from twin.nodes.navigation.docking_attempt import (
+    FAILED_TO_CHARGE,
+    FAILED_TO_CONTROL,
+    FAILED_TO_DETECT_DOCK,
+    FAILED_TO_STAGE,
+    PERCEPTION,
+    RETRY,
+    STAGING,
+    WAITING,
+    Attempt,
+    Cancelled,
+)
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
 Work = Generator[None, None, Any]
-
-_FAILED_TO_STAGE, _FAILED_TO_DETECT_DOCK, _FAILED_TO_CONTROL, _FAILED_TO_CHARGE = 903, 904, 905, 906
-_STAGING, _PERCEPTION, _CONTROLLING, _WAITING, _RETRY = 1, 2, 3, 4, 5
-"""States in the feedback."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,18 +69,15 @@ class DockingServerConfig:
             lateral_tolerance=0.2, yaw_tolerance=0.3, turn_first_above=0.3
         )
     )
+    controller: DockCollisionConfig = field(default_factory=DockCollisionConfig)
 
 
 NAMES = {"database": "", "types": "", "docks": ""}
 """Levels of the config that are none of the parameters' names."""
 
 
-class _Cancelled(Exception):
-    """A client wants the goal to end."""
-
-
 class DockingServerNode:
-    """Takes what `DockDetection` does, and `battery_state`; publishes `cmd_vel_docking`."""
+    """Takes what `DockDetection` does, and `battery_state`; drives by `DockDrive`."""
 
     def __init__(
         self,
@@ -75,6 +85,8 @@ class DockingServerNode:
         robot_pose: RobotPose,
         config: DockingServerConfig | None = None,
         *,
+        costmap: CostmapNode | None = None,
+        footprint: Array | None = None,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("docking_server", namespace)
@@ -88,11 +100,18 @@ class DockingServerNode:
         """Docked pose of the dock last driven to, in `odom`: where to undock from; None after undocking."""
         self._docked_type = ""
         """Of the dock at which the robot stands; '' if it does not."""
-        self._publisher = self.node.create_publisher(Twist, "cmd_vel_docking", 1)
+        self._drive = DockDrive(
+            self.node,
+            robot_pose,
+            self.config.controller,
+            costmap,
+            np.zeros((1, 2)) if footprint is None else footprint,
+            self.config.controller_period_ns,
+        )
         self._navigator = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
         self.node.create_subscription(BatteryState, "battery_state", self._on_battery_state, 1)
-        ActionServer(self.node, DockRobot, "dock_robot", self._dock_robot)
-        ActionServer(self.node, UndockRobot, "undock_robot", self._undock_robot)
+        ActionServer(self.node, DockRobot, "dock_robot", self._dock_robot, _is_finite)
+        ActionServer(self.node, UndockRobot, "undock_robot", self._undock_robot, _is_finite)
 
     def _on_battery_state(self, message: BatteryState) -> None:
         self._current = message.current
@@ -100,7 +119,7 @@ class DockingServerNode:
     # Docking
 
     def _dock_robot(self, handle: GoalHandle) -> Work:
-        attempt = _Attempt(handle, self.node.now_ns)
+        attempt = Attempt(handle, self.node.now_ns)
         try:
             dock = self._requested(handle.request)
             type_ = self.config.database.type_of(dock.type)
@@ -108,14 +127,14 @@ class DockingServerNode:
             yield from self._dock_at(attempt, self._in_odom(dock), type_)
             self._docked_type = dock.type
             return new(DockRobot.Result, success=True, num_retries=attempt.retries)
-        except _Cancelled:
+        except Cancelled:
             handle.canceled()
-            return attempt.failed(_FAILED_TO_CONTROL, "canceled")
+            return attempt.failed(FAILED_TO_CONTROL, "canceled")
         except DockError as error:
             handle.abort()
             return attempt.failed(error.code, str(error))
         finally:
-            self._stop()
+            self._drive.stop()
 
     def _requested(self, goal: Any) -> Dock:
         if goal.use_dock_id:
@@ -128,10 +147,10 @@ class DockingServerNode:
         """Return the docked pose in the odom frame, as the map has it."""
         frame = self._robot_pose.relative(self._robot_pose.frames.odom, dock.frame)
         if frame is None or self._robot_pose.in_odom() is None:
-            raise DockError(_FAILED_TO_DETECT_DOCK, "the robot is not localised")
+            raise DockError(FAILED_TO_DETECT_DOCK, "the robot is not localised")
         return frame @ dock.pose
 
-    def _stage(self, attempt: _Attempt, dock: Dock, type_: DockType) -> Work:
+    def _stage(self, attempt: Attempt, dock: Dock, type_: DockType) -> Work:
         """Navigate to the staging pose, if that is wanted and the robot is not there."""
         goal, staging = attempt.handle.request, type_.staging_pose(dock.pose)
         pose = self._robot_pose.relative(dock.frame, self._robot_pose.frames.base)
@@ -143,10 +162,10 @@ class DockingServerNode:
         sent = self._navigator.send_goal(new(NavigateToPose.Goal, pose=target))
         try:
             while not sent.done:
-                attempt.tell(_STAGING, self.node.now_ns)
+                attempt.tell(STAGING, self.node.now_ns)
                 if self.node.now_ns > deadline:
                     raise DockError(
-                        _FAILED_TO_STAGE, f"not at the staging pose after {goal.max_staging_time:g} s"
+                        FAILED_TO_STAGE, f"not at the staging pose after {goal.max_staging_time:g} s"
                     )
                 yield
         finally:
@@ -154,9 +173,9 @@ class DockingServerNode:
                 sent.cancel()
         if not sent.succeeded:
             reason = sent.error or getattr(sent.result, "error_msg", "")
-            raise DockError(_FAILED_TO_STAGE, f"cannot drive to the staging pose: {reason}")
+            raise DockError(FAILED_TO_STAGE, f"cannot drive to the staging pose: {reason}")
 
-    def _dock_at(self, attempt: _Attempt, expected: Pose2, type_: DockType) -> Work:
+    def _dock_at(self, attempt: Attempt, expected: Pose2, type_: DockType) -> Work:
         """See the dock and approach it; after a miss drive back to the staging distance and try again."""
         detection, docked = self._detection, expected
         detection.begin(expected, type_)
@@ -165,7 +184,7 @@ class DockingServerNode:
             nonlocal docked
             seen = detection.docked()
             if seen is None:
-                raise DockError(_FAILED_TO_DETECT_DOCK, f"lost sight of {detection.lacks}")
+                raise DockError(FAILED_TO_DETECT_DOCK, f"lost sight of {detection.lacks}")
             docked = seen
             return docked
 
@@ -177,43 +196,48 @@ class DockingServerNode:
             yield from self._see(attempt)
             while True:
                 try:
-                    yield from self._drive(attempt, goal, approach)
+                    yield from self._drive.drive(attempt, goal, approach)
                     return (yield from self._wait_for_charge(attempt, type_))
+                except BlindError:
+                    raise  # nor could it drive back
                 except DockError as error:
                     self._count_retry(attempt, error)
-                yield from self._back_off(attempt, staging)
+                yield from self._back_off(attempt, staging, docked)
         finally:
             detection.end()
             self._left_for = docked
 
-    def _count_retry(self, attempt: _Attempt, error: DockError) -> None:
+    def _count_retry(self, attempt: Attempt, error: DockError) -> None:
         if attempt.retries >= self.config.max_retries:
             raise DockError(error.code, f"docking failed: {error}") from error
         attempt.retries += 1
         self.node.get_logger().warn(f"docking attempt {attempt.retries}: {error}; trying again")
 
-    def _see(self, attempt: _Attempt) -> Work:
+    def _see(self, attempt: Attempt) -> Work:
         deadline = self.node.now_ns + self.config.initial_perception_timeout_ns
         while self._detection.docked() is None:
-            attempt.tell(_PERCEPTION, self.node.now_ns)
+            attempt.tell(PERCEPTION, self.node.now_ns)
             if self.node.now_ns > deadline:
-                raise DockError(_FAILED_TO_DETECT_DOCK, f"no {self._detection.lacks} in sight")
+                raise DockError(FAILED_TO_DETECT_DOCK, f"no {self._detection.lacks} in sight")
             yield
 
-    def _back_off(self, attempt: _Attempt, goal: Callable[[], Pose2]) -> Work:
-        attempt.tell(_RETRY, self.node.now_ns)
+    def _back_off(self, attempt: Attempt, goal: Callable[[], Pose2], docked: Pose2) -> Work:
+        attempt.tell(RETRY, self.node.now_ns)
+        config = self.config.undock
         try:
-            yield from self._drive(attempt, goal, self.config.undock, state=_RETRY, backward=True)
+            yield from self._drive.drive(attempt, goal, config, state=RETRY, backward=True, docked=docked)
+        except BlindError:
+            raise
         except DockError as error:
             self.node.get_logger().warn(f"backing off: {error}")
 
-    def _wait_for_charge(self, attempt: _Attempt, type_: DockType) -> Work:
+    def _wait_for_charge(self, attempt: Attempt, type_: DockType) -> Work:
         deadline = self.node.now_ns + self.config.wait_charge_timeout_ns
         while type_.is_charger and not self._is_charging(type_):
-            self._stop()
-            attempt.tell(_WAITING, self.node.now_ns)
+            self._drive.stop()
+            attempt.tell(WAITING, self.node.now_ns)
             if self.node.now_ns > deadline:
-                raise DockError(_FAILED_TO_CHARGE, "docked, but the battery is not charged")
+                raise DockError(FAILED_TO_CHARGE, "docked, but the battery is not charged")
             yield
 
     def _is_charging(self, type_: DockType) -> bool:
@@ -226,23 +250,24 @@ class DockingServerNode:
 
     def _undock_robot(self, handle: GoalHandle) -> Work:
         goal = handle.request
-        attempt = _Attempt(handle, self.node.now_ns)
+        attempt = Attempt(handle, self.node.now_ns)
         try:
             type_ = self.config.database.type_of(goal.dock_type or self._docked_type)
             pose = self._robot_pose.in_odom()
             if pose is None:
-                raise DockError(_FAILED_TO_CONTROL, "no odometry")
+                raise DockError(FAILED_TO_CONTROL, "no odometry")
             target = pose @ Pose2(-self._way_to_staging(pose, type_), 0.0, 0.0)
             config = replace(self.config.undock, time_allowance=goal.max_undocking_time)
-            yield from self._drive(attempt, lambda: target, config, backward=True)
-        except _Cancelled:
+            docked = self._left_for or pose
+            yield from self._drive.drive(attempt, lambda: target, config, backward=True, docked=docked)
+        except Cancelled:
             handle.canceled()
-            return new(UndockRobot.Result, success=False, error_code=_FAILED_TO_CONTROL, error_msg="canceled")
+            return new(UndockRobot.Result, success=False, error_code=FAILED_TO_CONTROL, error_msg="canceled")
         except DockError as error:
             handle.abort()
             return new(UndockRobot.Result, success=False, error_code=error.code, error_msg=str(error))
         finally:
-            self._stop()
+            self._drive.stop()
         self._left_for, self._docked_type = None, ""
         return new(UndockRobot.Result, success=True)
 
@@ -253,64 +278,10 @@ class DockingServerNode:
             return away
         return min(max(away + (self._left_for.inverse() @ pose).x, 0.0), away)
 
-    # Driving
 
-    def _stop(self) -> None:
-        self._publisher.publish(twist_from_planar(0.0, 0.0))
-
-    def _drive(
-        self,
-        attempt: _Attempt,
-        goal: Callable[[], Pose2],
-        config: LineApproachConfig,
-        *,
-        state: int = _CONTROLLING,
-        backward: bool = False,
-    ) -> Work:
-        """Drive to `goal()`, which may move on the way."""
-        control = LineApproach(config, goal(), backward=backward)
-        due = self.node.now_ns
-        while True:
-            attempt.check()
-            pose = self._robot_pose.in_odom()
-            if self.node.now_ns >= due and pose is not None:
-                due += self.config.controller_period_ns
-                attempt.tell(state, self.node.now_ns)
-                control.retarget(goal())
-                step = control.update(pose, self.config.controller_period_ns * 1e-9)
-                self._publisher.publish(twist_from_planar(step.v, step.w))
-                if step.done:
-                    return
-                if step.failed_reason is not None:
-                    _, lateral, yaw = control.errors(pose)
-                    where = f"{lateral:+.3f} m aside, {math.degrees(yaw):+.1f}° off"
-                    raise DockError(_FAILED_TO_CONTROL, f"{step.failed_reason}: {where}")
-            yield
-
-
-class _Attempt:
-    """One goal of either action, and how it is doing."""
-
-    def __init__(self, handle: GoalHandle, began_ns: int) -> None:
-        self.handle, self._began_ns = handle, began_ns
-        self.retries = 0
-
-    def check(self) -> None:
-        """Raise `_Cancelled` if a client wants the end."""
-        if self.handle.is_cancel_requested:
-            raise _Cancelled
-
-    def tell(self, state: int, now_ns: int) -> None:
-        """Publish feedback; undocking has none that says anything."""
-        self.check()
-        if isinstance(self.handle.request, DockRobot.Goal):
-            time = duration(now_ns - self._began_ns)
-            self.handle.publish_feedback(
-                new(DockRobot.Feedback, state=state, docking_time=time, num_retries=self.retries)
-            )
-
-    def failed(self, code: int, reason: str) -> Any:
-        """Return the result of a docking that failed."""
-        return new(
-            DockRobot.Result, success=False, error_code=code, num_retries=self.retries, error_msg=reason
-        )
+def _is_finite(goal: Any) -> bool:
+    """Whether a goal's pose and time, as far as they count, are numbers to act on."""
+    if isinstance(goal, UndockRobot.Goal):
+        return math.isfinite(goal.max_undocking_time)
+    pose = () if goal.use_dock_id else pose2_from_pose(goal.dock_pose.pose)
+    return all(map(math.isfinite, (goal.max_staging_time, *pose)))

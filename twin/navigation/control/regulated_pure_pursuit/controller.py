@@ -62,7 +62,7 @@ class RegulatedPurePursuit(Controller):
         """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
         config = self.config
         if self._handler.accept(now.path):
-            self._reached_xy = False
+            self._reached_xy = self._cancelling = self._stopped = False
         ahead = self._handler.local(now.pose)
         sign = -1.0 if ahead.reversing and config.allow_reversing else 1.0
         local = now.pose.inverse().apply(ahead.poses[:, :2])

@@ -78,6 +78,8 @@ class ActionNode(NavigatorNode):
             if goal is None:
                 return Status.FAILURE
             self._send(goal)
+        elif self.status.is_completed:
+            return self.status  # sequences tick what has ended, too
         sent = self._sent
         if sent is None:
             return Status.FAILURE

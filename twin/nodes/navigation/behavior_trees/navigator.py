@@ -87,7 +87,7 @@ class Navigator:
         self._started = self._due = 0
         self._unplanned: Path | None = None
         self._progress = Progress(context.filter_duration_ns)
-        ActionServer(
+        self._server = ActionServer(
             context.node,
             setup.action,
             setup.name,
@@ -98,8 +98,8 @@ class Navigator:
 
     @property
     def is_active(self) -> bool:
-        """Whether a goal is being executed."""
-        return self._active is not None
+        """Whether a goal was accepted and has not ended, be it that it still waits for the robot's pose."""
+        return bool(self._server.goals)
 
     def failure(self) -> tuple[int, str]:
         """Return the lowest error code on the blackboard with its message; (0, '') if there is none."""
