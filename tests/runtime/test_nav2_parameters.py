@@ -239,6 +239,7 @@ docking_server:
       filter_coef: 0.1
     docks: ["home"]
     home: {type: my_dock, frame: map, pose: [1.0, 2.0, 0.5]}
+    controller: {k_phi: 3.0, simulation_step: 0.1, projection_time: 2.5}
 smoother_server:
   ros__parameters:
     smoother_plugins: ["simple_smoother"]
@@ -257,7 +258,11 @@ def test_docks_and_smoothers_of_the_file(tmp_path: Path) -> None:
     assert docking.controller_period_ns == 50_000_000
     assert docking.max_retries == 1, "the scenario goes first"
     assert got.path_smoother.simple_smoother.max_its == 77
-    assert told == ["nav2.yaml: docking_server does not have my_dock.filter_coef"]
+    assert docking.controller.projection_time == 2.5
+    assert told == [
+        "nav2.yaml: docking_server does not have my_dock.filter_coef, controller.k_phi, "
+        "controller.simulation_step"
+    ]
 
 
 def test_a_dock_of_the_file_that_cannot_be(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ _ONLY_NAV2S = (
     "max_angular_decel",
     "max_angular_vel",
     "max_linear_accel",
+    "simulation_step",
     "transform_tolerance",
     "yaw_goal_tolerance",
 )
