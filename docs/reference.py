@@ -24,6 +24,7 @@ from twin.bridge.topics import Publisher, Subscription
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.docking.collision_check import DockCollisionConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig
@@ -233,6 +234,7 @@ PARAMETERS = (
     Parameters("/waypoint_follower", WaypointFollowerConfig),
     Parameters("/docking_server", DockingServerConfig),
     Parameters("/docking_server, sights of the dock", DockEstimateConfig, "estimate."),
+    Parameters("/docking_server, what is in the way", DockCollisionConfig, "controller."),
 )
 
 

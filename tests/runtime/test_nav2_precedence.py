@@ -78,6 +78,18 @@ def test_further_controllers_have_their_own_keys(tmp_path: Path) -> None:
     assert controllers["Precise"].vx_max == 0.4, "what the scenario says of FollowPath is not of Precise"
 
 
+def test_a_plugin_that_both_name_has_the_files_section(tmp_path: Path) -> None:
+    """Where the file has no shim, the scenario's default shim is none either, unless it is asked for."""
+    for config, vx_max in (({"plugin": "mppi"}, 0.45), ({"plugin": "mppi", "vx_max": "0.8 m/s"}, 0.8)):
+        controllers: Any = applied(
+            tmp_path, CONTROLLERS, {"controller": config}
+        ).controller_server.controllers
+        assert controllers["FollowPath"].vx_max == vx_max
+    asked = {"controller": {"plugin": "mppi", "rotation_shim": True}}
+    controllers = applied(tmp_path, CONTROLLERS, asked).controller_server.controllers
+    assert type(controllers["FollowPath"]).__name__ == "RotationShimConfig"
+
+
 def test_goal_checkers_of_further_controllers(tmp_path: Path) -> None:
     text = (
         "controller_server: {ros__parameters: {general_goal_checker: {xy_goal_tolerance: 0.2}, "

@@ -58,7 +58,9 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         update = {"rotation_shim": True, "plugin": _CONTROLLERS.get(primary)}
     else:
         update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
-    if update["plugin"] and not {"plugin", "rotation_shim"} & controller.model_fields_set:
+    given = controller.model_fields_set
+    may_be = "plugin" not in given or controller.plugin == update["plugin"]
+    if update["plugin"] and may_be and "rotation_shim" not in given:
         controller = controller.model_copy(update=update)
     for key, section, classes in (
         ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
