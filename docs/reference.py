@@ -15,22 +15,26 @@ import sys
 import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from twin.bridge.bus import Bus
+from twin.bridge.node import Node
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.docking.collision_check import DockCollisionConfig
 from twin.navigation.docking.dock_estimate import DockEstimateConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
+from twin.nodes.node_parameters import parameter_names
 from twin.runtime.build import build
 from twin.scenario.schema import json_schema, load
 from twin.warehouse.arena_file import ArenaFile
@@ -206,25 +210,39 @@ def _flow(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
-PARAMETERS: Mapping[str, type[Any]] = {
-    "/amcl": AmclConfig,
-    "/planner_server": ThetaStarConfig,
-    "/controller_server, regulated pure pursuit": RegulatedPurePursuitConfig,
-    "/controller_server, goal checker": GoalCheckerConfig,
-    "/controller_server, progress checker": ProgressCheckerConfig,
-    "/behavior_server": BehaviorConfig,
-    "/bt_navigator": BtNavigatorConfig,
-    "/waypoint_follower": WaypointFollowerConfig,
-    "/docking_server": DockingServerConfig,
-    "/docking_server, sights of the dock": DockEstimateConfig,
-}
+class Parameters(NamedTuple):
+    """What a table of parameters shows."""
+
+    title: str
+    """Name of the node, and after a comma which of its parameters."""
+    config: type[Any]
+    prefix: str = ""
+    """Of their names in ROS."""
+    setters: str = ""
+    """Who sets them, if they are no ROS parameters."""
+
+
+PARAMETERS = (
+    Parameters("/amcl", AmclConfig),
+    Parameters("/planner_server", ThetaStarConfig, "GridBased."),
+    Parameters("/controller_server", ControllerServerConfig),
+    Parameters("/controller_server, regulated pure pursuit", RegulatedPurePursuitConfig, "FollowPath."),
+    Parameters("/controller_server, goal checker", GoalCheckerConfig, "general_goal_checker."),
+    Parameters("/controller_server, progress checker", ProgressCheckerConfig, "progress_checker."),
+    Parameters("/behavior_server", BehaviorConfig, setters="a `params_file` sets them"),
+    Parameters("/bt_navigator", BtNavigatorConfig),
+    Parameters("/waypoint_follower", WaypointFollowerConfig),
+    Parameters("/docking_server", DockingServerConfig),
+    Parameters("/docking_server, sights of the dock", DockEstimateConfig, "estimate."),
+    Parameters("/docking_server, what is in the way", DockCollisionConfig, "controller."),
+)
 
 
 def stack() -> tuple[str, str]:
     """Return the tables of nodes and of parameters, as the warehouse scenario builds them."""
     parts = build(load(DOCS.parent / "scenarios" / "warehouse.yaml"))
     try:
-        return _nodes(parts.bus), _parameters()
+        return _nodes(parts.bus), _parameters(parts.bus)
     finally:
         parts.bus.close()
 
@@ -252,32 +270,45 @@ def _names(names: Iterator[str]) -> str:
     return ", ".join(found)
 
 
-def _parameters() -> str:
+def _parameters(bus: Bus) -> str:
     gc.collect()
     alive = gc.get_objects()
+    nodes = {node.fully_qualified_name: node for node in bus.nodes}
     lines = []
-    for title, kind in PARAMETERS.items():
-        found = [item for item in alive if type(item) is kind]
+    for shown in PARAMETERS:
+        found = [item for item in alive if type(item) is shown.config]
         # Defaults of dataclass fields are alive, too; what the robot has is another one, or the same.
-        config = next((item for item in found if item != kind()), found[0])
-        lines += _table(title, config, skip=())
+        config = next((item for item in found if item != shown.config()), found[0])
+        lines += _table(shown, config, nodes[shown.title.partition(",")[0]])
     costmaps = {item.name: item.layers for item in alive if type(item) is CostmapNodeConfig}
     for name, layers in sorted(costmaps.items()):
-        lines += _table(f"/{name}/{name}", layers, skip=("footprint", "robot_radius"))
+        setters = "the scenario or a `params_file` sets them"
+        shown = Parameters(f"/{name}/{name}", type(layers), setters=setters)
+        lines += _table(shown, layers, nodes[shown.title])
     return "\n".join(lines)
 
 
-def _table(title: str, config: Any, skip: tuple[str, ...]) -> list[str]:
-    lines = [f"### `{title}`", "", "| Parameter | Value | Meaning |", "|---|---|---|"]
+def _table(shown: Parameters, config: Any, node: Node) -> list[str]:
+    """Return a table with names and values as the node declares them, if it does."""
+    lines = [f"### `{shown.title}`", ""]
+    if shown.prefix:
+        lines += [f"All names begin with `{shown.prefix}`.", ""]
+    if shown.setters:
+        lines += [f"No ROS parameters: {shown.setters}.", ""]
+    lines += ["| Parameter | Value | Meaning |", "|---|---|---|"]
     meanings = _field_docs(type(config))
     for field in dataclasses.fields(config):
         value = getattr(config, field.name)
-        if field.name not in skip and isinstance(value, bool | int | float | str):
-            meaning = _flow(meanings.get(field.name, ""))
-            text = str(value).lower() if isinstance(value, bool) else _plain(value)
-            if field.name.endswith("_ns"):
-                text = f"{float(value) / 1e6:g} ms"
-            lines.append(f"| `{field.name}` | {text} | {meaning} |")
+        if field.name in ("footprint", "robot_radius") or not isinstance(value, bool | int | float | str):
+            continue
+        (name,) = parameter_names({field.name: value})
+        if not shown.setters:
+            value = node.get_parameter(shown.prefix + name).value
+        text = str(value).lower() if isinstance(value, bool) else _plain(value)
+        meaning = _flow(meanings.get(field.name, "")).replace("[ns]", "[s]")
+        if field.name.endswith("period_ns"):
+            meaning = f"[Hz]; {meaning}".removesuffix("; ")
+        lines.append(f"| `{name}` | {text} | {meaning} |")
     return [*lines, ""]
 
 

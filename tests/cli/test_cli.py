@@ -275,6 +275,7 @@ def test_wrong_options_say_what_is_valid() -> None:
         RunOptions(
             scenario=Path("a.yaml"),
             overrides={"x": "1", "seed": "3"},
+            params_file=Path(__file__),
             pace=0.5,
             listen=("tcp/1",),
             nodes=("n.py:make",),
@@ -302,6 +303,24 @@ def test_options_survive_the_way_to_a_child(
     code, _, err = invoke(*options.arguments(Path("out")))
     assert (code, err) == (0, "")
     assert understood == [options]
+
+
+def test_another_parameter_file_for_the_robots_that_navigate(
+    demo: Path, runtime: FakeRuntime, invoke: Invoke
+) -> None:
+    given = "localisation: {type: amcl, map: warehouse}, navigation: {params_file: own.yaml}"
+    demo.write_text(SCENARIO.replace("model: diff_bot", f"model: warehouse_bot, {given}"), encoding="utf-8")
+    for name in ("own.yaml", "other.yaml"):
+        demo.with_name(name).write_text("{}\n", encoding="utf-8")
+    assert invoke("run", str(demo))[0] == 0
+    assert invoke("run", str(demo), "--params-file", "other.yaml")[0] == 0
+    files = [call["scenario"].robots[0].navigation.params_file for call in runtime.calls]
+    assert files == [str(demo.with_name("own.yaml")), str(demo.with_name("other.yaml"))]
+    code, _, err = invoke("run", str(demo), "--params-file", "absent.yaml")
+    assert (code, "absent.yaml" in err) == (2, True)
+    demo.write_text(SCENARIO, encoding="utf-8")
+    code, _, err = invoke("run", str(demo), "--params-file", "other.yaml")
+    assert (code, "no robot of 'demo' has it" in err) == (2, True)
 
 
 def child(digests: Iterator[str | None], passed: bool = True) -> Callable[[RunOptions, Path], dict[str, Any]]:

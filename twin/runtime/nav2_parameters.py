@@ -10,6 +10,7 @@ from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNodeConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking_server import NAMES as DOCKING_NAMES
+from twin.runtime import nav2_given
 from twin.runtime.nav2_checks import (
     NavigatorParameters,
     VelocitySmootherParameters,
@@ -23,7 +24,6 @@ from twin.runtime.navigation_config import NavigationParameters
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
-from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
 
 _CONTROLLER_NAMES = dict.fromkeys(
@@ -34,18 +34,12 @@ _CONTROLLERS = {
     "DWBLocalPlanner": "dwb",
     "MPPIController": "mppi",
 }
-
-
 _GOAL_CHECKERS = {
     "SimpleGoalChecker": "simple",
     "StoppedGoalChecker": "stopped",
     "PositionGoalChecker": "position",
 }
 _PROGRESS_CHECKERS = {"SimpleProgressChecker": "simple", "PoseProgressChecker": "pose"}
-_PLUGINS = frozenset({"goal_checker", "plugin", "progress_checker", "rotation_shim"})
-"""What a scenario chooses; the chosen ones' parameters may come from the file."""
-_DOCKS = frozenset({"docks", "pose", "type", "frame"})
-"""Of a dock: these are read together."""
 
 
 def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
@@ -64,7 +58,9 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         update = {"rotation_shim": True, "plugin": _CONTROLLERS.get(primary)}
     else:
         update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
-    if update["plugin"] and not {"plugin", "rotation_shim"} & controller.model_fields_set:
+    given = controller.model_fields_set
+    may_be = "plugin" not in given or controller.plugin == update["plugin"]
+    if update["plugin"] and may_be and "rotation_shim" not in given:
         controller = controller.model_copy(update=update)
     for key, section, classes in (
         ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
@@ -145,17 +141,15 @@ def with_file(
     if config.params_file is None:
         return parameters, []
     file = Nav2Parameters(Path(config.params_file), namespace)
-    speeds = {
-        "linear.max_velocity": config.max_linear_speed,
-        "angular.max_velocity": config.max_angular_speed,
-    }
     docking = parameters.docking
     docking = replace(docking, database=database_of(file, docking.database))
-    given = frozenset(name for name, speed in speeds.items() if speed is not None)
     changed = replace(
         parameters,
         smoother=file.applied(
-            "velocity_smoother", parameters.smoother, keep=given, limits=VelocitySmootherParameters
+            "velocity_smoother",
+            parameters.smoother,
+            keep=nav2_given.for_smoother(config),
+            limits=VelocitySmootherParameters,
         ),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
@@ -163,21 +157,26 @@ def with_file(
             "planner_server",
             parameters.planner,
             prefix="GridBased.",
-            keep=_given(config.planner),
+            keep=nav2_given.for_planner(config.planner),
             limits=PlannerParameters,
         ),
         controller_server=file.applied(
             "controller_server",
             parameters.controller_server,
             _CONTROLLER_NAMES,
-            keep=_given(config.controller) - _PLUGINS,
+            keep=nav2_given.for_controllers(config),
             limits=ControllerParameters,
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
-        docking=file.applied("docking_server", docking, DOCKING_NAMES, keep=_given(config.docking) | _DOCKS),
+        docking=file.applied(
+            "docking_server", docking, DOCKING_NAMES, keep=nav2_given.for_docking(config.docking)
+        ),
         path_smoother=file.applied("smoother_server", parameters.path_smoother),
         navigator=file.applied(
-            "bt_navigator", parameters.navigator, keep=_given(config.navigator), limits=NavigatorParameters
+            "bt_navigator",
+            parameters.navigator,
+            keep=nav2_given.for_navigator(config.navigator),
+            limits=NavigatorParameters,
         ),
         waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
     )
@@ -186,13 +185,8 @@ def with_file(
     return changed, file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))
 
 
-def _given(group: ParameterGroup) -> frozenset[str]:
-    """Return the names that the scenario gives, which go before the file's."""
-    return frozenset(group.overrides())
-
-
-def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: ParameterGroup) -> CostmapNodeConfig:
-    node, keep = f"{config.name}/{config.name}", _given(group)
+def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
+    node, keep = f"{config.name}/{config.name}", nav2_given.for_costmap(group)
     scans, ranges = sources_of(file, node)
     config = replace(
         config,

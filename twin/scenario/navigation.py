@@ -88,7 +88,7 @@ class NavigationConfig(StrictModel):
     collision_monitor: CollisionMonitorParameters | None = None
     """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
-    """A Nav2 parameter file; keys below go before its values."""
+    """A Nav2 parameter file; all other keys here go before its values."""
     navigator: NavigatorParameters = NavigatorParameters()
     """Overrides of the navigator."""
     keepout_mask: NameOrPath | None = None

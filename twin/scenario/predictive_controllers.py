@@ -37,7 +37,8 @@ class PathCriticParameters(NearCriticParameters):
     """A critic of the path."""
 
     offset_from_furthest: Annotated[int, Field(ge=0)] | None = None
-    """Poses of the path, 5 cm apart, past the furthest that a rollout reaches; see docs."""
+    """How many poses of the path, 5 cm apart, past the furthest one that a rollout reaches it aims at; of
+    PathAlignCritic: how many must be reached before it scores."""
     trajectory_point_step: _Power | None = None
     """Every so many points of a rollout are looked at (PathAlignCritic)."""
 

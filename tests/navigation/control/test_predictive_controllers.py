@@ -12,6 +12,7 @@ from twin.geometry import Pose2, wrap_angle
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import (
+    CRITICS,
     CostCriticConfig,
     GoalAngleCriticConfig,
     GoalCriticConfig,
@@ -19,6 +20,8 @@ from twin.navigation.control.mppi.config import (
     PathAlignCriticConfig,
     PathAngleCriticConfig,
     SpeedCriticConfig,
+    TwirlingCriticConfig,
+    VelocityDeadbandCriticConfig,
 )
 from twin.navigation.control.mppi.controller import MPPI
 from twin.navigation.control.mppi.sent_commands import SentCommands
@@ -318,3 +321,59 @@ def test_mppi_knows_what_is_under_way_at_another_period_than_its_models() -> Non
         v, _ = controller.compute_velocity(Pose2(1.0, 2.0, 0.0), (v, 0.0), line(1.0, 6.5, 2.0), hall(), DT)
         speeds.append(v)
     assert controller._under_way[0] == pytest.approx([speeds[-2]] * 2 + [speeds[-1]] * 2)
+
+
+# critics that score only if they are listed
+
+
+def listed(name: str, **critics: object) -> MPPIConfig:
+    return replace(MPPI_CONFIG, critics=(*CRITICS, name), **critics)  # type: ignore[arg-type]
+
+
+def first_command(config: MPPIConfig, start: Pose2, v: float) -> tuple[float, float]:
+    controller = create_controller(config, FOOTPRINT)
+    return controller.compute_velocity(start, (v, 0.0), line(1.0, 6.5, 2.0), hall(), DT)
+
+
+def test_a_twirling_critic_turns_less() -> None:
+    start = Pose2(1.0, 2.4, 0.0)
+    plain = first_command(MPPI_CONFIG, start, 0.5)
+    critic = TwirlingCriticConfig(cost_weight=60.0)
+    calm = first_command(listed("TwirlingCritic", TwirlingCritic=critic), start, 0.5)
+    assert abs(calm[1]) < 0.7 * abs(plain[1])
+    unlisted = first_command(replace(MPPI_CONFIG, TwirlingCritic=critic), start, 0.5)
+    assert unlisted == plain
+
+
+def test_a_deadband_critic_avoids_speeds_that_the_drive_would_not_obey() -> None:
+    corridor = hall((2.0, 0.1, 6.0, 1.65), (2.0, 2.35, 6.0, 3.9))
+
+    def speed(config: MPPIConfig) -> float:
+        controller, pose, v, w, steps = (
+            create_controller(config, FOOTPRINT),
+            Pose2(3.0, 2.0, 0.0),
+            0.6,
+            0.0,
+            0,
+        )
+        while pose.x < 4.5:
+            v, w = controller.compute_velocity(pose, (v, w), line(1.0, 7.0, 2.0), corridor, DT)
+            pose = pose @ Pose2(v * DT, 0.0, 0.0) @ Pose2(0.0, 0.0, w * DT)
+            steps += 1
+            assert steps < 200
+        return (pose.x - 3.0) / (steps * DT)
+
+    critic = VelocityDeadbandCriticConfig(deadband_velocities=(0.9, 0.0, 0.0))
+    obeyed = speed(listed("VelocityDeadbandCritic", VelocityDeadbandCritic=critic))
+    assert speed(MPPI_CONFIG) < 0.65 < 0.8 < obeyed, "SpeedCritic's is slower"
+
+
+def test_an_obstacles_critic_keeps_off_as_the_cost_critic_does() -> None:
+    room, start = hall((2.0, 0.1, 5.0, 1.7)), Pose2(1.0, 2.0, 0.0)
+    blind = tuple(name for name in CRITICS if name not in ("CostCritic", "SpeedCritic"))
+    middle = [
+        drive(shimmed(replace(MPPI_CONFIG, critics=critics)), start, line(1.0, 6.5, 2.0), room)
+        for critics in (blind, (*blind, "ObstaclesCritic"))
+    ]
+    beside = [log[(log[:, 0] > 3.0) & (log[:, 0] < 4.0), 1].mean() for log in middle]
+    assert beside[1] > beside[0] + 0.01

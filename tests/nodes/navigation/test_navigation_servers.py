@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.nodes.conftest import Bench, Robot, map_of_room, open_room
+from tests.nodes.conftest import Bench, Robot, Room, box, map_of_room, open_room
 from tests.nodes.navigation.servers import LAYERS, Stack
 from twin.bridge.action_types import ComputePathToPose
 from twin.bridge.actions import ActionClient
@@ -66,6 +67,22 @@ def test_an_obstacle_on_no_map_is_marked_and_cleared_again(bench: Bench, stack: 
     stack.room.segments = walls
     bench.run(0.5)
     assert stack.cost(-0.98, 0.0) == 0, "beams pass through it: it is gone"
+
+
+@pytest.mark.parametrize("inf_is_valid", [True, False])
+def test_a_ray_without_return_clears_if_inf_is_valid(bench: Bench, inf_is_valid: bool) -> None:
+    pillar, crate = box(-2.0, -0.2, -1.8, 0.2), box(1.02, -0.2, 1.2, 0.2)
+    room = Room(np.concatenate([pillar, crate]))
+    layers = replace(LAYERS, rolling_window=True, track_unknown_space=False, inf_is_valid=inf_is_valid)
+    config = CostmapNodeConfig(name="local_costmap", frame="odom", layers=layers)
+    node = CostmapNode(bench.bus, Robot(bench, room).pose_lookup, config)
+    costs = []
+    for seen in (room.segments, pillar):
+        room.segments = seen
+        bench.run(0.5)
+        assert node.costmap is not None
+        costs.append(node.costmap.cost_at(1.03, 0.0))
+    assert costs == [254, 0 if inf_is_valid else 254]
 
 
 def test_the_clear_service_forgets_obstacles_but_not_the_map(bench: Bench, stack: Stack) -> None:

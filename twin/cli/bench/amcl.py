@@ -27,7 +27,7 @@ def amcl(
 ) -> None:
     """Track while driving to random goals, localise from anywhere, recover from being carried away.
 
-    Exit code 1: tracking over 0.03 m or 0.5 degrees rms, NEES outside 0.5 ... 6, the filter below 30x real
+    Exit code 1: tracking over 0.03 m or 0.5 degrees rms, NEES outside 1.5 ... 5, the filter below 30x real
     time, less than 95 % of the starts or not every kidnapped robot right.
     """
     from twin.benchmarks.amcl.relocation import globally, kidnapped

@@ -29,7 +29,7 @@ class ControllerServerConfig:
     failure_tolerance_ns: int = 300_000_000
     """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
     costmap_update_timeout_ns: int = 5_000_000_000
-    """How long the robot stands and waits for a local costmap that is not current; Nav2: 0.3 s [ns]."""
+    """How long the robot stands and waits for a local costmap that is not current [ns]; Nav2: 0.3 s."""
     maneuver: ManeuverConfig = field(default_factory=ManeuverConfig)
     """How a robot that stands blocked gets free; Nav2 leaves that to recoveries."""
     min_x_velocity_threshold: float = 0.0001
