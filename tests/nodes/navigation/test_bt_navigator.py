@@ -307,6 +307,17 @@ def test_a_tree_that_is_wrong_or_missing_ends_the_goal_not_the_run(stack: Stack,
     assert "did you mean 'navigate_to_pose'?" in result.error_msg
 
 
+def test_an_entry_of_the_blackboard_that_is_no_number_ends_the_goal(stack: Stack, tmp_path: Path) -> None:
+    nodes = """<Sequence>
+        <SetBlackboard value="soon" output_key="time"/>
+        <Wait wait_duration="{time}"/>
+    </Sequence>"""
+    result = stack.until_done(stack.go(1.0, 0.0, tree=tree(tmp_path, nodes)), 1.0)
+    assert result.error_code == 9000
+    assert "Wait: wait_duration must be a number" in result.error_msg
+    assert "{time} is 'soon'" in result.error_msg
+
+
 def test_a_wrong_default_tree_is_refused_when_the_node_is_made(bench: Bench) -> None:
     with pytest.raises(NavigationError, match=r"there is no behaviour tree 'none\.xml'"):
         Stack(bench, BtNavigatorConfig(default_nav_to_pose_bt_xml="none.xml"))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar
 
+from twin.errors import NavigationError
 from twin.navigation.behavior_trees.blackboard import Blackboard
 from twin.navigation.behavior_trees.ports import Port, is_pointer, read_value
 
@@ -109,7 +110,11 @@ class TreeNode(ABC):
     # Ports
 
     def get(self, name: str) -> Any:
-        """Return an input port's value; None if it is empty and has no default."""
+        """Return an input port's value; None if it is empty and has no default.
+
+        Raises:
+            NavigationError: the blackboard's entry is a text that is no such value.
+        """
         port, text = self._ports[name], self._texts.get(name)
         if text is None:
             return port.default
@@ -117,8 +122,14 @@ class TreeNode(ABC):
             return read_value(text, port.type)
         value = self.blackboard.get(self._entry(name, text))
         if isinstance(value, str) and port.type not in ("string", "any", "message"):
-            return read_value(value, port.type)
+            return self._read(name, text, value)
         return port.default if value is None else value
+
+    def _read(self, name: str, text: str, value: str) -> Any:
+        try:
+            return read_value(value, self._ports[name].type)
+        except ValueError as error:
+            raise NavigationError(f"{self.name}: {name} {error}; {text} is {value!r}") from error
 
     def get_or_entry(self, name: str) -> Any:
         """Return a port's value, or the blackboard entry of its name if the file leaves the port out."""

@@ -13,9 +13,6 @@ from twin.navigation.control.regulated_pure_pursuit.collision_check import Colli
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 
-_STILL_THERE = 0.25
-"""A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
-
 
 class RegulatedPurePursuit(Controller):
     """Drives the arc to a point of the path ahead; plans nothing."""
@@ -114,8 +111,7 @@ class RegulatedPurePursuit(Controller):
             off: Distance to its end [m].
             bearing: Of the carrot [rad].
         """
-        self._reached_xy |= ahead.ends_at_goal and off < self._tolerance
-        self._reached_xy &= off < self._tolerance + _STILL_THERE
+        self._reached_xy = self._is_there(self._reached_xy, off, at_end=ahead.ends_at_goal)
         if not self.config.use_rotate_to_heading:
             return None
         if self._reached_xy:

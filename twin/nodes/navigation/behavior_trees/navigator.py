@@ -141,6 +141,9 @@ class Navigator:
                 yield
             handle.abort()
             return self._result(0, "preempted by another goal")
+        except NavigationError as error:
+            handle.abort()
+            return self._failed(_UNKNOWN, f"the behaviour tree {self._tree.name!r} cannot go on: {error}")
         finally:
             if self._active is handle:
                 self._active = None
