@@ -51,7 +51,8 @@ def collision_ahead(
             return None
         pose = pose @ Pose2(step.v * dt, 0.0, step.w * dt)
         if pose.distance(docked) < config.dock_collision_threshold:
-            continue
-        if collision_step(costmap, footprint, pose, (0.0, 0.0), 0.0, 0) == 0:
+            if not approach.backward:
+                return None  # the rest leads nearer still
+        elif collision_step(costmap, footprint, pose, (0.0, 0.0), 0.0, 0) == 0:
             return pose
     return None

@@ -34,7 +34,7 @@ class DockDetection:
     def begin(self, docked: Pose2, type_: DockType) -> None:
         """Look for the dock at which the base would stand at `docked`, in the odom frame."""
         self._type, self._expected = type_, docked
-        self._estimate = None
+        self._estimate, self._scans = None, ScanInput(self._robot_pose, self._node.now_ns)
         if type_.detection != "none" and not type_.use_external_detection_pose:
             face = docked @ type_.T_detected_docked.inverse()
             self._estimate = DockEstimate(
@@ -78,8 +78,7 @@ class DockDetection:
         self._told = message
 
     def _on_scan(self, message: LaserScan) -> None:
-        usable = self._scans.accept(message, self._node.now_ns)
-        if self._estimate is None or not usable:
+        if self._estimate is None or not self._scans.accept(message, self._node.now_ns):
             return
         frames = self._robot_pose.frames
         T_base_lidar = self._robot_pose.at_stamp(frames.base, message.header)
