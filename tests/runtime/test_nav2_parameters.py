@@ -11,17 +11,15 @@ from typing import Any
 
 import pytest
 
+from tests.runtime.nav2_robot import applied
 from twin.controllers.limiter import AxisLimits
 from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
-from twin.models.specs import DriveSpec
-from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.docking.docks import Dock
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.costmap import CostmapNodeConfig
-from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file, with_file, with_plugins
-from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file
+from twin.runtime.navigation_config import NavigationParameters
 from twin.runtime.overrides import overridden
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import NavigationConfig
@@ -86,24 +84,6 @@ waypoint_follower:
     wait_at_waypoint: {{waypoint_pause_duration: 300}}
 """
 RPP = "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
-
-
-def applied(
-    tmp_path: Path, text: str, config: dict[str, object] | None = None, namespace: str = ""
-) -> tuple[NavigationParameters, list[str]]:
-    file = tmp_path / "nav2.yaml"
-    file.write_text(text)
-    scenario = NavigationConfig.model_validate({"params_file": str(file), **(config or {})})
-    drive = DriveSpec(
-        kind="diff_drive",
-        left_joints=("left",),
-        right_joints=("right",),
-        wheel_separation=0.3,
-        wheel_radius=0.05,
-    )
-    scenario = with_plugins(scenario, namespace)
-    before = navigation_parameters(scenario, drive, rectangle(0.3, 0.3), Frames())
-    return with_file(before, scenario, namespace)
 
 
 def _controller(got: NavigationParameters) -> Any:

@@ -5,30 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from twin.models.specs import DriveSpec
-from twin.navigation.costmaps.footprint import rectangle
-from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.nav2_parameters import with_file, with_plugins
-from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
-from twin.scenario.navigation import NavigationConfig
+from tests.runtime import nav2_robot
+from twin.runtime.navigation_config import NavigationParameters
 
 
 def applied(tmp_path: Path, text: str, config: dict[str, Any]) -> NavigationParameters:
-    file = tmp_path / "nav2.yaml"
-    file.write_text(text)
-    scenario = NavigationConfig.model_validate({"params_file": str(file), **config})
-    drive = DriveSpec(
-        kind="diff_drive",
-        left_joints=("left",),
-        right_joints=("right",),
-        wheel_separation=0.3,
-        wheel_radius=0.05,
-    )
-    scenario = with_plugins(scenario, "")
-    parameters, _ = with_file(
-        navigation_parameters(scenario, drive, rectangle(0.3, 0.3), Frames()), scenario, ""
-    )
-    return parameters
+    return nav2_robot.applied(tmp_path, text, config)[0]
 
 
 SMOOTHER = """\

@@ -11,7 +11,7 @@ import numpy as np
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 
-STILL_THERE = 0.25
+_STILL_THERE = 0.25
 """A goal once reached is so no more when the robot is farther off than the tolerance by so much [m]."""
 _NO_COSTMAP = Costmap(costs=np.zeros((1, 1), dtype=np.uint8), resolution=1.0)
 
@@ -119,7 +119,7 @@ class Controller(ABC):
             at_end: Whether the goal is what is driven to now: a path may pass by its own end.
         """
         if was_there:
-            return off <= self._tolerance + STILL_THERE
+            return off <= self._tolerance + _STILL_THERE
         return at_end and off <= self._tolerance
 
     def cancel(self) -> bool:

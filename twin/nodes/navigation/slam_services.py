@@ -48,12 +48,8 @@ class SlamServices:
     def _on_serialize(self, request: Any) -> Any:
         try:
             self._owner.slam.save(Path(request.filename))
-        except MapError as fault:
-            self._say(f"serialize_map refused: {fault}")
-            failed = SerializePoseGraph.Response.RESULT_FAILED_TO_WRITE_FILE
-            return new(SerializePoseGraph.Response, result=failed)
-        except OSError as fault:
-            self._say(f"{request.filename}: the pose graph cannot be written there: {fault}")
+        except (OSError, MapError) as fault:
+            self._say(f"serialize_map: the pose graph is not written: {fault}")
             failed = SerializePoseGraph.Response.RESULT_FAILED_TO_WRITE_FILE
             return new(SerializePoseGraph.Response, result=failed)
         return new(SerializePoseGraph.Response)

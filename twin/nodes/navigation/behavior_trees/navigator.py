@@ -22,9 +22,9 @@ from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 SHIPPED = FilePath(__file__).parent / "trees"
 
 _UNKNOWN, _FAILED_TO_LOAD, _TF_ERROR = 0, 1, 2
+"""Added to 9000 for navigate_to_pose, to 9100 for navigate_through_poses."""
 _POSE_PATIENCE_NS = 2_000_000_000
 """How long a goal waits for a robot that is not localised yet [ns]."""
-"""Added to 9000 for navigate_to_pose, to 9100 for navigate_through_poses."""
 
 
 def tree_file(name: str) -> FilePath:
