@@ -6,9 +6,11 @@ Copy an array by a loop: to assign one to a slice compiles numba's message about
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numba
+
+from twin.navigation._kernel_cache import KernelCache
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -18,9 +20,15 @@ _REORDER = {"reassoc", "contract", "nsz", "arcp"}
 
 def jit(function: F) -> F:
     """Return `function` compiled at its first call; the machine code is cached beside the source."""
-    return cast(F, numba.njit(cache=True)(function))
+    return _cached(numba.njit(function))
 
 
 def fast_jit(function: F) -> F:
     """As `jit`, for loops over many numbers: sums may be taken in another order, and so eight at a time."""
-    return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=_REORDER)(function))
+    return _cached(numba.njit(error_model="numpy", fastmath=_REORDER)(function))
+
+
+def _cached(dispatcher: Any) -> Any:
+    """Do as `numba.njit(cache=True)` does, with a cache that sees what other files give to the function."""
+    dispatcher._cache = KernelCache(dispatcher)
+    return dispatcher
