@@ -17,10 +17,11 @@ import pytest
 from tests.bridge import bag_helpers as bags
 from tests.processes import free_endpoint
 from twin.bridge import live
+from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.replay import replay
 from twin.bridge.bags.tap import BagTap
-from twin.bridge.bags.writer import BagConfig
+from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
@@ -66,6 +67,27 @@ def record(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def bag_of_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("run") / "one")
+
+
+def test_what_is_no_message_is_left_out_and_what_follows_one_is_ignored(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    exact = codec(String).encode(String("whole"))
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic(BagTopic(name="/in", type=String.__msgtype__))
+        for time_ns, data in enumerate((exact + b"\xa5" * 8, exact[:-3], exact)):
+            writer.write(BagMessage("/in", data, time_ns, time_ns, time_ns))
+    heard: list[str] = []
+    with BagReader(tmp_path / "bag") as bag:
+        replay(
+            bag,
+            lambda bus: bus.create_node("a").create_subscription(
+                String, "in", lambda m: heard.append(m.data)
+            ),
+        )
+    assert heard == ["whole", "whole"]
+    assert "/in: 8 bytes after a message are ignored" in caplog.text
+    assert "/in: a message from outside was dropped (payload: not a std_msgs/msg/String" in caplog.text
 
 
 def amcl(config: AmclConfig, seed: int = 3) -> Callable[[Bus], Any]:

@@ -296,6 +296,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock:
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
             **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
+            **({"trailing_bytes": float(simulation.bus.trailing)} if simulation.bus.trailing else {}),
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=clock != "free" and not (simulation.lockstep and simulation.lockstep.surplus),
