@@ -36,13 +36,16 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a
 soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory
 	$(BIN)/python -m tests.benchmarks.soak
 
-oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations
+oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
 	$(BIN)/python -m pytest tests/convert/test_pinocchio.py tests/models/test_kinematics.py
 	$(BIN)/python -m tests.oracles.example_robots
 	$(PYTHON) -m venv build/wire_oracle
 	build/wire_oracle/bin/python -m pip install --quiet --disable-pip-version-check zenoh-ros2-sdk==0.1.8 pamoja-ros2==0.2.0
 	TWIN_WIRE_ORACLE=build/wire_oracle/bin/python $(BIN)/python -m pytest tests/bridge/test_wire_oracles.py
+	$(PYTHON) -m venv build/rclpy_oracle
+	build/rclpy_oracle/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/bridge/rclpy_requirements.txt
+	TWIN_RCLPY_ORACLE=build/rclpy_oracle/bin/python $(BIN)/python -m pytest tests/bridge/test_cdr_rclpy.py
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 
 from tests.bridge import bag_helpers as bags
+from twin.bridge import types
 from twin.bridge.bags.convert import convert
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.bags.writer import BagWriter
 from twin.bridge.cdr.codec import codec
+from twin.bridge.msgs import JointState, new
+from twin.errors import RecordingError
 
 ALL = 2 * bags.COUNT + 1
 
@@ -83,8 +86,6 @@ def test_we_read_what_rosbags_writes(tmp_path: Path, storage: str, mode: str) ->
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 
-    from twin.bridge import types
-
     path = tmp_path / "theirs"
     writer = Writer(path, version=8, storage_plugin=StoragePlugin[storage])
     writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
@@ -117,6 +118,37 @@ def test_a_ros1_bag_becomes_ros2_and_back(tmp_path: Path) -> None:
         }
 
 
+@pytest.mark.parametrize("name", ["sensor_msgs/msg/JointState", "std_msgs/msg/Header"])
+def test_bytes_after_messages_are_left_out_of_a_ros1_bag_and_counted(tmp_path: Path, name: str) -> None:
+    """As in bags that are written with rosbag2_py; Header is a type that has other fields in ROS 1."""
+    cls = types.get(name)
+    exact = codec(cls).encode(new(cls))
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic(BagTopic(name="/odd", type=name))
+        for time, rest in enumerate((b"", b"\xa5" * 8, b"\xa5" * 24)):
+            writer.write(BagMessage("/odd", exact + rest, time, time, time))
+    done = convert(tmp_path / "bag", tmp_path / "one.bag", storage="rosbag1")
+    assert done.messages == 3
+    assert [words.partition(": ")[2] for words in done.notices] == [
+        "messages on /odd with bytes after their end, which are left out: 2"
+    ]
+    with BagReader(tmp_path / "one.bag") as bag:
+        assert [m.data for m in bag.messages()] == [exact] * 3
+    convert(tmp_path / "bag", tmp_path / "sqlite", storage="sqlite3")
+    with BagReader(tmp_path / "sqlite") as bag:
+        assert [len(m.data) - len(exact) for m in bag.messages()] == [0, 8, 24]  # nothing is encoded again
+
+
+def test_a_message_that_is_cut_off_is_no_ros1_message(tmp_path: Path) -> None:
+    exact = codec(JointState).encode(new(JointState, name=["wheel"]))
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic(BagTopic(name="/odd", type=JointState.__msgtype__))
+        writer.write(BagMessage("/odd", exact[:-9], 5, 5, 1))
+    with pytest.raises(RecordingError, match="message on /odd at 5 ns is not a sensor_msgs/msg/JointState"):
+        convert(tmp_path / "bag", tmp_path / "one.bag", storage="rosbag1")
+    assert not (tmp_path / "one.bag").exists()
+
+
 def test_ros1_types_are_brought_to_ros2(tmp_path: Path) -> None:
     """Fields that moved (Header's seq, CameraInfo's K) and types that only the bag knows."""
     from rosbags.rosbag1 import Writer
@@ -140,7 +172,6 @@ def test_ros1_types_are_brought_to_ros2(tmp_path: Path) -> None:
         for topic, message in (("/odd", odd), ("/camera_info", camera)):
             connection = writer.add_connection(topic, message.__msgtype__, typestore=store, latching=1)
             writer.write(connection, 10, store.serialize_ros1(message, message.__msgtype__))
-    from twin.bridge import types
 
     with BagReader(tmp_path / "odd.bag") as bag:
         assert bag.notices == ()

@@ -5,22 +5,26 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.bridge import bag_helpers as bags
 from tests.processes import free_endpoint
 from twin.bridge import live
+from twin.bridge.action_types import Fibonacci
+from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
+from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.replay import replay
 from twin.bridge.bags.tap import BagTap
-from twin.bridge.bags.writer import BagConfig
+from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
@@ -66,6 +70,27 @@ def record(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def bag_of_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("run") / "one")
+
+
+def test_what_is_no_message_is_left_out_and_what_follows_one_is_ignored(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    exact = codec(String).encode(String("whole"))
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic(BagTopic(name="/in", type=String.__msgtype__))
+        for time_ns, data in enumerate((exact + b"\xa5" * 8, exact[:-3], exact)):
+            writer.write(BagMessage("/in", data, time_ns, time_ns, time_ns))
+    heard: list[str] = []
+    with BagReader(tmp_path / "bag") as bag:
+        replay(
+            bag,
+            lambda bus: bus.create_node("a").create_subscription(
+                String, "in", lambda m: heard.append(m.data)
+            ),
+        )
+    assert heard == ["whole", "whole"]
+    assert "/in: 8 bytes after a message are ignored" in caplog.text
+    assert "/in: a message from outside was dropped (payload: not a std_msgs/msg/String" in caplog.text
 
 
 def amcl(config: AmclConfig, seed: int = 3) -> Callable[[Bus], Any]:
@@ -199,6 +224,45 @@ def test_a_run_from_outside_is_in_the_bag(tmp_path: Path) -> None:
         assert len(messages) == count
         assert [m.sequence for m in messages] == list(range(1, count + 1))
         assert codec(String).decode(messages[0].data).data == "hello"
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_topics_of_actions_are_in_the_bag_only_if_asked_for(tmp_path: Path, hidden: bool) -> None:
+    """Plain readers of MCAP know no names of parts of actions and stop at the first feedback."""
+    make_reader = pytest.importorskip("mcap.reader").make_reader
+    decoder = pytest.importorskip("mcap_ros2.decoder").DecoderFactory()
+
+    def execute(goal: GoalHandle) -> Generator[None, None, Any]:
+        goal.publish_feedback(Fibonacci.Feedback(np.array([0, 1], np.int32)))
+        yield
+        return Fibonacci.Result(np.array([0, 1], np.int32))
+
+    clock = Clock()
+    with Bus.open(clock) as bus:
+        tap = BagTap(tmp_path / "bag", hidden=hidden)
+        bus.tap(tap.on_sample)
+        node = bus.create_node("robot")
+        ActionServer(node, Fibonacci, "fibonacci", execute)
+        goal = ActionClient(node, Fibonacci, "fibonacci").send_goal(Fibonacci.Goal(2))
+        chatter = node.create_publisher(String, "chatter")
+        for _ in range(5):
+            chatter.publish(String("hello"))
+            bus.spin()
+            clock.now_ns += 10_000_000
+        assert goal.done
+        tap.close()
+    with BagReader(tmp_path / "bag") as bag:
+        replay(bag, lambda bus: bus.create_node("robot"))  # it tells of as many messages as there are
+        assert {name for name in bag.topics if "/_" in name} == {
+            f"/fibonacci/_action/{name}" for name in ("feedback", "status") if hidden
+        }
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        messages = make_reader(stream, decoder_factories=[decoder]).iter_decoded_messages()
+        if hidden:
+            with pytest.raises(Exception, match="Fibonacci"):  # said in docs/ros/bags.md
+                list(messages)
+        else:
+            assert [channel.topic for _, channel, _, _ in messages].count("/chatter") == 5
 
 
 def test_no_bag_is_made_over_another(tmp_path: Path) -> None:

@@ -184,6 +184,45 @@ def test_a_query_that_is_dropped_and_one_with_garbage(bus: Bus, endpoint: str) -
     assert dict(bus.refused) == {"payload": 3, "attachment": 1, "type hash": 1, "type": 1}
 
 
+def test_bytes_after_messages_are_ignored_counted_and_said_once(
+    bus: Bus, endpoint: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As ROS 2's serializer leaves them: on topics, in requests and in responses."""
+    heard: list[str] = []
+    node = bus.create_node("a")
+    node.create_subscription(String, "chatter", lambda m: heard.append(m.data))
+    node.create_service(AddTwoInts, "add", lambda r: AddTwoInts.Response(r.a + r.b))
+    client = node.create_client(AddTwoInts, "other")
+    rest, numbers = b"\xa5" * 24, b"\0\1\0\0" + struct.pack("<qq", 1, 2)
+    with raw_session(endpoint) as peer:
+        peer.declare_queryable(
+            f"{ADD}/{ADD_HASH}".replace("/add/", "/other/"),
+            lambda query: query.reply(query.key_expr, numbers[:4] + bytes([7]) + bytes(7) + rest),
+            complete=True,
+        )
+        publisher = matched(peer, CHATTER)
+        for number, left in enumerate((b"", b"\xa5" * 3, rest, rest)):  # three may fill the last word
+            publisher.put(string("abcd" * number) + left, attachment=attachment(number + 1))
+        sums: list[bytes] = []
+        wait_for(lambda: list(peer.liveliness().get("@ros2_lv/0/*/*/*/SS/**")))
+        peer.get(
+            f"{ADD}/{ADD_HASH}",
+            lambda reply: sums.append(reply.ok.payload.to_bytes()),
+            payload=numbers + rest,
+            attachment=attachment(1),
+            target=zenoh.QueryTarget.ALL,
+        )
+        wait_for(lambda: client.service_is_ready)
+        future = client.call_async(AddTwoInts.Request(1, 2))
+        wait_for(lambda: _spin(bus) and future.done and sums and len(heard) == 4)
+    _spin(bus)
+    assert heard == ["", "abcd", "abcdabcd", "abcdabcdabcd"]
+    assert (future.result.sum, sums) == (7, [b"\0\1\0\0" + struct.pack("<q", 3)])
+    assert (bus.trailing, dict(bus.refused)) == (4, {})
+    said = [r.message for r in caplog.records if "24 bytes after a message" in r.message]
+    assert sorted(words.partition(":")[0] for words in said) == ["/add", "/chatter", "/other"]
+
+
 _READER = f"""
 import sys, time, zenoh
 from tests.bridge.wire_peer import raw_session

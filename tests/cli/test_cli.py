@@ -288,6 +288,7 @@ def test_wrong_options_say_what_is_valid() -> None:
             domain_id=7,
             record=False,
             bag=True,
+            bag_hidden_topics=True,
             save_model=Path("model"),
         ),
     ],

@@ -155,6 +155,11 @@ class Bus:
         """
         return self.external.refused
 
+    @property
+    def trailing(self) -> int:
+        """How many messages had bytes after their end, which were ignored."""
+        return self.external.trailing
+
     def admit(self) -> int:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
         if guard.pending:

@@ -23,7 +23,7 @@ from twin.bridge.programs import ros_args
 from twin.bridge.programs.arguments import parser_of, split
 from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
-from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.entrance import Entrance, read
 from twin.bridge.wire.interrupts import noted_signals
 from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.naming import Interface
@@ -96,13 +96,11 @@ class SimTime:
         attachment = sample.attachment.to_bytes() if sample.attachment else None
         if self._entrance.source(str(sample.key_expr), attachment) is None:
             return
-        try:
-            now_ns = ns(self._codec.decode(sample.payload.to_bytes()).clock)
-        except Exception as error:  # whatever the bytes were, they are not our bug
-            self._bus.external.refuse("payload", "/clock", f"not a {self._codec.msgtype}: {error}")
+        message = read(self._bus.external, "/clock", self._codec, sample.payload.to_bytes())
+        if message is None:
             return
         with self._lock:
-            self._now_ns = now_ns
+            self._now_ns = ns(message.clock)
         self._bus.external.wake()
 
 

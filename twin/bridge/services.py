@@ -11,7 +11,7 @@ from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
-from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.entrance import Entrance, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, pack_attachment
 from twin.bridge.wire.naming import parse_key
@@ -125,13 +125,9 @@ class Service(Endpoint):
         """Decode and call back."""
         query, source = data
         payload = query.payload.to_bytes() if query.payload else b""
-        try:
-            request = self._requests.decode(payload)
-        except Exception as error:
+        request = read(self.node.bus.external, self.name, self._requests, payload)
+        if request is None:
             query.drop()  # type: ignore[no-untyped-call]
-            if not external:
-                raise
-            self.node.bus.external.refuse("payload", self.name, f"not a {self._requests.msgtype}: {error}")
             return
 
         def respond(response: Any) -> None:
@@ -269,12 +265,8 @@ class Client(Endpoint):
         if payload is None:
             future.finish(None, f"nobody answered on the service {self.name}; is its node running?")
             return
-        try:
-            response = self._responses.decode(payload)
-        except Exception as error:
-            if not external:
-                raise
-            self.node.bus.external.refuse("payload", self.name, f"not a {self._responses.msgtype}: {error}")
+        response = read(self.node.bus.external, self.name, self._responses, payload)
+        if response is None:
             future.finish(None, f"the service {self.name} answered with something else than a response")
             return
         future.finish(response)

@@ -12,7 +12,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import INFINITE_NS, QoS
-from twin.bridge.wire.entrance import Entrance
+from twin.bridge.wire.entrance import Entrance, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.wire.naming import Interface
@@ -212,14 +212,9 @@ class Subscription(Endpoint, Generic[M]):
         payload, origin = data
         if self._wanted is not None and not self._wanted(payload):
             return
-        if external:
-            try:
-                message = self.codec.decode(payload)
-            except Exception as error:  # whatever the bytes were, they are not our bug
-                self.node.bus.external.refuse("payload", self.name, f"not a {self.codec.msgtype}: {error}")
-                return
-        else:
-            message = self.codec.decode(payload)
+        message = read(self.node.bus.external, self.name, self.codec, payload)
+        if message is None:
+            return
         self._origin = origin
         self._callback(message)
         self._origin = None

@@ -59,6 +59,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
                 network=options.network,
                 outside=outside,
                 bag=folder / "bag" if options.bag else None,
+                bag_hidden_topics=options.bag_hidden_topics,
                 save_model=options.save_model,
                 progress=progress,
             )

@@ -37,6 +37,8 @@ class RunOptions:
     record: bool = True
     bag: bool = False
     """Whether a bag is written into the folder of the results."""
+    bag_hidden_topics: bool = False
+    """Whether topics of actions are in the bag too."""
     save_model: Path | None = None
 
     @property
@@ -72,6 +74,7 @@ class RunOptions:
         words += [] if self.zenoh_config is None else ["--zenoh-config", str(self.zenoh_config)]
         words += [] if self.record else ["--no-record"]
         words += ["--bag"] if self.bag else []
+        words += ["--include-hidden-topics"] if self.bag_hidden_topics else []
         return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
 
 

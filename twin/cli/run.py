@@ -108,6 +108,9 @@ def run(
     bag: Annotated[
         bool, typer.Option("--bag", help="Also write a ROS 2 bag of every message: <out>/bag.")
     ] = False,
+    hidden: Annotated[
+        bool, typer.Option("--include-hidden-topics", help="With --bag: topics of actions too.")
+    ] = False,
     save_model: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
     ] = None,
@@ -117,6 +120,8 @@ def run(
 
     Exit code 0: every check holds; 1: one fails; 2: the run could not be made.
     """
+    if hidden and not bag:
+        raise typer.BadParameter("--include-hidden-topics says what is in the bag; it needs --bag")
     options = RunOptions(
         scenario=scenario,
         overrides=parse_overrides(sets or [], seed),
@@ -133,6 +138,7 @@ def run(
         domain_id=domain,
         record=not no_record,
         bag=bag,
+        bag_hidden_topics=hidden,
         save_model=save_model,
     )
     if repeat == 1 and not expect_one_hash:

@@ -169,6 +169,7 @@ def run(
     network: SessionConfig | None = None,
     outside: Outside = ALONE,
     bag: Path | None = None,
+    bag_hidden_topics: bool = False,
     save_model: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     watch: Callable[[Run], bool] | None = None,
@@ -186,6 +187,7 @@ def run(
         network: How else the bus takes part in a network, instead of `listen`.
         outside: Who takes part from other processes, and how the run keeps time with them.
         bag: Folder for a bag of every message.
+        bag_hidden_topics: Whether topics of actions are in the bag too.
         save_model: Folder for the compiled world as MJCF.
         progress: Called about four times a second.
         watch: Called after each tick; the run ends when it returns True.
@@ -195,7 +197,7 @@ def run(
     """
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
-    bag_tap = None if bag is None else BagTap(bag)
+    bag_tap = None if bag is None else BagTap(bag, hidden=bag_hidden_topics)
     parts = build(
         scenario,
         taps=[digest.on_sample, *(tap.on_sample for tap in (sink, bag_tap) if tap is not None)],
@@ -296,6 +298,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock:
             "real_time_factor": simulated / wall,
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
             **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
+            **({"trailing_bytes": float(simulation.bus.trailing)} if simulation.bus.trailing else {}),
         },
         digest=digest.finish(simulation.world.state_digest()),
         deterministic=clock != "free" and not (simulation.lockstep and simulation.lockstep.surplus),

@@ -136,6 +136,13 @@ def test_echo_prints_what_was_latched_before(twin: Twin) -> None:
     assert twin("topic", "echo", "/robot_description", "--once", "-f").stdout == f"data: {text}\n---\n"
 
 
+def test_echo_ignores_bytes_after_a_message_and_counts_it(twin: Twin) -> None:
+    done = twin("topic", "echo", "--once", "/padded")
+    assert (done.returncode, done.stdout) == (0, "data: whole\n---\n")
+    assert "/padded: 8 bytes after a message are ignored, as in ROS 2; reported once\n" in done.stderr
+    assert "messages with bytes after their end, which were ignored: 1\n" in done.stderr
+
+
 def test_echo_of_arrays(twin: Twin) -> None:
     cut = twin("topic", "echo", "/robot/scan", "--once", "-l", "2").stdout
     assert cut.endswith("ranges:\n- 0.0\n- 0.25\n- '...'\nintensities: []\n---\n")

@@ -10,8 +10,10 @@ import numpy as np
 from twin.bridge import live, types
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import ActionClient, ActionServer
+from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import LaserScan, PointStamped, String, Twist, stamp
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
+from twin.bridge.raw_publisher import RawPublisher
 from twin.bridge.srvs import AddTwoInts
 from twin.bridge.types.default_values import new
 
@@ -33,6 +35,12 @@ with live.join([], listen=[sys.argv[1]]) as process:
 
     talker.create_timer(20_000_000, talk)
     talker.create_publisher(String, "robot_description", LATCHED).publish(String("<robot/>" * 30))
+
+    # As ROS 2's own serializer leaves a buffer.
+    padded = RawPublisher(
+        talker, "/padded", "std_msgs/msg/String", types.rihs01("std_msgs/msg/String"), LATCHED
+    )
+    padded.publish(codec(String).encode(String("whole")) + b"\xa5" * 8)
 
     sensors = bus.create_node("sensors", "/robot")
     scan = sensors.create_publisher(LaserScan, "scan", SENSOR_DATA)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -72,7 +73,7 @@ def convert(
     with BagReader(source) as bag:
         wanted = (topics or TopicChoice()).of(bag.topics)
         notices = list(bag.notices)
-        writer = _open(target, storage, compression)
+        writer = _open(target, storage, compression, notices)
         try:
             count, usable = _copy(bag, wanted, writer, notices)
         except BaseException:  # Ctrl-C too: half a bag would be in the way of the next attempt
@@ -107,9 +108,9 @@ def _remove(target: Path) -> None:
         target.unlink(missing_ok=True)
 
 
-def _open(target: Path, storage: Target, compression: Compression) -> _Writer:
+def _open(target: Path, storage: Target, compression: Compression, notices: list[str]) -> _Writer:
     if storage == "rosbag1":
-        return _Rosbag1Writer(target, compression)
+        return _Rosbag1Writer(target, compression, notices)
     config = BagConfig(storage=storage, compression=compression)
     return BagWriter(target, config)
 
@@ -117,7 +118,7 @@ def _open(target: Path, storage: Target, compression: Compression) -> _Writer:
 class _Rosbag1Writer:
     """A ROS 1 bag, by rosbags."""
 
-    def __init__(self, path: Path, compression: Compression) -> None:
+    def __init__(self, path: Path, compression: Compression, notices: list[str]) -> None:
         from rosbags.rosbag1 import Writer, WriterError
 
         from twin.bridge.bags.ros1 import ToRos1
@@ -135,8 +136,10 @@ class _Rosbag1Writer:
             raise RecordingError(f"{path} exists already; name another bag, or remove it") from fault
         except OSError as fault:
             raise RecordingError(f"{path}: cannot be written: {fault.strerror}") from fault
+        self._path, self._notices = path, notices
         self._types = ToRos1()
-        self._connections: dict[str, tuple[Any, Callable[[bytes], bytes]]] = {}
+        self._connections: dict[str, tuple[Any, Callable[[bytes], tuple[bytes, bool]]]] = {}
+        self._trailing: Counter[str] = Counter()
 
     def add_topic(self, topic: BagTopic) -> None:
         if topic.definition:
@@ -152,11 +155,17 @@ class _Rosbag1Writer:
     def write(self, message: BagMessage) -> None:
         connection, convert_message = self._connections[message.topic]
         try:
-            data = convert_message(message.data)
+            data, is_exact = convert_message(message.data)
         except Exception as fault:  # rosbags' converters raise many kinds on damaged payloads
             words = f"at {message.log_ns} ns is not a {connection.msgtype}: {fault}"
             raise RecordingError(f"the message on {message.topic} {words}") from fault
+        self._trailing[message.topic] += not is_exact
         self._writer.write(connection, message.log_ns, data)
 
     def close(self) -> None:
         self._writer.close()
+        self._notices += [
+            f"{self._path}: messages on {topic} with bytes after their end, which are left out: {count}"
+            for topic, count in sorted(self._trailing.items())
+            if count
+        ]

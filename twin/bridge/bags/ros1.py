@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from twin.bridge import types
 from twin.bridge.bags import definitions
+from twin.bridge.cdr.codec import codec
 from twin.errors import BridgeError
 
 Convert = Callable[[bytes], bytes]
@@ -59,13 +61,24 @@ class ToRos1:
         """The types, for the writer of a ROS 1 bag."""
         self._cache: dict[str, object] = {}
 
-    def converter(self, typename: str) -> Convert:
-        """Return what converts a message in CDR.
+    def converter(self, typename: str) -> Callable[[bytes], tuple[bytes, bool]]:
+        """Return what converts a message in CDR, and says whether the bytes were all of the message.
 
         Raises:
             BridgeError: an unknown type.
         """
-        types.get(typename)
+        one, convert = codec(types.get(typename)), self._of_whole(typename)
+
+        def of_any(data: bytes) -> tuple[bytes, bool]:
+            try:
+                return convert(data), True
+            except SerdeError:  # rosbags refuses what ROS 2's serializer leaves after a message
+                _, end = one.read(data)
+                return convert(data[:end]), False
+
+        return of_any
+
+    def _of_whole(self, typename: str) -> Convert:
         source, store, cache = types.store, self.store, self._cache
         if typename not in store.fielddefs:
             copies = get_types_from_msg(definitions.definition(typename), typename)

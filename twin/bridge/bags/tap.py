@@ -1,4 +1,4 @@
-"""Records every message of a run in process, by simulated time: the same run is the same bytes."""
+"""Records the messages of a run in process, by simulated time: the same run is the same bytes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.bridge.bags.origins import Origins
 from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.bridge.bus import Bus
-from twin.bridge.graph import Graph
+from twin.bridge.graph import Graph, is_hidden
 from twin.bridge.topics import Sample, Subscription
 from twin.bridge.wire.external import Arrival
 from twin.errors import RecordingError
@@ -23,8 +23,14 @@ _OUTSIDE = -1
 class BagTap:
     """A tap of a bus (`Bus.tap`) that writes a bag, and into it which node published each message."""
 
-    def __init__(self, folder: Path, config: BagConfig | None = None) -> None:
+    def __init__(self, folder: Path, config: BagConfig | None = None, *, hidden: bool = False) -> None:
         """Prepare for a bag; it is made when time first goes on, so a bus that fails before leaves none.
+
+        Args:
+            folder: Of the bag.
+            config: How it is written.
+            hidden: Whether topics of actions are recorded too: readers that know no names of their parts,
+                as mcap-ros2-support, stop at them.
 
         Raises:
             RecordingError: it exists already.
@@ -33,6 +39,7 @@ class BagTap:
             raise RecordingError(f"{folder} exists already; name another bag, or remove it")
         self.folder = folder
         self._config = config
+        self._hidden = hidden
         self._writer: BagWriter | None = None
         self._bus: Bus | None = None
         self._graph = Graph()
@@ -55,6 +62,8 @@ class BagTap:
         Raises:
             RecordingError: the disk is full or gone.
         """
+        if is_hidden(sample.topic) and not self._hidden:
+            return
         node, time_ns = sample.publisher.node, sample.time_ns
         self._bus = node.bus
         self._names[node.token.node_id] = node.fully_qualified_name
@@ -68,7 +77,7 @@ class BagTap:
             RecordingError: the disk is full or gone.
         """
         receiver, source = arrival.receiver, arrival.source
-        if not isinstance(receiver, Subscription):
+        if not isinstance(receiver, Subscription) or (is_hidden(receiver.name) and not self._hidden):
             return
         if self._receivers.setdefault(receiver.name, receiver) is not receiver:
             return  # every other subscription of the topic has it too

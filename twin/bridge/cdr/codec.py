@@ -1,6 +1,7 @@
 """Messages to CDR bytes and back: rosbags' codec in general, packed structs for the hot types.
 
-A fast path gives the same bytes as the general one (tested); the general one reads big endian.
+A fast path gives the same bytes as the general one (tested); the general one reads big endian. What follows
+a message is ignored, as in ROS 2: its own serializer returns a buffer of an estimated size.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from typing import Any, Generic, TypeVar
 from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
+from twin.bridge.cdr.general import read_cdr
 from twin.bridge.cdr.packed import (
-    check_end,
     decode_imu,
     decode_joint_state,
     decode_odometry,
@@ -52,6 +53,7 @@ from twin.bridge.msgs import (
 from twin.bridge.types.fields import array_types
 
 M = TypeVar("M")
+_Read = Callable[[bytes], tuple[M, int]]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 """The encapsulation header of plain CDR, little endian."""
@@ -72,9 +74,14 @@ class Codec(Generic[M]):
     cls: type[M]
     encode: Callable[[M], bytes]
     """Raises BridgeError, naming the field, if one has a value that it cannot hold."""
-    decode: Callable[[bytes], M]
-    """Raises on bytes that are not such a message; which exception is not specified. Takes no more memory
-    than some times the payload, whatever lengths the payload tells."""
+    read: _Read[M]
+    """Returns the message and where in the payload it ends. Raises on bytes that do not begin with such a
+    message; which exception is not specified. Takes no more memory than some times the payload, whatever
+    lengths the payload tells."""
+
+    def decode(self, payload: bytes) -> M:
+        """Return the message; raises what `read` does."""
+        return self.read(payload)[0]
 
 
 def codec(cls: type[M]) -> Codec[M]:
@@ -83,7 +90,7 @@ def codec(cls: type[M]) -> Codec[M]:
     fast = _FAST.get(general.msgtype) or _of_only_a_path(cls)
     if fast is None:
         return general
-    encode, decode = fast
+    encode, read = fast
 
     def explained(message: M) -> bytes:
         try:
@@ -91,7 +98,7 @@ def codec(cls: type[M]) -> Codec[M]:
         except Exception:
             return general.encode(checked(message))
 
-    return Codec(general.msgtype, cls, explained, decode)
+    return Codec(general.msgtype, cls, explained, read)
 
 
 def general_codec(cls: type[M]) -> Codec[M]:
@@ -100,7 +107,7 @@ def general_codec(cls: type[M]) -> Codec[M]:
     if is_wide(msgtype):
         return Codec(msgtype, cls, _explained(encode_wide), lambda payload: decode_wide(payload, msgtype))
     types.store.get_msgdef(msgtype)
-    serialize, deserialize = types.store.serialize_cdr, types.store.deserialize_cdr
+    serialize = types.store.serialize_cdr
     arrays = array_types(msgtype)
 
     def encode(message: M) -> bytes:
@@ -110,10 +117,7 @@ def general_codec(cls: type[M]) -> Codec[M]:
                 break
         return bytes(serialize(message, msgtype, little_endian=True))
 
-    def decode(payload: bytes) -> Any:
-        return deserialize(payload, msgtype)
-
-    return Codec(msgtype, cls, _explained(encode), decode)
+    return Codec(msgtype, cls, _explained(encode), lambda payload: read_cdr(types.store, payload, msgtype))
 
 
 def _explained(encode: Callable[[M], bytes]) -> Callable[[M], bytes]:
@@ -133,22 +137,18 @@ def _encode_twist(message: Twist) -> bytes:
     return _TWIST.pack(LITTLE_ENDIAN, v.x, v.y, v.z, w.x, w.y, w.z)
 
 
-def _decode_twist(payload: bytes) -> Twist:
-    if payload[:4] != LITTLE_ENDIAN or len(payload) != _TWIST.size:
-        return general_codec(Twist).decode(payload)
-    _, vx, vy, vz, wx, wy, wz = _TWIST.unpack(payload)
-    return Twist(Vector3(vx, vy, vz), Vector3(wx, wy, wz))
+def _decode_twist(payload: bytes) -> tuple[Twist, int]:
+    _, vx, vy, vz, wx, wy, wz = _TWIST.unpack_from(payload)
+    return Twist(Vector3(vx, vy, vz), Vector3(wx, wy, wz)), _TWIST.size
 
 
 def _encode_clock(message: Clock) -> bytes:
     return _CLOCK.pack(LITTLE_ENDIAN, message.clock.sec, message.clock.nanosec)
 
 
-def _decode_clock(payload: bytes) -> Clock:
-    if payload[:4] != LITTLE_ENDIAN or len(payload) != _CLOCK.size:
-        return general_codec(Clock).decode(payload)
-    _, sec, nanosec = _CLOCK.unpack(payload)
-    return Clock(Time(sec, nanosec))
+def _decode_clock(payload: bytes) -> tuple[Clock, int]:
+    _, sec, nanosec = _CLOCK.unpack_from(payload)
+    return Clock(Time(sec, nanosec)), _CLOCK.size
 
 
 @lru_cache(maxsize=4096)
@@ -191,9 +191,7 @@ def _encode_tf(message: TFMessage) -> bytes:
     return b"".join(chunks)
 
 
-def _decode_tf(payload: bytes) -> TFMessage:
-    if payload[:4] != LITTLE_ENDIAN:
-        return general_codec(TFMessage).decode(payload)
+def _decode_tf(payload: bytes) -> tuple[TFMessage, int]:
     (count,) = _TEXT_LENGTH.unpack_from(payload, 4)
     at = 8
     transforms = []
@@ -207,8 +205,7 @@ def _decode_tf(payload: bytes) -> TFMessage:
         at += _POSE.size
         transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
         transforms.append(TransformStamped(Header(Time(sec, nanosec), frame), child, transform))
-    check_end(payload, at)
-    return TFMessage(transforms)
+    return TFMessage(transforms), at
 
 
 def _encode_poses(message: PoseArray) -> bytes:
@@ -222,9 +219,7 @@ def _encode_poses(message: PoseArray) -> bytes:
     return pack(layout, LITTLE_ENDIAN, time.sec, time.nanosec, len(frame), frame, n, *numbers)
 
 
-def _decode_poses(payload: bytes) -> PoseArray:
-    if payload[:4] != LITTLE_ENDIAN:
-        return general_codec(PoseArray).decode(payload)
+def _decode_poses(payload: bytes) -> tuple[PoseArray, int]:
     sec, nanosec = _STAMP.unpack_from(payload, 4)
     frame, at = read_text(payload, 12)
     at += -at % 4
@@ -234,41 +229,43 @@ def _decode_poses(payload: bytes) -> PoseArray:
         at += (4 - at) % 8
     if n * _POSE.size > len(payload) - at:
         raise ValueError(f"{n} poses do not fit")
-    check_end(payload, at + n * _POSE.size)
     values = unpack_from(f"<{7 * n}d", payload, at)
     poses = [
         Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
         for x, y, z, qx, qy, qz, qw in zip(*[iter(values)] * 7, strict=True)
     ]
-    return PoseArray(Header(Time(sec, nanosec), frame), poses)
+    return PoseArray(Header(Time(sec, nanosec), frame), poses), at + n * _POSE.size
 
 
-def _little_endian(cls: type[M], decode: Callable[[bytes], M]) -> Callable[[bytes], M]:
+def _little_endian(cls: type[M], read: _Read[M]) -> _Read[M]:
     """Return a decoder that leaves big-endian payloads to the general codec."""
 
-    def either(payload: bytes) -> M:
-        return decode(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).decode(payload)
+    def either(payload: bytes) -> tuple[M, int]:
+        return read(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).read(payload)
 
     return either
 
 
-def _of_only_a_path(cls: Any) -> tuple[Callable[[Any], bytes], Callable[[bytes], Any]] | None:
+def _of_only_a_path(cls: Any) -> tuple[Callable[[Any], bytes], _Read[Any]] | None:
     """Return the codec of a message that has a path and nothing else, as requests to check one: its bytes."""
     definition = types.store.fielddefs.get(cls.__msgtype__)
     match definition and definition[1]:
         case [(name, (Nodetype.NAME, Path.__msgtype__))]:
             field = attrgetter(name)
-            return lambda message: encode_path(field(message)), _little_endian(
-                cls, lambda payload: cls(decode_path(payload))
-            )
+
+            def read(payload: bytes) -> tuple[Any, int]:
+                path, end = decode_path(payload)
+                return cls(path), end
+
+            return lambda message: encode_path(field(message)), _little_endian(cls, read)
     return None
 
 
-_FAST: dict[str, tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = {
-    Twist.__msgtype__: (_encode_twist, _decode_twist),
-    Clock.__msgtype__: (_encode_clock, _decode_clock),
-    TFMessage.__msgtype__: (_encode_tf, _decode_tf),
-    PoseArray.__msgtype__: (_encode_poses, _decode_poses),
+_FAST: dict[str, tuple[Callable[[Any], bytes], _Read[Any]]] = {
+    Twist.__msgtype__: (_encode_twist, _little_endian(Twist, _decode_twist)),
+    Clock.__msgtype__: (_encode_clock, _little_endian(Clock, _decode_clock)),
+    TFMessage.__msgtype__: (_encode_tf, _little_endian(TFMessage, _decode_tf)),
+    PoseArray.__msgtype__: (_encode_poses, _little_endian(PoseArray, _decode_poses)),
     Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
     LaserScan.__msgtype__: (encode_scan, _little_endian(LaserScan, decode_scan)),
     Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),

@@ -61,15 +61,14 @@ def encode_odometry(message: Odometry) -> bytes:
     )  # fmt: skip
 
 
-def decode_odometry(payload: bytes) -> Odometry:
-    """Return an Odometry from little-endian CDR."""
+def decode_odometry(payload: bytes) -> tuple[Odometry, int]:
+    """Return an Odometry from little-endian CDR, and where it ends."""
     stamp, (frame, child), at = _read_head(payload, 2, _ODOMETRY_NUMBERS.size)
     x, y, z, qx, qy, qz, qw, pose_covariance, *twist, twist_covariance = _ODOMETRY_NUMBERS.unpack_from(
         payload, at
     )
-    check_end(payload, at + _ODOMETRY_NUMBERS.size)
     vx, vy, vz, wx, wy, wz = twist
-    return Odometry(
+    odometry = Odometry(
         Header(stamp, frame),
         child,
         PoseWithCovariance(
@@ -79,6 +78,7 @@ def decode_odometry(payload: bytes) -> Odometry:
             Twist(Vector3(vx, vy, vz), Vector3(wx, wy, wz)), np.frombuffer(twist_covariance, np.float64)
         ),
     )
+    return odometry, at + _ODOMETRY_NUMBERS.size
 
 
 def encode_imu(message: Imu) -> bytes:
@@ -100,12 +100,11 @@ def encode_imu(message: Imu) -> bytes:
     )  # fmt: skip
 
 
-def decode_imu(payload: bytes) -> Imu:
-    """Return an Imu from little-endian CDR."""
+def decode_imu(payload: bytes) -> tuple[Imu, int]:
+    """Return an Imu from little-endian CDR, and where it ends."""
     stamp, (frame,), at = _read_head(payload, 1, _IMU_NUMBERS.size)
     qx, qy, qz, qw, co, wx, wy, wz, cw, ax, ay, az, ca = _IMU_NUMBERS.unpack_from(payload, at)
-    check_end(payload, at + _IMU_NUMBERS.size)
-    return Imu(
+    imu = Imu(
         Header(stamp, frame),
         Quaternion(qx, qy, qz, qw),
         np.frombuffer(co, np.float64),
@@ -114,6 +113,7 @@ def decode_imu(payload: bytes) -> Imu:
         Vector3(ax, ay, az),
         np.frombuffer(ca, np.float64),
     )
+    return imu, at + _IMU_NUMBERS.size
 
 
 @lru_cache(maxsize=64)
@@ -139,19 +139,21 @@ def encode_joint_state(message: JointState) -> bytes:
     return _MAGIC + block
 
 
-def decode_joint_state(payload: bytes) -> JointState:
-    """Return a JointState from little-endian CDR."""
+def decode_joint_state(payload: bytes) -> tuple[JointState, int]:
+    """Return a JointState from little-endian CDR, and where it ends."""
     stamp = Time(*_STAMP.unpack_from(payload, 4))
     # A robot's joints do not change: the names are read once for all payloads that begin alike.
     known = _joint_names.get(len(payload))
     if known is not None and payload.startswith(known[0], 12):
         prefix, frame, names = known
-        return JointState(Header(stamp, frame), list(names), *_read_arrays(payload, 12 + len(prefix)))
+        arrays, end = _read_arrays(payload, 12 + len(prefix))
+        return JointState(Header(stamp, frame), list(names), *arrays), end
     frame, names, at = _read_names(payload)
     if len(_joint_names) >= _MOST_LENGTHS:  # no robot's: somebody sends all kinds of things
         _joint_names.clear()
     _joint_names[len(payload)] = (payload[12:at], frame, names)
-    return JointState(Header(stamp, frame), names, *_read_arrays(payload, at))
+    arrays, end = _read_arrays(payload, at)
+    return JointState(Header(stamp, frame), names, *arrays), end
 
 
 _MOST_LENGTHS = 64
@@ -173,7 +175,7 @@ def _read_names(payload: bytes) -> tuple[str, list[str], int]:
     return frame, names, at
 
 
-def _read_arrays(payload: bytes, at: int) -> list[NDArray[np.float64]]:
+def _read_arrays(payload: bytes, at: int) -> tuple[list[NDArray[np.float64]], int]:
     arrays = []
     for _ in range(3):
         at += -at % 4
@@ -185,8 +187,7 @@ def _read_arrays(payload: bytes, at: int) -> list[NDArray[np.float64]]:
             raise ValueError(f"{count} values do not fit")
         arrays.append(np.frombuffer(payload, np.float64, count, at))
         at += 8 * count
-    check_end(payload, at)
-    return arrays
+    return arrays, at
 
 
 def _doubles(values: NDArray[np.float64], count: int) -> bytes:
@@ -204,12 +205,6 @@ def read_text(payload: bytes, at: int) -> tuple[str, int]:
     if length == 0 or end > len(payload) or payload[end - 1]:
         raise ValueError(f"a string of {length} bytes does not fit, or has no end")
     return payload[at + 4 : end - 1].decode(), end
-
-
-def check_end(payload: bytes, at: int) -> None:
-    """Refuse bytes after the message; up to three may fill the last word."""
-    if len(payload) - at > 3:
-        raise ValueError(f"{len(payload) - at} bytes after the message")
 
 
 def _read_head(payload: bytes, texts: int, after: int) -> tuple[Time, tuple[str, ...], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from struct import Struct
 
-from twin.bridge.cdr.packed import check_end, read_text
+from twin.bridge.cdr.packed import read_text
 from twin.bridge.msgs import Header, Path, Point, Pose, PoseStamped, Quaternion, Time
 
 _MAGIC = b"\x00\x01\x00\x00"
@@ -38,8 +38,8 @@ def encode_path(message: Path) -> bytes:
     return b"".join(chunks)
 
 
-def decode_path(payload: bytes) -> Path:
-    """Return a Path from little-endian CDR."""
+def decode_path(payload: bytes) -> tuple[Path, int]:
+    """Return a Path from little-endian CDR, and where it ends."""
     stamp = Time(*_STAMP.unpack_from(payload, 4))
     frame, at = read_text(payload, 12)
     at += -at % 4
@@ -57,5 +57,4 @@ def decode_path(payload: bytes) -> Path:
         at += _POSE.size
         pose = Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
         poses.append(PoseStamped(Header(time, pose_frame), pose))
-    check_end(payload, at)
-    return Path(Header(stamp, frame), poses)
+    return Path(Header(stamp, frame), poses), at

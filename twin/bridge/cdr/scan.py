@@ -7,7 +7,7 @@ from struct import Struct
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.bridge.cdr.packed import check_end, read_text
+from twin.bridge.cdr.packed import read_text
 from twin.bridge.msgs import Header, LaserScan, Time
 
 _HEAD = Struct("<4siII")
@@ -32,16 +32,15 @@ def encode_scan(message: LaserScan) -> bytes:
     return head + padding + numbers + _floats(message.ranges) + _floats(message.intensities)
 
 
-def decode_scan(payload: bytes) -> LaserScan:
-    """Return a LaserScan from little-endian CDR."""
+def decode_scan(payload: bytes) -> tuple[LaserScan, int]:
+    """Return a LaserScan from little-endian CDR, and where it ends."""
     _, sec, nanosec, _ = _HEAD.unpack_from(payload)
     frame, at = read_text(payload, 12)
     at += -at % 4
     start, end, increment, between, duration, nearest, farthest = _NUMBERS.unpack_from(payload, at)
     ranges, at = _read_floats(payload, at + _NUMBERS.size)
     intensities, at = _read_floats(payload, at)
-    check_end(payload, at)
-    return LaserScan(
+    scan = LaserScan(
         Header(Time(sec, nanosec), frame),
         start,
         end,
@@ -53,6 +52,7 @@ def decode_scan(payload: bytes) -> LaserScan:
         ranges,
         intensities,
     )
+    return scan, at
 
 
 def _floats(values: NDArray[np.float32]) -> bytes:

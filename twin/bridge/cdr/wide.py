@@ -16,6 +16,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from twin.bridge import types
+from twin.bridge.cdr.general import read_cdr
 from twin.bridge.types.fields import Field, fields_of
 
 _wire = get_typestore(Stores.EMPTY)
@@ -44,14 +45,15 @@ def encode_wide(message: Any) -> bytes:
     return bytes(_wire.serialize_cdr(_to_wire(message, name), name, little_endian=True))
 
 
-def decode_wide(payload: bytes, typename: str) -> Any:
-    """Return a message with wstrings from CDR.
+def decode_wide(payload: bytes, typename: str) -> tuple[Any, int]:
+    """Return a message with wstrings from CDR, and where it ends.
 
     Raises:
-        SerdeError, ValueError: no such message.
+        SerdeError, struct.error, ValueError: no such message.
     """
     _register(typename)
-    return _from_wire(_wire.deserialize_cdr(payload, typename), typename)
+    message, end = read_cdr(_wire, payload, typename)
+    return _from_wire(message, typename), end
 
 
 def _register(name: str) -> None:

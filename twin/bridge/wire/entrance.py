@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import count
+from typing import TYPE_CHECKING, TypeVar
 
 import xxhash
 
@@ -10,6 +11,13 @@ from twin.bridge.wire.external import ExternalQueue
 from twin.bridge.wire.keys import Attachment, parse_attachment
 from twin.bridge.wire.naming import Interface, mismatch, parse_key
 from twin.bridge.wire.ros2dds import parse_request_id
+
+if TYPE_CHECKING:
+    from twin.bridge.cdr.codec import Codec
+
+M = TypeVar("M")
+_WORD = 4
+"""Fewer bytes than this after a message fill its last word."""
 
 
 class Entrance:
@@ -32,6 +40,30 @@ class Entrance:
         if source is None:
             self._external.refuse("attachment", self._item.name, "no rmw_zenoh attachment of 33 bytes")
         return source
+
+
+def read(queue: ExternalQueue, name: str, codec: Codec[M], payload: bytes) -> M | None:
+    """Return a message that came on a topic or service; None if the bytes are none, which is counted.
+
+    Bytes after the message are ignored and counted: ROS 2's serializer leaves some.
+    """
+    try:
+        return read_start(queue, name, codec, payload)
+    except Exception as error:  # whatever the bytes were, they are not our bug
+        queue.refuse("payload", name, f"not a {codec.msgtype}: {error}")
+        return None
+
+
+def read_start(queue: ExternalQueue, name: str, codec: Codec[M], payload: bytes) -> M:
+    """Return the message that a payload begins with; count it if more follows.
+
+    Raises:
+        Exception: there is none, as of `Codec.read`.
+    """
+    message, end = codec.read(payload)
+    if len(payload) - end >= _WORD:
+        queue.ignore_after(name, len(payload) - end)
+    return message
 
 
 def nameless_source(key: str, arrival: int) -> Attachment:

@@ -44,6 +44,8 @@ class ExternalQueue:
     def __init__(self, depth: int, max_bytes: int = 256 * 2**20) -> None:
         self.refused: Counter[str] = Counter()
         """What was not delivered, by reason; see `Bus.refused`."""
+        self.trailing = 0
+        """Messages that were delivered without the bytes that followed them."""
         self._depth, self._max_bytes = depth, max_bytes
         self._waiting: dict[int, deque[Arrival]] = {}
         """Arrivals by receiver."""
@@ -82,6 +84,12 @@ class ExternalQueue:
         with self._lock:
             self._refuse(reason, name, detail)
 
+    def ignore_after(self, name: str, left: int) -> None:
+        """Count a message that so many bytes follow; the first is logged. Called in any thread."""
+        with self._lock:
+            self.trailing += 1
+            self._report("trailing", name, f"{left} bytes after a message are ignored, as in ROS 2")
+
     def drain(self) -> list[Arrival]:
         """Return what has arrived, sorted by (topic, source, sequence), and log what was refused."""
         if not self._arrived.is_set() and not self._to_report:  # as in every tick of a run on its own
@@ -113,11 +121,12 @@ class ExternalQueue:
 
     def _refuse(self, reason: str, name: str, detail: str) -> None:
         self.refused[reason] += 1
+        self._report(reason, name, f"a message from outside was dropped ({reason}: {detail})")
+
+    def _report(self, reason: str, name: str, sentence: str) -> None:
         if len(self._reported) < _MOST_REPORTS and (reason, name) not in self._reported:
             self._reported.add((reason, name))
-            self._to_report.append(
-                f"{_clipped(name)}: a message from outside was dropped ({reason}: {detail}); reported once"
-            )
+            self._to_report.append(f"{_clipped(name)}: {sentence}; reported once")
 
 
 def _clipped(name: str) -> str:

@@ -80,9 +80,11 @@ class Listener:
 
     def decode(self, sample: RawSample) -> Any | None:
         """Return the message, None if the bytes are none: that is said once."""
+        from twin.bridge.wire.entrance import read_start
+
         assert self._codec is not None
         try:
-            return self._codec.decode(sample.payload)
+            return read_start(self._process.live.bus.external, self.name, self._codec, sample.payload)
         except Exception as error:  # whatever the bytes were, they are not our bug
             self._tell("payload", f"a message on {self.name} is no {self._type}: {error}")
             return None

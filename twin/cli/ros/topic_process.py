@@ -90,3 +90,6 @@ def open_topics(joining: Joining, *, node_name: str | None = None) -> Iterator[T
             yield TopicProcess(live=live, node=node, graph=graph)
         finally:
             graph.close()
+            if live.bus.trailing:
+                words = "messages with bytes after their end, which were ignored"
+                typer.echo(f"{words}: {live.bus.trailing}", err=True)
