@@ -23,10 +23,6 @@ class SensorDevice(Protocol):
     def spec(self) -> SensorSpec:
         """What it is."""
 
-    @property
-    def period_ns(self) -> int:
-        """Time between samples [ns]."""
-
     def sample(self, time_ns: int) -> Any:
         """Return the reading at `time_ns`; None: there is none."""
 

@@ -1,0 +1,46 @@
+"""When sensors fire."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from twin.nodes.sensor_publishers import SensorPublisher
+from twin.periods import latest, next_due
+
+
+class SensorSchedule:
+    """Fires each sensor at the first physics step at or after its due time.
+
+    Due times are the multiples of its period: any rate up to that of the physics works, its mean is exact.
+    """
+
+    def __init__(self, sensors: Sequence[SensorPublisher], timestep_ns: int) -> None:
+        """Take in sensors at time 0, and tell of each how late it can be; `timestep_ns` of the physics."""
+        self._sensors = tuple(sensors)
+        self._timestep_ns = timestep_ns
+        self._steps = [self._step_after(sensor, 0) for sensor in self._sensors]
+        self.next_step = min(self._steps, default=sys.maxsize)
+        """The physics step at which a sensor fires next."""
+        for sensor in self._sensors:
+            spec = sensor.sensor.spec
+            late_ns = latest(spec.period, timestep_ns)
+            if late_ns > 0:
+                sensor.node.get_logger().warn(
+                    f"sensor '{spec.name}' samples up to {late_ns / 1e6:.3g} ms late, at {spec.rate_hz:g} Hz "
+                    f"on average: its period is no whole number of physics steps of {timestep_ns / 1e6:g} ms"
+                )
+
+    def fire(self, step: int) -> None:
+        """Let the sensors due at a physics step publish, in their order, stamped with its time."""
+        if step < self.next_step:
+            return
+        time_ns = step * self._timestep_ns
+        for i, sensor in enumerate(self._sensors):
+            if step >= self._steps[i]:
+                sensor.publish(time_ns)
+                self._steps[i] = self._step_after(sensor, time_ns)
+        self.next_step = min(self._steps)
+
+    def _step_after(self, sensor: SensorPublisher, time_ns: int) -> int:
+        return -(-next_due(sensor.sensor.spec.period, time_ns) // self._timestep_ns)
