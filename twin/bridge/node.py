@@ -21,6 +21,7 @@ from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.keys import NodeToken
 from twin.errors import BridgeError
+from twin.periods import Period, period_of
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -128,11 +129,13 @@ class Node(NodeParameters, NodeGraph):
             Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
         )
 
-    def create_timer(self, period_ns: int, callback: Callable[[], Any], *, autostart: bool = True) -> Timer:
+    def create_timer(
+        self, period_ns: Period, callback: Callable[[], Any], *, autostart: bool = True
+    ) -> Timer:
         """Call back at multiples of a period [ns] of simulated time, first at the next one.
 
         Args:
-            period_ns: More than zero.
+            period_ns: More than zero; `twin.periods.period_of` a rate if it must be exact.
             callback: Takes nothing.
             autostart: Whether it runs without a `reset`.
 
@@ -151,7 +154,7 @@ class Node(NodeParameters, NodeGraph):
         """
         if not 0.0 < frequency <= 1e9:
             raise BridgeError(f"a rate of {frequency} Hz; valid is more than zero")
-        return Rate(round(1e9 / frequency), self.bus.clock)
+        return Rate(period_of(frequency), self.bus.clock)
 
     def create_task(self, generator: Generator[None, None, Any]) -> Task:
         """Run a generator: each spin of the node advances it to its next yield, first the next spin."""

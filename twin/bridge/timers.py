@@ -7,13 +7,14 @@ from typing import Any
 
 from twin.bridge.clock import Clock
 from twin.errors import BridgeError
+from twin.periods import Period, next_due
 
 
 class Timer:
     """Calls back at multiples of a period of simulated time; several missed ones are one call."""
 
     def __init__(
-        self, period_ns: int, callback: Callable[[], Any], clock: Clock, *, autostart: bool = True
+        self, period_ns: Period, callback: Callable[[], Any], clock: Clock, *, autostart: bool = True
     ) -> None:
         if period_ns <= 0:
             raise BridgeError(f"a timer period of {period_ns} ns; valid is more than zero")
@@ -61,13 +62,13 @@ class Timer:
             self._schedule(now_ns)
 
     def _schedule(self, now_ns: int) -> None:
-        self.next_ns = (now_ns // self.period_ns + 1) * self.period_ns
+        self.next_ns = next_due(self.period_ns, now_ns)
 
 
 class Rate:
     """Sleeps to the next multiple of a period in executions: `yield from rate.sleep()`."""
 
-    def __init__(self, period_ns: int, clock: Clock) -> None:
+    def __init__(self, period_ns: Period, clock: Clock) -> None:
         if period_ns <= 0:
             raise BridgeError(f"a rate with a period of {period_ns} ns; valid is more than zero")
         self.period_ns = period_ns
@@ -76,6 +77,6 @@ class Rate:
     def sleep(self) -> Generator[None, None, None]:
         """Wait until the clock reaches the next multiple of the period."""
         start_ns = self._clock.now_ns
-        until_ns = (start_ns // self.period_ns + 1) * self.period_ns
+        until_ns = next_due(self.period_ns, start_ns)
         while start_ns <= self._clock.now_ns < until_ns:
             yield

@@ -34,6 +34,10 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [Text(reason, style="red") for reason in _reasons(verdict)]
     lines.append(_summary(verdict))
+    if losses := verdict["metrics"].get("pace_losses"):
+        times = "once" if losses == 1 else f"{losses:.0f} times"
+        lost = f"the pace was lost {times}, {verdict['metrics']['pace_lost_s']:.1f} s in all"
+        lines.append(Text(lost, style="yellow"))
     if folder is not None:
         lines.append(Text(f"written to {folder}", style="dim"))
     return Group(*lines)

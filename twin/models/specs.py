@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from twin.geometry import Pose3
+from twin.periods import Period, period_of
 
 Interface = Literal["position", "velocity", "effort"]
 """Of ros2_control: [rad or m], [rad/s or m/s], [Nm or N]."""
@@ -63,6 +64,11 @@ class SensorSpec:
     T_link_sensor: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
     """From the sensor's `<pose>`; `twin.sim` samples at the link's origin."""
     line: int = 0
+
+    @property
+    def period(self) -> Period:
+        """Time between two samples [ns]."""
+        return period_of(self.rate_hz)
 
 
 @dataclass(frozen=True, kw_only=True)

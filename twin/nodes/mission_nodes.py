@@ -15,6 +15,7 @@ from twin.bridge.qos import LATCHED
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.nodes.mission_leaves import CallAction, Do, WaitUntil, sequence
+from twin.periods import next_due
 
 
 class MissionNode:
@@ -94,13 +95,17 @@ class ActionSequenceNode(MissionNode):
 
 
 class VelocityProfileNode(MissionNode):
-    """Sends velocities open loop on `cmd_vel`: steps of duration [s], linear [m/s], angular [rad/s]."""
+    """Sends velocities open loop on `cmd_vel`: steps of duration [s], linear [m/s], angular [rad/s].
+
+    A step ends in the first control period at or after its end; ends are counted from the start.
+    """
 
     def __init__(
         self,
         bus: Bus,
         steps: Sequence[tuple[float, float, float]],
         *,
+        control_period_ns: int = 20_000_000,
         period_ns: int = 100_000_000,
         settle_ns: int = 1_000_000_000,
         namespace: str = "",
@@ -112,23 +117,28 @@ class VelocityProfileNode(MissionNode):
             end += round(duration * 1e9)
             self._ends.append((end, linear, angular))
         self._settle_ns = settle_ns
-        self._start = self.node.now_ns
+        self._period_ns = period_ns
+        self._start = self._due_ns = next_due(period_ns, self.node.now_ns)
         self._step = -1
         self._commands = self.node.create_publisher(Twist, "cmd_vel", 10)
-        self.node.create_timer(period_ns, self._update)
+        self.node.create_timer(control_period_ns, self._update)
 
     def _update(self) -> None:
-        if self.done:
+        now = self.node.now_ns
+        elapsed = now - self._start
+        if self.done or elapsed < 0:
             return
-        elapsed = self.node.now_ns - self._start
-        step = next((i for i, (end, _, _) in enumerate(self._ends) if elapsed <= end), len(self._ends))
+        step = next((i for i, (end, _, _) in enumerate(self._ends) if elapsed < end), len(self._ends))
+        begins = step != self._step
+        if not begins and now < self._due_ns:
+            return
+        self._due_ns, self._step = next_due(self._period_ns, now), step
         if step == len(self._ends):
             self._commands.publish(twist_from_planar(0.0, 0.0))
-            if elapsed > self._ends[-1][0] + self._settle_ns:
+            if elapsed >= self._ends[-1][0] + self._settle_ns:
                 self.finish(succeeded=True)
             return
         _, linear, angular = self._ends[step]
-        if step != self._step:
-            self._step = step
+        if begins:
             self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
         self._commands.publish(twist_from_planar(linear, angular))

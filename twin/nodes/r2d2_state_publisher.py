@@ -13,6 +13,7 @@ from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
 from twin.nodes.mission_nodes import MissionNode
 from twin.nodes.navigation.robot_pose import Frames
+from twin.periods import period_of
 
 _DEGREE = math.pi / 180.0
 _SWEEPS = {"tilt": (-0.5, 0.0), "periscope": (0.0, 0.2)}
@@ -35,7 +36,7 @@ class R2D2StatePublisherNode(MissionNode):
         frames: Frames,
         move_base: Callable[[Pose2], None],
         radius: float = 2.0,
-        rate_hz: float = 25.0,
+        rate_hz: float = 30.0,
         degrees_per_cycle: float = 0.25,
         turns: float = 1.0,
         namespace: str = "",
@@ -52,7 +53,7 @@ class R2D2StatePublisherNode(MissionNode):
         self._rates = {"tilt": -_DEGREE, "swivel": _DEGREE, "periscope": 0.005}
         self._tf = TransformBroadcaster(self.node)
         self._commands = self.node.create_publisher(Float64MultiArray, "position_controller/commands", 1)
-        self.node.create_timer(round(1e9 / rate_hz), self._cycle)
+        self.node.create_timer(period_of(rate_hz), self._cycle)
 
     def _cycle(self) -> None:
         if self.done:

@@ -24,6 +24,7 @@ from twin.errors import BridgeError, ModelError
 from twin.geometry import rotate_wxyz
 from twin.models.description import Joint, RobotDescription
 from twin.models.loader import parse_urdf
+from twin.periods import period_of
 
 _MAX_HZ = 1000.0
 _MOVING = ("continuous", "revolute", "prismatic")
@@ -148,7 +149,7 @@ class RobotStatePublisherNode:
         self._prefix: str = self.node.get_parameter("frame_prefix").value
         self._ignores_stamps: bool = self.node.get_parameter("ignore_timestamp").value
         frequency: float = self.node.get_parameter("publish_frequency").value
-        self._period_ns = round(1e9 / frequency)
+        self._period_ns = period_of(frequency)
 
     def _check_frequency(self, frequency: float) -> None:
         if not 0.0 < frequency <= _MAX_HZ:

@@ -15,6 +15,7 @@ import numpy as np
 import rerun as rr
 
 from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
+from twin.periods import Period, next_due
 from twin.recording.columns import TIMELINE, ScalarColumns, TrailColumns, TransformColumns
 from twin.recording.frames import Frames
 
@@ -41,7 +42,7 @@ class Belief:
         namespace: str,
         true_pose: TruePose,
         *,
-        period_ns: int,
+        period: Period,
         trail_step_m: float,
     ) -> None:
         """Start without knowing anything.
@@ -51,14 +52,14 @@ class Belief:
             frames: Names of the run's frames.
             namespace: Of the robot's topics.
             true_pose: Reads the simulator.
-            period_ns: Trails and errors are sampled at most this often [ns].
+            period: Trails and errors are sampled in the first transform at or after its multiples [ns].
             trail_step_m: Length of a segment of a trail [m].
         """
         self._recording = recording
         self._frames = frames
         self._namespace = namespace
         self._true_pose = true_pose
-        self._period_ns = period_ns
+        self._period = period
         self._next_ns = 0
         self._base: str | None = None
         self._names: dict[tuple[str, str], tuple[str, str]] = {}
@@ -105,7 +106,7 @@ class Belief:
         elif parent.rsplit("/", 1)[-1] == "odom":
             if time_ns < self._next_ns:
                 return
-            self._next_ns = time_ns + self._period_ns
+            self._next_ns = next_due(self._period, time_ns)
             self._on_odometry(time_ns, parent, child, _pose2(transform))
         t, q = transform.translation, transform.rotation
         self._add(time_ns, parent, child, (t.x, t.y, t.z), (q.x, q.y, q.z, q.w))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from twin.errors import RecordingError
+from twin.periods import next_due, period_of
 from twin.recording.frames import WORLD, Frames
 from twin.recording.sources import Sample, World
 
@@ -98,7 +99,7 @@ class RerunSink:
         self._early: list[Sample] = []
         self._channels: dict[tuple[str, str], Channel | None] = {}
         self._beliefs: dict[str, Belief] = {}
-        self._period_ns = round(_NS / self._config.poses_hz)
+        self._period = period_of(self._config.poses_hz)
         self._block_ns = round(_NS * self._config.block_s)
         self._closed = False
 
@@ -160,7 +161,7 @@ class RerunSink:
         """Sample the poses when they are due, and write the block when it is full."""
         time_ns = world.time_ns
         if time_ns >= self._next_pose_ns:
-            self._next_pose_ns += self._period_ns * (1 + (time_ns - self._next_pose_ns) // self._period_ns)
+            self._next_pose_ns = next_due(self._period, time_ns)
             self._sample_poses(time_ns, world)
         if time_ns >= self._next_block_ns:
             self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
@@ -208,7 +209,7 @@ class RerunSink:
                 self._frames,
                 namespace,
                 self._world.pose,
-                period_ns=self._period_ns,
+                period=self._period,
                 trail_step_m=self._config.trail_step_m,
             )
         return self._beliefs[namespace]

@@ -13,7 +13,9 @@ import rerun.blueprint as rrb
 from twin.errors import RecordingError
 from twin.recording.frames import WORLD, Frames
 
-WALL_CLOCK_METRICS = frozenset({"wall_time_s", "cpu_time_s", "real_time_factor"})
+WALL_CLOCK_METRICS = frozenset(
+    {"wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s"}
+)
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
 
 

@@ -135,7 +135,9 @@ def build(
             )
             for robot in scenario.robots
         }
-        mission = build_mission(bus, scenario.mission, stacks, arena, namespaces, scenario.seed)
+        mission = build_mission(
+            bus, scenario.mission, stacks, arena, namespaces, scenario.seed, control_period_ns
+        )
         bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)

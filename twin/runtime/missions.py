@@ -85,6 +85,7 @@ def build_mission(
     arena: Arena | None,
     namespaces: Mapping[str, str],
     seed: int,
+    control_period_ns: int,
 ) -> MissionHandle:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
@@ -107,7 +108,9 @@ def build_mission(
             return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
         case VelocityProfile():
             profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
-            return VelocityProfileNode(bus, profile * mission.repeat, namespace=namespace)
+            return VelocityProfileNode(
+                bus, profile * mission.repeat, control_period_ns=control_period_ns, namespace=namespace
+            )
         case Explore():
             return _explore(bus, mission, stack, namespace)
         case R2D2StatePublisher():

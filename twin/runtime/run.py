@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -15,14 +14,16 @@ from twin.bridge.bags.tap import BagTap
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
-from twin.errors import RecordingError, ScenarioError
+from twin.errors import RecordingError
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
 from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
+from twin.runtime.pacing import Pace
 from twin.runtime.saved_maps import save_maps
+from twin.runtime.sensing import SensorSchedule
 from twin.scenario.checks import Check
 from twin.scenario.outside import ALONE, ClockMode, Outside
 from twin.scenario.provenance import cpu_class, versions
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
-"""Checks see one observation in so many control ticks; contacts and power of the others are in it."""
+"""Checks see one observation in so many ticks; contacts and power of the others are in it."""
 _SETTLE_NS = 1_000_000_000
 """The run goes on for so long after its mission has ended, so that the recording shows how it ended."""
 
@@ -65,10 +66,11 @@ class Run:
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
         self._sink = sink
-        self._sensors = [sensor for stack in parts.stacks.values() for sensor in stack.sensors]
-        self.tick_ns = self._tick_length()
+        self._schedule = SensorSchedule(
+            [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
+        )
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
-        self._substeps = self.tick_ns // self.world.timestep_ns
+        self._substeps = parts.control_period_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(
@@ -79,19 +81,6 @@ class Run:
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
         self._check()  # where everything starts
-
-    def _tick_length(self) -> int:
-        """Return the greatest common divisor of all periods [ns]; each is a multiple of the physics step."""
-        step = self.world.timestep_ns
-        periods = {f"sensor '{s.sensor.spec.name}'": s.sensor.period_ns for s in self._sensors}
-        periods["control_period"] = self.parts.control_period_ns
-        for what, period in periods.items():
-            if period % step:
-                raise ScenarioError(
-                    f"the period of {what}, {period / 1e6:g} ms, is not a whole multiple of the physics "
-                    f"step, {step / 1e6:g} ms"
-                )
-        return math.gcd(*periods.values())
 
     @property
     def over(self) -> bool:
@@ -126,15 +115,19 @@ class Run:
         self._faults.update()
 
     def step(self) -> None:
-        """4. Physics."""
-        self.world.step(self._substeps)
+        """4. Physics; a sensor due on the way samples and publishes there."""
+        world, schedule = self.world, self._schedule
+        end = world.step_count + self._substeps
+        while schedule.next_step < end:
+            world.step(schedule.next_step - world.step_count)
+            self.parts.clock.now_ns = world.time_ns
+            schedule.fire(world.step_count)
+        world.step(end - world.step_count)
 
     def sense(self) -> None:
         """5. Sensors due publish, stamped with the new time."""
-        now = self.parts.clock.now_ns = self.world.time_ns
-        for sensor in self._sensors:
-            if now % sensor.sensor.period_ns == 0:
-                sensor.publish(now)
+        self.parts.clock.now_ns = self.world.time_ns
+        self._schedule.fire(self.world.step_count)
 
     def clock(self) -> None:
         """6. `/clock`."""
@@ -148,8 +141,7 @@ class Run:
     def sinks(self) -> None:
         """7. Checks and recording."""
         now = self.world.time_ns
-        if now % self.parts.control_period_ns == 0:
-            self._observer.gather()
+        self._observer.gather()
         if now % self._observation_ns == 0 or self.parts.mission.done:
             self._check()
         if self._sink is not None:
@@ -181,7 +173,8 @@ def run(
         out: Folder for the recording, for maps that robots make, and for the last states if the physics
             diverges; None writes none of them.
         record: Whether to write `<scenario>.rrd`.
-        pace: Simulated seconds per second; None is as fast as possible. Changes no result.
+        pace: Simulated seconds per second; None is as fast as possible. Changes no result. What is lost is
+            not caught up; the verdict tells of it.
         listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`. Unless the run waits for
             them, they make it non-deterministic, and the verdict says so.
         network: How else the bus takes part in a network, instead of `listen`.
@@ -219,8 +212,9 @@ def run(
             ending.callback(simulation.lockstep.close)
         if sink is not None:
             sink.declare(parts.world)
-        wall, cpu = _loop(simulation, pace, progress, watch)
-        verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
+        keeper = None if pace is None else Pace(pace)
+        wall, cpu = _loop(simulation, keeper, progress, watch)
+        verdict = _verdict(simulation, digest, wall, cpu, keeper, outside.clock(parts.bus.networked))
         if out is not None:
             save_maps(parts.stacks, out)
         if sink is not None:
@@ -250,7 +244,7 @@ def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
 
 def _loop(
     simulation: Run,
-    pace: float | None,
+    pace: Pace | None,
     progress: Callable[[Progress], None] | None,
     watch: Callable[[Run], bool] | None,
 ) -> tuple[float, float]:
@@ -262,10 +256,10 @@ def _loop(
         simulation.tick()
         if watch is not None and watch(simulation):
             break
-        now = time.perf_counter()
         simulated = simulation.world.time_ns * 1e-9
-        if pace is not None and (ahead := simulated / pace - (now - wall)) > 0.0:
-            time.sleep(ahead)
+        if pace is not None:
+            pace.keep(simulated)
+        now = time.perf_counter()
         if progress is not None and now - shown > 0.25:
             shown = now
             progress(
@@ -281,7 +275,9 @@ def _loop(
     return elapsed
 
 
-def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock: ClockMode) -> Verdict:
+def _verdict(
+    simulation: Run, digest: RunDigest, wall: float, cpu: float, pace: Pace | None, clock: ClockMode
+) -> Verdict:
     simulated = simulation.world.time_ns * 1e-9
     navigators = [
         stack.navigator for stack in simulation.parts.stacks.values() if stack.navigator is not None
@@ -296,6 +292,7 @@ def _verdict(simulation: Run, digest: RunDigest, wall: float, cpu: float, clock:
             "wall_time_s": wall,
             "cpu_time_s": cpu,
             "real_time_factor": simulated / wall,
+            **({} if pace is None else {"pace_losses": float(pace.losses), "pace_lost_s": pace.lost_s}),
             "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
             **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
             **({"trailing_bytes": float(simulation.bus.trailing)} if simulation.bus.trailing else {}),

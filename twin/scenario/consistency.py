@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from twin.errors import nearest
+from twin.periods import period_of
 from twin.scenario.checks.check import CheckConfig
 from twin.scenario.faults import RobotFault
 from twin.scenario.missions import (
@@ -15,7 +16,6 @@ from twin.scenario.missions import (
     PickAndPlace,
     R2D2StatePublisher,
     RandomGoals,
-    VelocityProfile,
 )
 from twin.strict_yaml import Fault, Loc
 
@@ -58,22 +58,21 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
         text = f"the control period {_whole(control, 'physics steps', timestep)}"
         yield Fault(("physics", "control_period"), text)
         return
-    mission = scenario.mission
-    periods: list[tuple[Loc, str, float]] = [(("duration",), "the duration", scenario.duration)]
+    rates: list[tuple[Loc, str, float]] = []
     if scenario.recording.enabled:
-        period = 1.0 / scenario.recording.poses_hz
-        periods.append((("recording", "poses_hz"), "the period of the recorded poses", period))
-    if isinstance(mission, R2D2StatePublisher):
-        periods.append((("mission", "rate"), "the period of the publisher", 1.0 / mission.rate))
-    if isinstance(mission, VelocityProfile):
-        for i, step in enumerate(mission.steps):
-            periods.append((("mission", "steps", i, "duration"), "the duration of the step", step.duration))
+        rates.append(
+            (("recording", "poses_hz"), "the rate of the recorded poses", scenario.recording.poses_hz)
+        )
+    if isinstance(scenario.mission, R2D2StatePublisher):
+        rates.append((("mission", "rate"), "the rate of the publisher", scenario.mission.rate))
+    for loc, what, rate in rates:
+        if period_of(rate) < nanoseconds(control):
+            most = f"at most {1.0 / control:.6g} Hz, one per control period ({control * 1e3:g} ms)"
+            yield Fault(loc, f"{what} ({rate:g} Hz) must be {most}")
     for i, robot in enumerate(scenario.robots):
-        latency = robot.command_latency
-        periods.append((("robots", i, "command_latency"), "the latency of commands", latency))
-    for loc, what, period in periods:
-        if nanoseconds(period) % max(1, nanoseconds(control)):
-            yield Fault(loc, f"{what} {_whole(period, 'control periods', control)}")
+        if nanoseconds(robot.command_latency) % max(1, nanoseconds(control)):
+            whole = _whole(robot.command_latency, "control periods", control)
+            yield Fault(("robots", i, "command_latency"), f"the latency of commands {whole}")
 
 
 def _whole(period: float, units: str, unit: float) -> str:

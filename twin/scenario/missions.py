@@ -173,8 +173,8 @@ class R2D2StatePublisher(StrictModel):
     """Name of the robot."""
     radius: Annotated[Metres, NotNegative] = 2.0
     """Radius of the circle about the origin of `odom` [m]."""
-    rate: Annotated[Hertz, Positive] = 25.0
-    """Cycles per second [Hz]; a whole number of control periods each (the tutorial's 30 Hz is not)."""
+    rate: Annotated[Hertz, Positive] = 30.0
+    """Cycles per second [Hz], at most one per control period."""
     degrees_per_cycle: Annotated[float, Positive] = 0.25
     """Progress on the circle per cycle [deg]."""
 

@@ -23,7 +23,7 @@ class Verdict:
     seed: int
     checks: tuple[CheckResult, ...] = ()
     metrics: Mapping[str, float] = field(default_factory=dict)
-    """`sim_time_s`, `wall_time_s`, `cpu_time_s`, `real_time_factor` and what a mission adds."""
+    """`sim_time_s`, `wall_time_s`, `cpu_time_s`, `real_time_factor`, `recoveries`; of some runs more."""
     digest: str | None = None
     """SHA-256 over every published sample and the final physics state; None if the run was not finished."""
     deterministic: bool = True

@@ -85,4 +85,4 @@ class RecordingConfig(StrictModel):
     enabled: bool = True
     """Whether to write one."""
     poses_hz: Annotated[Hertz, Positive] = 25.0
-    """Rate of the poses [Hz]; its period is a whole number of control periods."""
+    """Rate of the poses [Hz], at most one per control period."""

@@ -89,7 +89,7 @@ class World:
 
         Raises:
             ScenarioError: Two things have the same name.
-            ModelError: A sensor's period is not a whole multiple of the physics step.
+            ModelError: A sensor is faster than the physics.
         """
         physics = physics or Physics()
         spec = build_spec(scene, robots, physics)

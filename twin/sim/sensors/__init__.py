@@ -1,4 +1,4 @@
-"""Sensors: bound to a compiled world, they turn its state into noisy readings at their own period."""
+"""Sensors: bound to a compiled world, they turn its state into noisy readings."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ def create_sensor(spec: SensorSpec, mount: Mount) -> Sensor:
     """Build the sensor that `spec` describes.
 
     Raises:
-        ModelError: Its period is not a whole multiple of the physics step.
+        ModelError: It is faster than the physics.
     """
+    mount.check_rate(spec)
     if isinstance(spec, LidarSpec):
         return Lidar(spec, mount)
     if isinstance(spec, ImuSpec):

@@ -24,7 +24,6 @@ class ContactSensor:
 
     def __init__(self, spec: ContactSpec, mount: Mount) -> None:
         self.spec = spec
-        self.period_ns = mount.period_ns(spec)
         self._world = mount.world
         self._body = mount.body
 

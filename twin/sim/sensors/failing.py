@@ -19,7 +19,6 @@ class FailingLidar:
 
     def __init__(self, lidar: Lidar) -> None:
         self.spec: LidarSpec = lidar.spec
-        self.period_ns = lidar.period_ns
         self.failure: LidarFailure | None = None
         self._lidar = lidar
         self._last: LidarReading | None = None

@@ -33,7 +33,6 @@ class Imu:
 
     def __init__(self, spec: ImuSpec, mount: Mount) -> None:
         self.spec = spec
-        self.period_ns = mount.period_ns(spec)
         self._world = mount.world
         self._body = mount.body_id
         self._noise = mount.noise(spec.name)

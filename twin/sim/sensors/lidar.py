@@ -29,7 +29,6 @@ class Lidar:
 
     def __init__(self, spec: LidarSpec, mount: Mount) -> None:
         self.spec = spec
-        self.period_ns = mount.period_ns(spec)
         angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
         directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(spec.samples)))
         self._rays = RayCaster(mount, directions, cutoff=spec.range_max)

@@ -45,7 +45,6 @@ class Range:
 
     def __init__(self, spec: RangeSpec, mount: Mount) -> None:
         self.spec = spec
-        self.period_ns = mount.period_ns(spec)
         self._rays = RayCaster(mount, cone(spec.field_of_view), cutoff=spec.range_max)
         self._noise = mount.noise(spec.name)
         self._world = mount.world

@@ -21,10 +21,6 @@ class Sensor(Protocol):
     def spec(self) -> SensorSpec:
         """What the robot file says about it."""
 
-    @property
-    def period_ns(self) -> int:
-        """Time between two samples, a whole multiple of the physics step [ns]."""
-
     def sample(self, time_ns: int) -> Any:
         """Return a reading, a frozen dataclass; `time_ns` is the world's time."""
 
@@ -53,20 +49,17 @@ class Mount:
         """Return the stream of one noisy part of a sensor."""
         return NoiseStream(self.world.seed, f"{self.robot}/{sensor}/{part}")
 
-    def period_ns(self, spec: SensorSpec) -> int:
-        """Return the period of a rate.
+    def check_rate(self, spec: SensorSpec) -> None:
+        """Refuse what is faster than the physics.
 
         Raises:
-            ModelError: It is not a whole multiple of the physics step.
+            ModelError: It is.
         """
-        period = round(1e9 / spec.rate_hz)
         step = self.world.timestep_ns
-        if period % step == 0:
-            return period
-        below = max(1, period // step)
-        valid = " or ".join(f"{1e9 / (n * step):.6g} Hz" for n in (below + 1, below))
-        message = (
-            f"sensor '{spec.name}' of robot '{self.robot}' samples every {period / 1e6:g} ms, not a whole "
-            f"multiple of the physics step of {step / 1e6:g} ms; valid near {spec.rate_hz:g} Hz: {valid}"
-        )
-        raise ModelError(Problem(message, self.source, spec.line or None))
+        if spec.period < step:
+            message = (
+                f"sensor '{spec.name}' of robot '{self.robot}' samples at {spec.rate_hz:g} Hz, faster than "
+                f"the physics steps; valid is at most {1e9 / step:.6g} Hz, or a physics.timestep of at most "
+                f"{1e3 / spec.rate_hz:.6g} ms instead of {step / 1e6:g} ms"
+            )
+            raise ModelError(Problem(message, self.source, spec.line or None))

@@ -1,0 +1,44 @@
+"""Simulated time against the clock on the wall."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+_SLACK_S = 0.1
+"""A run that is behind by no more makes up for it; what goes beyond is lost, as in Gazebo, so that nobody who
+steers it sees the robots rush."""
+
+
+class Pace:
+    """Holds a run back to so many simulated seconds per second, and counts what it could not keep."""
+
+    def __init__(
+        self,
+        factor: float,
+        *,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Start at simulated time 0 with `factor` simulated seconds per second."""
+        self._factor = factor
+        self._clock, self._sleep = clock, sleep
+        self._start = clock()
+        """When the run would have started if nothing had been lost."""
+        self._is_kept = True
+        self.losses = 0
+        """How often the pace was lost: once for as long as the run is not in time again."""
+        self.lost_s = 0.0
+        """How much later the run is for it, by the clock on the wall [s]."""
+
+    def keep(self, simulated_s: float) -> None:
+        """Wait until the time of a simulated one has come."""
+        ahead = self._start + simulated_s / self._factor - self._clock()
+        if ahead > 0.0:
+            self._is_kept = True
+            self._sleep(ahead)
+        elif ahead < -_SLACK_S:
+            self.losses += self._is_kept
+            self._is_kept = False
+            self.lost_s -= ahead
+            self._start -= ahead
