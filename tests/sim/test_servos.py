@@ -49,7 +49,10 @@ class Bot:
         self.world = World.compose(Scene(name="s", statics=(stand,), goods=(tote,)), [placement], physics)
         self.hardware = self.world.robots["r"].hardware
         self.steps = round(0.02 / physics.timestep)
-        self.fastest: dict[str, float] = {}
+        model = self.world.model
+        self._dofs = [model.joint(f"r/{name}").dofadr[0] for name in self.hardware.joint_names]
+        self.fastest = dict.fromkeys(self.hardware.joint_names, 0.0)
+        """Joint -> greatest speed so far [rad/s or m/s]."""
         for joint in FINGERS:
             self.world.data.joint(f"r/{joint}").qpos = 0.17
 
@@ -61,9 +64,9 @@ class Bot:
             self.hardware.apply()
             for _ in range(self.steps):
                 self.world.step()
-                for joint in self.hardware.joint_names:
-                    speed = abs(self.world.data.joint(f"r/{joint}").qvel[0])
-                    self.fastest[joint] = max(self.fastest.get(joint, 0.0), speed)
+                speeds = abs(self.world.data.qvel[self._dofs]).tolist()
+                for joint, speed in zip(self.hardware.joint_names, speeds, strict=True):
+                    self.fastest[joint] = max(self.fastest[joint], speed)
 
     def position(self, joint: str) -> float:
         return float(self.world.data.joint(f"r/{joint}").qpos[0])
@@ -111,13 +114,13 @@ def test_a_commanded_trajectory_is_followed_without_a_jerk_at_every_tick() -> No
     bot = Bot()
     bot.take_tote_away()
     bot.run(0.5)
-    bot.fastest.clear()
+    bot.fastest["lift_joint"] = 0.0
     for tick in range(50):
         bot.run(0.02, lift_joint=0.004 * (tick + 1))
     assert bot.fastest["lift_joint"] < 1.02 * 0.2
 
 
-@pytest.mark.parametrize("effort", [20.0, 40.0, 80.0, 500.0])
+@pytest.mark.parametrize("effort", [40.0, 500.0])
 def test_a_finger_presses_with_the_effort_it_is_allowed(effort: float) -> None:
     bot = Bot()
     bot.hardware.limit_effort("left_finger_joint", effort)
