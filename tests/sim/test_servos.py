@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import pytest
 
@@ -21,6 +22,9 @@ FINGERS = ("left_finger_joint", "right_finger_joint")
 ARM = ("lift_joint", "arm_stage_1_joint", "wrist_yaw_joint")
 
 
+warehouse_bot = functools.cache(functools.partial(load, "warehouse_bot"))
+
+
 def boxed(size: tuple[float, float, float]) -> tuple[Shape, ...]:
     return (Shape(geometry=Box(size=size)),)
 
@@ -35,7 +39,7 @@ class Bot:
         physics: Physics | None = None,
         description: RobotDescription | None = None,
     ) -> None:
-        description = description or load("warehouse_bot")
+        description = description or warehouse_bot()
         physics = physics or Physics()
         at = Pose3.from_xyz_rpy((0.2, 0.0, 0.42))
         stand = StaticBody(
@@ -81,7 +85,7 @@ class Bot:
 
 
 def limit(joint: str) -> float:
-    velocity = load("warehouse_bot").joints[joint].limit.velocity
+    velocity = warehouse_bot().joints[joint].limit.velocity
     assert velocity is not None
     return velocity
 
@@ -140,7 +144,7 @@ def test_the_grip_is_as_good_as_the_friction_of_the_tote(friction: float, lifted
 
 
 def test_an_effort_command_ends_at_the_velocity_limit() -> None:
-    robot = load("warehouse_bot")
+    robot = warehouse_bot()
     commands = {**robot.commands, "wrist_yaw_joint": CommandSpec(joint="wrist_yaw_joint", interface="effort")}
     bot = Bot(description=dataclasses.replace(robot, commands=commands))
     bot.take_tote_away()
