@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from pathlib import Path
 
+import mujoco
 import pytest
 
 from twin.convert import convert
@@ -154,3 +156,20 @@ def test_an_effort_command_ends_at_the_velocity_limit() -> None:
     assert efforts["wrist_yaw_joint"] == pytest.approx(5.0)
     bot.run(0.2, wrist_yaw_joint=30.0)
     assert 0.9 * limit("wrist_yaw_joint") < bot.fastest["wrist_yaw_joint"] < 1.05 * limit("wrist_yaw_joint")
+
+
+def test_wheels_whose_motors_take_efforts_are_driven_by_velocity_all_the_same() -> None:
+    robot = warehouse_bot()
+    wheels = ("wheel_left_joint", "wheel_right_joint")
+    commands = {wheel: CommandSpec(joint=wheel, interface="effort") for wheel in wheels}
+    bot = Bot(description=dataclasses.replace(robot, commands={**robot.commands, **commands}))
+    bot.take_tote_away()
+    bot.run(1.0, **dict.fromkeys(wheels, 3.0))
+    assert bot.world.data.joint(f"r/{wheels[0]}").qvel[0] == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_saved_world_has_the_same_drives(tmp_path: Path) -> None:
+    bot = Bot()
+    saved = mujoco.MjModel.from_xml_path(str(bot.world.save_model(tmp_path)))
+    for name in ("actuator_dyntype", "actuator_biasprm", "actuator_dynprm", "dof_armature"):
+        assert getattr(saved, name) == pytest.approx(getattr(bot.world.model, name)), name

@@ -120,17 +120,21 @@ def moved_inertia(description: RobotDescription, model: mujoco.MjModel) -> dict[
     return moved
 
 
+def leader_of(description: RobotDescription, joint: str) -> tuple[str, float]:
+    """Return the joint whose drive moves `joint`, and the velocity of `joint` per velocity of that one."""
+    share, leader = 1.0, description.joints[joint]
+    if leader.type not in ONE_DOF:
+        return joint, 0.0
+    while leader.mimic is not None:
+        share *= leader.mimic.multiplier
+        leader = description.joints[leader.mimic.joint]
+    return (leader.name, share) if leader.type in ONE_DOF else (joint, 1.0)
+
+
 def driven_joints(description: RobotDescription, joint: str) -> dict[str, float]:
     """Return `joint` and all joints that mimic it, each with its velocity per velocity of `joint`."""
-    shares = {}
-    for other in description.joints.values():
-        share, leader = 1.0, other
-        while leader.mimic is not None:
-            share *= leader.mimic.multiplier
-            leader = description.joints[leader.mimic.joint]
-        if leader.name == joint and other.type in ONE_DOF:
-            shares[other.name] = share
-    return shares
+    found = {name: leader_of(description, name) for name in description.joints}
+    return {name: share for name, (leader, share) in found.items() if leader == joint and share}
 
 
 def drive_ratio(description: RobotDescription, joint: str) -> float:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.convert.actuators import drive_ratio, driven_joints
+from twin.convert.actuators import drive_ratio, leader_of
 from twin.convert.roles import commanded_wheels
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
@@ -104,7 +104,11 @@ class Hardware:
             model, data, np.array(driven, dtype=np.intp), self.config.wheel_integral_gain
         )
         self._positions = PositionServos(model, data, self._actuators)
-        by_effort = [command for command in description.commands.values() if command.interface == "effort"]
+        by_effort = [
+            command
+            for name, command in description.commands.items()
+            if command.interface == "effort" and name not in wheels
+        ]
         self._efforts = EffortServos(
             model,
             data,
@@ -169,10 +173,9 @@ class Hardware:
         """
         index = self._drive(joint)
         strongest = min(effort * self._ratios[index], self._strongest[index])
-        if math.isfinite(strongest):
-            actuator = self._actuators[index]
-            self._model.actuator_forcelimited[actuator] = True
-            self._model.actuator_forcerange[actuator] = -strongest, strongest
+        actuator = self._actuators[index]
+        self._model.actuator_forcelimited[actuator] = math.isfinite(strongest)
+        self._model.actuator_forcerange[actuator] = -strongest, strongest
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
@@ -211,14 +214,13 @@ class Hardware:
         self, model: mujoco.MjModel, robot: str, description: RobotDescription
     ) -> tuple[NDArray[np.intp], Array]:
         """Return for each joint the velocity address of the joint whose drive moves it, and its share."""
-        dofs, shares = self._dof.copy(), np.ones(len(self.joint_names))
-        for leader in self.joint_names:
-            ratio = drive_ratio(description, leader)
-            for name, share in driven_joints(description, leader).items():
-                index = self.joint_names.index(name)
-                dofs[index] = model.joint(f"{robot}/{leader}").dofadr[0]
-                shares[index] = math.copysign(1.0, share) / ratio
-        return dofs, shares
+        found = [leader_of(description, name) for name in self.joint_names]
+        ratios = dict.fromkeys((leader for leader, _ in found), 0.0)
+        for leader, share in found:
+            ratios[leader] += abs(share)
+        dofs = [model.joint(f"{robot}/{leader}").dofadr[0] for leader, _ in found]
+        shares = [np.sign(share) / ratios[leader] for leader, share in found]
+        return np.array(dofs, dtype=np.intp), np.array(shares)
 
     def _arrived(self) -> Array:
         """Send the present commands on their way; return the newest ones that have arrived."""
