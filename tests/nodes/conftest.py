@@ -98,14 +98,20 @@ class Joints:
         self.position = np.zeros(len(self.joint_names))
         self.velocity = np.zeros(len(self.joint_names))
         self.target = np.zeros(len(self.joint_names))
+        self.strongest: dict[str, float] = {}
+        """Joint -> limit of its effort."""
         self.blocked: dict[str, float] = {}
         """Joint -> position below which it cannot go."""
 
     def read(self) -> Reading:
-        return Reading(self.position.copy(), self.velocity.copy(), np.zeros(len(self.joint_names)))
+        effort = [-self.strongest.get(joint, 0.0) for joint in self.joint_names]
+        return Reading(self.position.copy(), self.velocity.copy(), np.array(effort))
 
     def command(self, joint: str, value: float) -> None:
         self.target[self.joint_names.index(joint)] = value
+
+    def limit_effort(self, joint: str, effort: float) -> None:
+        self.strongest[joint] = effort
 
     def advance(self) -> None:
         """One tick."""

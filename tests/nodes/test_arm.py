@@ -44,8 +44,8 @@ class Arm:
         trajectory = JointTrajectory(header=header(0, ""), joint_names=list(names), points=messages)
         return self.trajectory.send_goal(new(FollowJointTrajectory.Goal, trajectory=trajectory))
 
-    def grip(self, position: float) -> Any:
-        command = new(GripperCommandMsg, position=position, max_effort=10.0)
+    def grip(self, position: float, max_effort: float = 10.0) -> Any:
+        command = new(GripperCommandMsg, position=position, max_effort=max_effort)
         return self.gripper.send_goal(new(GripperCommand.Goal, command=command))
 
     def ended(self, goal: Any, seconds: float = 10.0) -> Any:
@@ -144,6 +144,16 @@ def test_gripper_stalls_on_something(arm: Arm) -> None:
     assert (result.reached_goal, result.stalled) == (False, True)
     assert result.position == pytest.approx(0.12)
     assert arm.joints.target[2] == 0.0, "and it goes on squeezing"
+
+
+@pytest.mark.parametrize(("max_effort", "limit"), [(40.0, 40.0), (0.0, math.inf), (-1.0, math.inf)])
+def test_gripper_presses_with_no_more_than_max_effort_if_there_is_one(
+    arm: Arm, max_effort: float, limit: float
+) -> None:
+    arm.joints.blocked["finger"] = 0.12
+    result = arm.ended(arm.grip(0.0, max_effort))
+    assert arm.joints.strongest["finger"] == limit
+    assert result.effort == limit, "the effort exerted, whichever way the finger presses"
 
 
 def test_gripper_cancelled_stays_where_it_is(bench: Bench, arm: Arm) -> None:

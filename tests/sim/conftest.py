@@ -31,12 +31,12 @@ XML = """
       <body name="imu" pos="0.1 0 0.05"/>
       <body name="left_wheel" pos="0 .15 0">
         <joint name="left_wheel_joint" axis="0 1 0" armature=".001"/>
-        <geom type="ellipsoid" size=".05 .02 .05" group="3" priority="1" mass=".2"
+        <geom type="ellipsoid" size=".05 .02 .05" group="3" priority="2" mass=".2"
           friction=".9 .005 .0001" solref=".004 1"/>
       </body>
       <body name="right_wheel" pos="0 -.15 0">
         <joint name="right_wheel_joint" axis="0 1 0" armature=".001"/>
-        <geom type="ellipsoid" size=".05 .02 .05" group="3" priority="1" mass=".2"
+        <geom type="ellipsoid" size=".05 .02 .05" group="3" priority="2" mass=".2"
           friction=".9 .005 .0001" solref=".004 1"/>
       </body>
       <body name="mast" pos="-.1 0 .08">

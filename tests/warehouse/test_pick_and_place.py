@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
@@ -21,11 +22,12 @@ from twin.bridge.clock import Clock
 from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
 from twin.bridge.msgs import JointState, PoseArray, String, header, new
 from twin.bridge.srvs import SetBool
+from twin.bridge.tf import TransformBuffer
 from twin.bridge.types import ActionType
-from twin.geometry import Pose2
+from twin.geometry import Pose2, Pose3
 from twin.manipulation.telescopic_arm import GraspPose
 from twin.models import load
-from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.runtime import derive
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
 from twin.warehouse.skills import Station
@@ -56,6 +58,10 @@ class Robot:
         self.at_closing: list[GraspPose] = []
         self.failures: dict[str, list[str]] = {}
         """Action -> reasons with which its next goals fail."""
+        self.effort = 80.0
+        """Of the finger while it grips [N]."""
+        self.driving_takes_ns = 20_000_000
+        self.transforms = TransformBuffer()
         self.node = bus.create_node("robot")
         self._serve("navigate_to_pose", NavigateToPose, self._navigate)
         self._serve("dock_robot", DockRobot, lambda goal: f"dock {goal.dock_type}")
@@ -79,15 +85,16 @@ class Robot:
             self.manipulator.arm,
             gripper_joint=self.manipulator.gripper_joint,
             gripper_open=self.manipulator.gripper_open,
-            frames=Frames(),
+            robot_pose=RobotPose(self.transforms, Frames()),
         )
         while not mission.done:
             assert self.clock.now_ns < seconds * 1e9, f"no end; it is at {mission.state!r}"
             self.clock.now_ns += 20_000_000
             names = list(self.positions)
             zeros, values = np.zeros(len(names)), np.array(list(self.positions.values()))
+            effort = np.array([-self.effort * (name == self.manipulator.gripper_joint) for name in names])
             self._joints.publish(
-                JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=zeros)
+                JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=effort)
             )
             if self.sees_tote and self._detecting and self.clock.now_ns % 100_000_000 == 0:
                 poses = [pose_from_pose2(pose) for pose in self.totes_in_base]
@@ -99,7 +106,14 @@ class Robot:
 
     def _serve(self, name: str, action: ActionType, perform: Callable[[Any], Any]) -> None:
         def execute(handle: GoalHandle) -> Generator[None, None, Any]:
+            start = self.clock.now_ns
             yield
+            while name == "navigate_to_pose" and self.clock.now_ns - start < self.driving_takes_ns:
+                if handle.is_cancel_requested:
+                    self.log.append(f"cancelled at {self.clock.now_ns * 1e-9:.1f} s")
+                    handle.canceled()
+                    return new(action.Result)
+                yield
             if self.failures.get(name):
                 handle.abort()
                 key = "error_string" if action is FollowJointTrajectory else "error_msg"
@@ -135,7 +149,11 @@ class Robot:
         self.positions[self.manipulator.gripper_joint] = position
         self.log.append("close" if closing else "open")
         return new(
-            GripperCommand.Result, position=position, stalled=holds and self.stalls, reached_goal=not holds
+            GripperCommand.Result,
+            position=position,
+            effort=self.effort,
+            stalled=holds and self.stalls,
+            reached_goal=not holds,
         )
 
     @property
@@ -263,16 +281,43 @@ def test_without_a_tote_in_sight_it_does_not_reach(robot: Robot) -> None:
     assert not any(state.endswith("reach") for state in robot.states)
 
 
-def test_a_tote_lost_on_the_way_is_noticed(robot: Robot) -> None:
+def fingers_close(robot: Robot) -> None:
+    robot.positions[robot.manipulator.gripper_joint] = 0.09
+
+
+def grip_fails(robot: Robot) -> None:
+    robot.effort = 0.0
+
+
+@pytest.mark.parametrize(
+    ("happens", "told"),
+    [
+        (fingers_close, "finger at 0.090 m instead of 0.120 m"),
+        (grip_fails, "finger presses with 0 N instead of 80 N"),
+    ],
+)
+def test_a_tote_lost_on_the_way_ends_the_drive_at_once(
+    robot: Robot, happens: Callable[[Robot], None], told: str
+) -> None:
+    robot.driving_takes_ns = 20_000_000_000
+    robot.transforms.set_transform(
+        "map", "base_footprint", 0, Pose3.from_xyz_rpy((6.0, 1.0, 0.0)), static=True
+    )
+    lost: list[float] = []
+
     def lose() -> None:
-        if robot.states and robot.states[-1] == "tote_a: carry to table":
-            robot.positions[robot.manipulator.gripper_joint] = 0.0
+        if robot.states and robot.states[-1] == "tote_a: carry to table" and not lost:
+            lost.append(robot.clock.now_ns * 1e-9)
+            happens(robot)
 
     robot.node.create_timer(20_000_000, lose)
     mission = robot.run()
     assert mission.succeeded is False
-    assert "lost tote_a: finger at 0.000 m instead of 0.120 m" in mission.reason
-    assert "dock table" not in robot.log
+    noticed = re.search(r"lost tote_a at ([\d.]+) s, at \(6.00, 1.00\): (.*)", mission.reason)
+    assert noticed is not None
+    assert lost[0] < float(noticed[1]) < lost[0] + 0.3
+    assert noticed[2] == told
+    assert robot.log[-1].startswith("cancelled"), "the drive ends, too"
 
 
 def test_navigation_that_fails_ends_the_mission_with_its_reason(robot: Robot) -> None:

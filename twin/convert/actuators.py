@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -30,23 +31,20 @@ FOLLOWER_SOLIMP = [0.99, 0.999, 0.001, 0.5, 2.0]
 
 
 def add_actuators(
-    spec: mujoco.MjSpec, description: RobotDescription, model: mujoco.MjModel, *, timestep: float
+    spec: mujoco.MjSpec, description: RobotDescription, moved: Mapping[str, float], *, timestep: float
 ) -> list[Guess]:
     """Add what drives the joints; return what was chosen.
 
     Args:
         spec: Gets the actuators and equalities.
         description: The robot.
-        model: `spec` compiled without them, for the inertia that each joint moves.
+        moved: The inertia that each commanded joint moves, from `moved_inertia`.
         timestep: [s]
     """
     guesses = _add_wheels(spec, description)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     for command in description.commands.values():
         if spec.actuator(command.joint) is None:
-            inertia = moved_inertia(description, description.joints[command.joint], model, data)
-            guesses += _add_commanded(spec, description, command, inertia)
+            guesses += _add_commanded(spec, description, command, moved[command.joint])
     for joint in description.joints.values():
         if joint.mimic is not None and joint.type in ONE_DOF:
             leader = description.joints[joint.mimic.joint]
@@ -83,7 +81,12 @@ def _add_commanded(
     joint = description.joints[command.joint]
     limit = joint.limit
     actuator = _add(spec, joint)
-    _limit_force(actuator, limit.effort)
+    # The file's limit is of each joint; a drive that others follow has to move them all.
+    _limit_force(
+        actuator, None if limit.effort is None else limit.effort * drive_ratio(description, joint.name)
+    )
+    if actuator.forcelimited == mujoco.mjtLimited.mjLIMITED_TRUE:
+        spec.joint(joint.name).actfrcrange = actuator.forcerange
     if command.interface == "effort":
         actuator.set_to_motor()
         _limit_command(actuator, command)
@@ -91,7 +94,7 @@ def _add_commanded(
     if command.interface == "velocity":
         gain = inertia / WHEEL_TIME_CONSTANT_S
         actuator.set_to_velocity(gain)
-        _limit_command(actuator, command)
+        _limit_command(actuator, command, *((-limit.velocity, limit.velocity) if limit.velocity else ()))
         note = f"velocity actuator, gain {gain:.3g}"
     else:
         stiffness, damping = inertia * SERVO_BANDWIDTH**2, 2.0 * inertia * SERVO_BANDWIDTH
@@ -103,21 +106,40 @@ def _add_commanded(
     return [Guess(element=element, note=f"{note}; it moves {inertia:.3g} (kg or kg m²)")]
 
 
-def moved_inertia(
-    description: RobotDescription, joint: Joint, model: mujoco.MjModel, data: mujoco.MjData
-) -> float:
-    """Return the inertia [kg or kg m²] that `joint` and its followers move, base still, at `data`."""
-    speed = np.zeros(model.nv)
-    for other in description.joints.values():
-        share, leader = 1.0, other
-        while leader.mimic is not None:
-            share *= leader.mimic.multiplier
-            leader = description.joints[leader.mimic.joint]
-        if leader.name == joint.name and other.type in ONE_DOF:
-            speed[model.joint(other.name).dofadr[0]] = share
-    momentum = np.zeros(model.nv)
-    mujoco.mj_mulM(model, data, momentum, speed)
-    return float(speed @ momentum)
+def moved_inertia(description: RobotDescription, model: mujoco.MjModel) -> dict[str, float]:
+    """Return the inertia [kg or kg m²] that each commanded joint and its followers move, base still."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    moved = {}
+    for joint in description.commands:
+        speed, momentum = np.zeros(model.nv), np.zeros(model.nv)
+        for name, share in driven_joints(description, joint).items():
+            speed[model.joint(name).dofadr[0]] = share
+        mujoco.mj_mulM(model, data, momentum, speed)
+        moved[joint] = float(speed @ momentum)
+    return moved
+
+
+def leader_of(description: RobotDescription, joint: str) -> tuple[str, float]:
+    """Return the joint whose drive moves `joint`, and the velocity of `joint` per velocity of that one."""
+    share, leader = 1.0, description.joints[joint]
+    if leader.type not in ONE_DOF:
+        return joint, 0.0
+    while leader.mimic is not None:
+        share *= leader.mimic.multiplier
+        leader = description.joints[leader.mimic.joint]
+    return (leader.name, share) if leader.type in ONE_DOF else (joint, 1.0)
+
+
+def driven_joints(description: RobotDescription, joint: str) -> dict[str, float]:
+    """Return `joint` and all joints that mimic it, each with its velocity per velocity of `joint`."""
+    found = {name: leader_of(description, name) for name in description.joints}
+    return {name: share for name, (leader, share) in found.items() if leader == joint and share}
+
+
+def drive_ratio(description: RobotDescription, joint: str) -> float:
+    """Return the effort of the drive of `joint` per effort of this joint, and of each that mimics it."""
+    return sum(abs(share) for share in driven_joints(description, joint).values())
 
 
 def _add(spec: mujoco.MjSpec, joint: Joint) -> mujoco.MjsActuator:

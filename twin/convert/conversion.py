@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import mujoco
 
@@ -26,7 +27,7 @@ class Conversion:
     Every link is a body, every moving joint a joint of its name. A drive's wheels and the joints commanded by
     `<ros2_control>` have an actuator named after the joint: velocity [rad/s] for wheels, else as the command
     interface says (position [rad or m], velocity, effort). Position actuators are stiff and jump to a new
-    command as fast as their effort allows: feed them a trajectory that keeps to the joint's velocity limit.
+    command as fast as their effort allows; `twin.sim` lets them keep to the joint's velocity limit.
     Visuals are in geom group 2, collision shapes in group 3.
     """
 
@@ -38,5 +39,7 @@ class Conversion:
     """Height of the root link at which the lowest collision point, all joints at zero, touches z = 0 [m]."""
     root_joint: str | None
     """Name of the free joint of the root link; None for a fixed or kinematic base."""
+    moved_inertia: Mapping[str, float] = field(default_factory=dict)
+    """Of each commanded joint with all that it moves [kg or kg m²]."""
     guesses: tuple[Guess, ...]
     """Of everything else, `twin.convert.tag_ledger` tells what became of it."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import mujoco
 
-from twin.convert.actuators import add_actuators
+from twin.convert.actuators import add_actuators, moved_inertia
 from twin.convert.bodies import Base, add_bodies, free_name
 from twin.convert.contacts import add_excludes, spawn_height
 from twin.convert.conversion import Conversion
@@ -63,13 +63,15 @@ def convert(
     add_excludes(spec, description)
     add_extensions(spec, description)
     carry_load(spec, moving, roles)
-    servos = add_actuators(spec, description, moving, timestep=timestep)
+    moved = moved_inertia(description, moving)
+    servos = add_actuators(spec, description, moved, timestep=timestep)
     return Conversion(
         description=description,
         spec=spec,
         spawn_height=spawn_height(_compile(spec, description)),
         root_joint=root_joint,
         guesses=(*contact_guesses(description, roles), *servos),
+        moved_inertia=moved,
     )
 
 

@@ -111,7 +111,7 @@ def _friction(element: Element, path: str, link: Link) -> Fate:
     if path in MU1:
         if value != surface.friction:
             return "dropped", "another mu1 of the link counts"
-        return "kept", f"friction {value:g}, whatever it touches"
+        return "kept", f"friction {value:g}; in twin run that of goods counts if it is lower"
     if value == surface.friction:
         return "kept", f"{ONE_FRICTION}, as here"
     return "dropped", f"{ONE_FRICTION}; mu1 counts"

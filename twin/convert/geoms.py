@@ -18,6 +18,8 @@ from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh
 
 GROUP_VISUAL = 2
 GROUP_COLLISION = 3
+OWN_CONTACT = 2
+"""Priority of wheels and casters: they touch everything in their own way. Links with a friction have 1."""
 TORSION, ROLLING = 0.005, 0.0001
 """MuJoCo's default torsional and rolling friction; without effect at condim 3."""
 
@@ -75,9 +77,9 @@ class GeomBuilder:
             if friction == 0.0:
                 contact["condim"] = 1
         if link.name in self._roles.casters:
-            contact |= {"priority": 1, "condim": 1}
+            contact |= {"priority": OWN_CONTACT, "condim": 1}
         if link.name in self._roles.wheels:
-            contact |= {"priority": 1, **self._wheel_contact}
+            contact |= {"priority": OWN_CONTACT, **self._wheel_contact}
         elif link.name in self._roles.gripping:
             contact["solref"] = self._stiff
         return contact

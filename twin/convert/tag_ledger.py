@@ -193,7 +193,7 @@ def _limit(element: Element, kind: str) -> Fate:
         parts.append("no range: a continuous joint has none")
     parts.append("actuatorfrcrange" if number(element.get("effort", "0")) else "effort left open")
     if element.get("velocity"):
-        parts.append("velocity bounds the ctrlrange of a wheel, elsewhere it has no counterpart")
+        parts.append("velocity bounds the ctrlrange of a velocity actuator; others keep it in twin run")
     return "translated", "; ".join(parts)
 
 

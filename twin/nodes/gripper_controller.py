@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from typing import Any
 
@@ -14,7 +15,11 @@ from twin.nodes.hardware import HardwareInterface
 
 
 class GripperControllerNode:
-    """Commands the finger joint and tells how the move ended: `reached_goal` or `stalled` on something."""
+    """Commands the finger joint and tells how the move ended: `reached_goal` or `stalled` on something.
+
+    `max_effort` is of the finger joint, and of each that mimics it: what a finger presses with [N]. If it is
+    0, as in an empty message, the joint's limit holds alone.
+    """
 
     def __init__(
         self,
@@ -37,6 +42,8 @@ class GripperControllerNode:
     def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         target = float(goal.request.command.position)
         monitor = GripperMonitor(self.config, target)
+        wanted = float(goal.request.command.max_effort)
+        self._hardware.limit_effort(self._joint, wanted if wanted > 0.0 else math.inf)
         self._hardware.command(self._joint, target)
         while True:
             yield
@@ -51,7 +58,7 @@ class GripperControllerNode:
             return new(
                 GripperCommand.Result,
                 position=position,
-                effort=float(reading.effort[self._index]),
+                effort=abs(float(reading.effort[self._index])),
                 stalled=state == "stalled",
                 reached_goal=state == "reached",
             )

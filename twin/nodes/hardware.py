@@ -35,3 +35,6 @@ class HardwareInterface(Protocol):
 
     def command(self, joint: str, value: float) -> None:
         """Set the target of one joint, in the unit of its command interface."""
+
+    def limit_effort(self, joint: str, effort: float) -> None:
+        """Let one joint press with no more than `effort` [N or Nm], nor with more than its own limit."""

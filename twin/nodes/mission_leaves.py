@@ -19,6 +19,11 @@ def sequence(name: str, children: Sequence[TreeNode]) -> TreeNode:
     return sequences.Sequence(_setup(name, *children))
 
 
+def while_true(condition: TreeNode, node: TreeNode) -> TreeNode:
+    """Return a node that ticks `node` while `condition` succeeds; it halts it and fails when that fails."""
+    return sequences.ReactiveSequence(_setup(f"While[{condition.name}]", condition, node))
+
+
 def with_recovery(name: str, retries: int, main: TreeNode, recovery: TreeNode) -> TreeNode:
     """Return a node that, when `main` fails, runs `recovery` and tries again, at most `retries` times."""
     return RecoveryNode(_setup(name, main, recovery, number_of_retries=str(retries)))

@@ -213,6 +213,6 @@ def _pick_and_place(
         stack.manipulator.arm,
         gripper_joint=stack.manipulator.gripper_joint,
         gripper_open=stack.manipulator.gripper_open,
-        frames=stack.frames,
+        robot_pose=stack.robot_pose,
         namespace=namespace,
     )

@@ -56,7 +56,7 @@ class GoodOverride(StrictModel):
     mass: Annotated[Kilograms, Positive] | None = None
     """Mass [kg]."""
     friction: Annotated[float, NotNegative] | None = None
-    """Coulomb coefficient against what declares none of its own (a gripper's pads do)."""
+    """Coulomb coefficient; of a good and a gripper's pads the lower one counts."""
 
 
 class WorldConfig(StrictModel):

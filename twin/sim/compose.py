@@ -8,12 +8,15 @@ from collections.abc import Sequence
 
 import mujoco
 
+from twin.convert.actuators import driven_joints
+from twin.convert.geoms import OWN_CONTACT
 from twin.errors import Problem, ScenarioError
 from twin.models.shapes import Box, Capsule, Cylinder
 from twin.sim.casters import casters_under_chassis
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
+from twin.sim.servos import keep_velocity_limit
 
 FLOOR = "floor"
 """Name of the floor's geom."""
@@ -55,6 +58,7 @@ def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics)
         _add_placed(spec, placed, solref)
     for placement in robots:
         _attach(spec, placement)
+    _let_lower_friction_act(spec, scene.goods)
     return spec
 
 
@@ -198,6 +202,23 @@ def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[
     )
 
 
+def _let_lower_friction_act(spec: mujoco.MjSpec, goods: Sequence[FreeBody]) -> None:
+    """Rank goods, and links with a friction of their own: of two the slippery one decides, as in Gazebo.
+
+    MuJoCo takes the friction of the geom with the higher priority, at one priority the larger one. Against
+    all else, of priority 0, goods and such links keep theirs; wheels and casters keep it against everything.
+    """
+    names = {good.name for good in goods}
+    solid = [geom for geom in spec.geoms if geom.contype or geom.conaffinity]
+    ranked = [geom for geom in solid if 0 < geom.priority < OWN_CONTACT or geom.parent.name in names]
+    grades = sorted({geom.friction[0] for geom in ranked}, reverse=True)
+    for geom in solid:
+        if geom.priority >= OWN_CONTACT:
+            geom.priority = len(grades) + 1
+    for geom in ranked:
+        geom.priority = grades.index(geom.friction[0]) + 1
+
+
 def _primitive(shape: Shape) -> tuple[mujoco.mjtGeom, list[float]]:
     """Return MuJoCo's type and half sizes."""
     geometry = shape.geometry
@@ -225,6 +246,7 @@ def volume(shape: Shape) -> float:
 def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
     robot = placement.conversion.spec.copy()
     spec.attach(robot, prefix=f"{placement.name}/", frame=spec.worldbody.add_frame())
+    _limit_velocities(spec, placement)
     root = spec.body(f"{placement.name}/{placement.conversion.description.root}")
     root.pos, root.quat = placement.T_world_root.xyz, placement.T_world_root.quat_wxyz
     for link in casters_under_chassis(placement.conversion.description):
@@ -233,3 +255,20 @@ def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
                 geom.contype = geom.conaffinity = _ROLLING
     if root.joints:  # MuJoCo refuses a policy for a body that cannot move
         root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+
+
+def _limit_velocities(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
+    description = placement.conversion.description
+    for command in description.commands.values():
+        joints = driven_joints(description, command.joint)
+        limits = [(description.joints[name].limit.velocity, abs(share)) for name, share in joints.items()]
+        velocity = min((limit / share for limit, share in limits if limit and share), default=None)
+        actuator = spec.actuator(f"{placement.name}/{command.joint}")
+        if velocity is not None and actuator is not None:
+            keep_velocity_limit(
+                actuator,
+                spec.joint(actuator.target),
+                velocity,
+                moved=placement.conversion.moved_inertia.get(command.joint, 0.0),
+                timestep=spec.option.timestep,
+            )

@@ -11,11 +11,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.convert.actuators import drive_ratio, leader_of
 from twin.convert.roles import commanded_wheels
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.sim.noise import NoiseStream
+from twin.sim.servos import EffortServos, PositionServos
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +45,7 @@ class JointReading(NamedTuple):
     velocity: Array
     """[rad/s] or [m/s]"""
     effort: Array
-    """Of the actuators [Nm] or [N]."""
+    """What the drives move each joint with; a drive moves those that mimic its joint as hard [Nm] or [N]."""
 
 
 class Hardware:
@@ -65,7 +67,7 @@ class Hardware:
     ) -> None:
         """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
-        self._data = data
+        self._model, self._data = model, data
         self._timestep = float(model.opt.timestep)
         moving = ("continuous", "revolute", "prismatic")
         self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in moving)
@@ -83,6 +85,7 @@ class Hardware:
         self._miscounted = np.zeros(len(joints))
         self._counts = self._count()
         self._step = 0
+        self._drive_dof, self._drive_share = self._drives(model, robot, description)
         n = len(self.joint_names)
         self._reading = JointReading(self._counts * self._tick, np.zeros(n), np.zeros(n))
 
@@ -97,9 +100,24 @@ class Hardware:
         self._under_way: deque[tuple[int, Array]] = deque()
         self._last_arrived = self._commands.copy()
         driven = [i for i, name in zip(self._actuators, names, strict=True) if name in wheels]
-        self._servos = _WheelServos(
+        self._wheels = _WheelServos(
             model, data, np.array(driven, dtype=np.intp), self.config.wheel_integral_gain
         )
+        self._positions = PositionServos(model, data, self._actuators)
+        by_effort = [
+            command
+            for name, command in description.commands.items()
+            if command.interface == "effort" and name not in wheels
+        ]
+        self._efforts = EffortServos(
+            model,
+            data,
+            np.array([self._actuators[self._index[command.joint]] for command in by_effort], dtype=np.intp),
+            [(command.lower, command.upper) for command in by_effort],
+        )
+        limited = model.actuator_forcelimited[self._actuators].astype(bool)
+        self._strongest = np.where(limited, model.actuator_forcerange[self._actuators, 1], math.inf)
+        self._ratios = [drive_ratio(description, name) for name in names]
         self.refused = 0
         """Commands ignored because they were not finite."""
 
@@ -122,7 +140,8 @@ class Hardware:
         position = np.where(self._encoder, counts * self._tick, position)
         velocity = np.where(self._encoder, (counts - self._counts) * (self._tick / elapsed), velocity)
         self._counts, self._step = counts, step
-        self._reading = JointReading(position, velocity, self._data.qfrc_actuator[self._dof])
+        effort = self._data.qfrc_actuator[self._drive_dof] * self._drive_share
+        self._reading = JointReading(position, velocity, effort)
         return self._reading
 
     def command(self, joint: str, value: float) -> None:
@@ -136,13 +155,27 @@ class Hardware:
         Raises:
             SimulationError: No actuator moves this joint.
         """
-        index = self._index.get(joint)
-        if index is None:
-            raise SimulationError(f"no actuator for joint '{joint}'; {nearest(joint, self._index)}")
+        index = self._drive(joint)
         if math.isfinite(value):
             self._commands[index] = value
         else:
             self.refused += 1
+
+    def limit_effort(self, joint: str, effort: float) -> None:
+        """Let the drive move a joint, and each that mimics it, with no more than `effort` from now on.
+
+        Args:
+            joint: One of `commanded_joints`.
+            effort: [N] or [Nm]; the joint's own limit holds as well.
+
+        Raises:
+            SimulationError: No actuator moves this joint.
+        """
+        index = self._drive(joint)
+        strongest = min(effort * self._ratios[index], self._strongest[index])
+        actuator = self._actuators[index]
+        self._model.actuator_forcelimited[actuator] = math.isfinite(strongest)
+        self._model.actuator_forcerange[actuator] = -strongest, strongest
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
@@ -150,7 +183,9 @@ class Hardware:
             self._data.ctrl[self._actuators] = self._arrived()
         else:
             self._data.ctrl[self._actuators] = self._commands
-        self._servos.apply()
+        self._wheels.apply()
+        self._positions.apply()
+        self._efforts.apply()
 
     def miscount(self, joint: str, angle: float) -> None:
         """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
@@ -169,6 +204,24 @@ class Hardware:
             raise SimulationError(f"no encoder measures joint '{joint}'; {nearest(joint, encoders)}")
         self._miscounted[self.joint_names.index(joint)] += round(angle / self._tick)
 
+    def _drive(self, joint: str) -> int:
+        index = self._index.get(joint)
+        if index is None:
+            raise SimulationError(f"no actuator for joint '{joint}'; {nearest(joint, self._index)}")
+        return index
+
+    def _drives(
+        self, model: mujoco.MjModel, robot: str, description: RobotDescription
+    ) -> tuple[NDArray[np.intp], Array]:
+        """Return for each joint the velocity address of the joint whose drive moves it, and its share."""
+        found = [leader_of(description, name) for name in self.joint_names]
+        ratios = dict.fromkeys((leader for leader, _ in found), 0.0)
+        for leader, share in found:
+            ratios[leader] += abs(share)
+        dofs = [model.joint(f"{robot}/{leader}").dofadr[0] for leader, _ in found]
+        shares = [np.sign(share) / ratios[leader] for leader, share in found]
+        return np.array(dofs, dtype=np.intp), np.array(shares)
+
     def _arrived(self) -> Array:
         """Send the present commands on their way; return the newest ones that have arrived."""
         now = round(self._data.time / self._timestep)
@@ -179,7 +232,7 @@ class Hardware:
 
     def reset(self) -> None:
         """Forget the past; to be called when the state of the physics was set from outside."""
-        self._servos.reset()
+        self._wheels.reset()
 
     def _count(self) -> Array:
         return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick) + self._miscounted

@@ -9,7 +9,7 @@ from twin.bridge.bus import Bus
 from twin.manipulation.telescopic_arm import TelescopicArm
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.mission_leaves import sequence, with_recovery
-from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.robot_pose import RobotPose
 from twin.warehouse.skills import MobileManipulationNode, Station
 
 
@@ -59,7 +59,7 @@ class PickAndPlaceNode(MobileManipulationNode):
         *,
         gripper_joint: str,
         gripper_open: float,
-        frames: Frames,
+        robot_pose: RobotPose,
         config: PickAndPlaceConfig | None = None,
         period_ns: int = 100_000_000,
         namespace: str = "",
@@ -69,7 +69,7 @@ class PickAndPlaceNode(MobileManipulationNode):
             arm,
             gripper_joint=gripper_joint,
             gripper_open=gripper_open,
-            frames=frames,
+            robot_pose=robot_pose,
             namespace=namespace,
         )
         self.config = config or PickAndPlaceConfig()
@@ -99,14 +99,12 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.stow(carry_z),
                 self.drive_to(task.pick),
                 pick,
+                self.holding(task.tote, task.tote_width, [*self._carry(task), *self._set_down(task)]),
+                self.report(f"{task.tote}: release"),
+                self.open_gripper(),
                 self.report(f"{task.tote}: back off"),
-                self.undock_from("shelf"),
-                self.move_to_height("LowerToCarry", carry_z, loaded=True),
-                self.holding(task.tote, task.tote_width),
-                self.report(f"{task.tote}: carry to {task.place.name}"),
-                self.drive_to(task.place),
-                self.holding(task.tote, task.tote_width),
-                self._place(task),
+                self.retract(),
+                self.undock_from("table"),
                 self.stow(carry_z),
             ],
         )
@@ -129,15 +127,28 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.reach_for_tote(grasp_z, task.tote_depth),
                 self.report(f"{task.tote}: grasp"),
                 self.close_on(task.tote_width),
-                self.move_to_height("LiftOff", grasp_z + self.config.lift_off, loaded=True),
-                self.holding(task.tote, task.tote_width),
-                self.report(f"{task.tote}: retract"),
-                self.retract(loaded=True),
-                self.holding(task.tote, task.tote_width),
+                self.holding(
+                    task.tote,
+                    task.tote_width,
+                    [
+                        self.move_to_height("LiftOff", grasp_z + self.config.lift_off, loaded=True),
+                        self.report(f"{task.tote}: retract"),
+                        self.retract(loaded=True),
+                    ],
+                ),
             ],
         )
 
-    def _place(self, task: PickAndPlaceTask) -> TreeNode:
+    def _carry(self, task: PickAndPlaceTask) -> list[TreeNode]:
+        return [
+            self.report(f"{task.tote}: back off"),
+            self.undock_from("shelf"),
+            self.move_to_height("LowerToCarry", self.config.carry_z, loaded=True),
+            self.report(f"{task.tote}: carry to {task.place.name}"),
+            self.drive_to(task.place),
+        ]
+
+    def _set_down(self, task: PickAndPlaceTask) -> list[TreeNode]:
         config = self.config
         set_down = task.place.surface_z + task.tote_height / 2.0 + config.set_down_clearance
         above = set_down + config.lift_off
@@ -148,20 +159,11 @@ class PickAndPlaceNode(MobileManipulationNode):
             self.dock_at(task.place, "table"),
             sequence("StageAgain", [self.undock_from("table"), self.drive_to(task.place)]),
         )
-        return sequence(
-            "Place",
-            [
-                self.report(f"{task.tote}: dock at {task.place.name}"),
-                dock,
-                self.report(f"{task.tote}: set down"),
-                self.move_to_height("RaiseToPlace", above, loaded=True),
-                self.reach("ReachToPlace", x, above, loaded=True),
-                self.holding(task.tote, task.tote_width),
-                self.move_to_height("Lower", set_down, loaded=True),
-                self.report(f"{task.tote}: release"),
-                self.open_gripper(),
-                self.report(f"{task.tote}: back off"),
-                self.retract(),
-                self.undock_from("table"),
-            ],
-        )
+        return [
+            self.report(f"{task.tote}: dock at {task.place.name}"),
+            dock,
+            self.report(f"{task.tote}: set down"),
+            self.move_to_height("RaiseToPlace", above, loaded=True),
+            self.reach("ReachToPlace", x, above, loaded=True),
+            self.move_to_height("Lower", set_down, loaded=True),
+        ]

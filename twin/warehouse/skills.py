@@ -5,7 +5,7 @@ Every leaf is an action or service of the robot's nodes, or a look at what its s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,9 +38,17 @@ from twin.manipulation.trajectory import plan_joint_move
 from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.navigation.docking.docks import DockType
 from twin.nodes.messages import pose_stamped
-from twin.nodes.mission_leaves import CallAction, CallService, Condition, Do, MissionLeaf
+from twin.nodes.mission_leaves import (
+    CallAction,
+    CallService,
+    Condition,
+    Do,
+    MissionLeaf,
+    sequence,
+    while_true,
+)
 from twin.nodes.mission_nodes import MissionNode
-from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.robot_pose import RobotPose
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +70,10 @@ class SkillsConfig:
     """From the face to the base's origin when docked [m]."""
     staging_distance: float = -DockType.external_detection_translation_x - DockType.staging_x_offset
     """From the face to the base's origin before docking [m]."""
-    gripper_effort: float = 160.0
-    """[N]"""
+    gripper_effort: float = 80.0
+    """That a finger presses with [N]."""
+    least_grip: float = 0.5
+    """Share of the effort with which the fingers closed; with less they hold nothing safely."""
     grip_tolerance: float = 0.012
     """Largest deviation of the finger from half the good's width for a grip [m]."""
     loaded_speed: float = 0.5
@@ -86,7 +96,7 @@ class MobileManipulationNode(MissionNode):
         *,
         gripper_joint: str,
         gripper_open: float,
-        frames: Frames,
+        robot_pose: RobotPose,
         skills: SkillsConfig | None = None,
         namespace: str = "",
     ) -> None:
@@ -95,9 +105,12 @@ class MobileManipulationNode(MissionNode):
         self._arm = arm
         self._gripper_joint = gripper_joint
         self._gripper_open = gripper_open
-        self._frames = frames
+        self._robot_pose = robot_pose
+        self._frames = robot_pose.frames
         self._totes: list[Pose2] = []
         self._joints: dict[str, float] = {}
+        self._efforts: dict[str, float] = {}
+        self._grip_effort = 0.0
         node = self.node
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
         self._dock = ActionClient(node, DockRobot, "dock_robot")
@@ -110,6 +123,7 @@ class MobileManipulationNode(MissionNode):
 
     def _on_joint_states(self, message: JointState) -> None:
         self._joints = dict(zip(message.name, message.position.tolist(), strict=True))
+        self._efforts = dict(zip(message.name, message.effort.tolist(), strict=False))  # empty: not measured
 
     def _on_tote_poses(self, message: PoseArray) -> None:
         totes = [pose2_from_pose(pose) for pose in message.poses]
@@ -245,6 +259,7 @@ class MobileManipulationNode(MissionNode):
         """Close the fingers; fails unless they stall on something of this width [m]."""
 
         def judge(result: Any) -> str | None:
+            self._grip_effort = result.effort
             if result.stalled and abs(result.position - width / 2.0) < self.skills.grip_tolerance:
                 return None
             finger = f"finger at {result.position:.3f} m"
@@ -258,17 +273,33 @@ class MobileManipulationNode(MissionNode):
             on_failure=self.note,
         )
 
-    def holding(self, what: str, width: float) -> TreeNode:
-        """Succeeds while the fingers are held apart by something of this width [m]."""
+    def holding(self, what: str, width: float, steps: Sequence[TreeNode]) -> TreeNode:
+        """Take steps while the fingers are held apart by something of this width [m], and press on it.
+
+        That is watched at every tick: when it is lost, the step under way is cancelled, and the node fails.
+        """
 
         def held() -> bool:
-            finger = self._joints.get(self._gripper_joint, 0.0)
-            if abs(finger - width / 2.0) < self.skills.grip_tolerance:
-                return True
-            self.note(f"lost {what}: finger at {finger:.3f} m instead of {width / 2.0:.3f} m")
-            return False
+            fault = self._grip_fault(width)
+            if fault is not None:
+                pose = self._robot_pose.in_map()
+                place = "" if pose is None else f", at ({pose.x:.2f}, {pose.y:.2f})"
+                self.note(f"lost {what} at {self.node.now_ns * 1e-9:.1f} s{place}: {fault}")
+            return fault is None
 
-        return Condition(f"Holding[{what}]", held)
+        return while_true(Condition(f"Holding[{what}]", held), sequence(f"With[{what}]", steps))
+
+    def _grip_fault(self, width: float) -> str | None:
+        """Return what the finger's encoder and drive tell against a grip, if anything."""
+        finger, effort = (
+            self._joints.get(self._gripper_joint, 0.0),
+            self._efforts.get(self._gripper_joint, 0.0),
+        )
+        if abs(finger - width / 2.0) > self.skills.grip_tolerance:
+            return f"finger at {finger:.3f} m instead of {width / 2.0:.3f} m"
+        if abs(effort) < self.skills.least_grip * self._grip_effort:
+            return f"finger presses with {abs(effort):.0f} N instead of {self._grip_effort:.0f} N"
+        return None
 
     def _gripper_goal(self, position: float) -> Any:
         command = new(GripperCommandMsg, position=position, max_effort=self.skills.gripper_effort)

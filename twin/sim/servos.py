@@ -1,0 +1,137 @@
+"""The motor controllers of joints that are commanded by position or effort: they keep the velocity limit.
+
+A motor controller limits the current and, in a loop of its own, the speed: a position that jumps is reached
+at the joint's limit, and a joint that loses what it pressed against does not shoot off.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
+
+_SPARE = 1.25
+"""A servo's damping at the velocity limit, in effort limits: so that with the target as far ahead of a
+blocked joint as the velocity limit allows, the effort limit says how hard it presses."""
+_RUN_UP_S = 0.006
+"""A drive is not faster at its velocity limit, all effort given [s]; at least three time steps. A lighter one
+would pass the limit within one step."""
+_STEEPNESS = 3.0
+"""Of the edge at which a commanded effort gives way: from two thirds of the velocity limit on."""
+_POSITION_INPUT, _SLEWMAX = 1, 1
+"""Of MuJoCo's PID actuator: its `ctrlspec` for a position alone, and where `dynprm` has `slewmax`."""
+
+
+def keep_velocity_limit(
+    actuator: mujoco.MjsActuator,
+    joint: mujoco.MjsJoint,
+    velocity: float,
+    *,
+    moved: float,
+    timestep: float,
+) -> None:
+    """Turn a position servo or a motor into one that keeps a velocity limit.
+
+    A position servo moves its target no faster than that (MuJoCo's `pid` with `slewmax`; its activation is
+    the target), and `PositionServos` keeps it near the joint. A motor becomes a velocity servo, for
+    `EffortServos`.
+
+    Args:
+        actuator: Left as it is if it is a velocity servo, or a motor without an effort limit.
+        joint: The actuator's; gets the inertia of a motor where the drive is too strong for what it moves.
+        velocity: The limit [rad/s or m/s].
+        moved: The inertia of all that the joint moves [kg or kg m²].
+        timestep: [s]
+    """
+    limited = actuator.forcelimited == mujoco.mjtLimited.mjLIMITED_TRUE
+    effort = float(actuator.forcerange[1]) if limited else 0.0
+    stiffness, damping = -float(actuator.biasprm[1]), -float(actuator.biasprm[2])
+    if stiffness > 0.0 and damping > 0.0:
+        gain = max(1.0, _SPARE * effort / (velocity * damping))
+        actuator.set_to_pid(stiffness * gain, kv=damping * gain, slewmax=velocity, ctrlspec=_POSITION_INPUT)
+    elif stiffness == 0.0 and damping == 0.0 and effort > 0.0:
+        actuator.set_to_velocity(_STEEPNESS * effort / velocity)
+        actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.ctrlrange = [-velocity, velocity]
+    else:
+        return
+    joint.armature += max(0.0, effort * max(_RUN_UP_S, 3.0 * timestep) / velocity - moved)
+
+
+class PositionServos:
+    """Leads the targets of position servos to what is commanded: within a tick, or at the velocity limit.
+
+    A servo follows its target at (stiffness / damping · distance). So the target stays as near to the joint
+    as that allows: one that ran ahead of a blocked joint would let it shoot off when it is free again.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp]) -> None:
+        """Bind to those of `actuators` that `keep_velocity_limit` made; changes `slewmax` in `model`."""
+        self._model, self._data = model, data
+        kept = actuators[model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID]
+        joints = model.actuator_trnid[kept, 0]
+        self._actuators, self._target = kept, model.actuator_actadr[kept]
+        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._fastest = model.actuator_dynprm[kept, _SLEWMAX]
+        self._ahead = self._fastest * model.actuator_biasprm[kept, 2] / model.actuator_biasprm[kept, 1]
+        self._time = float(data.time)
+
+    def apply(self) -> None:
+        """Bound targets, and the commands in `ctrl`; called once a tick."""
+        data = self._data
+        elapsed, self._time = float(data.time) - self._time, float(data.time)
+        if not len(self._actuators):
+            return
+        here = data.qpos[self._qpos]
+        target = np.clip(data.act[self._target], here - self._ahead, here + self._ahead)
+        # where the joint will be at the end of the tick
+        there = here + elapsed * np.clip(data.qvel[self._dof], -self._fastest, self._fastest)
+        command = np.clip(data.ctrl[self._actuators], there - self._ahead, there + self._ahead)
+        data.act[self._target], data.ctrl[self._actuators] = target, command
+        if elapsed > 0.0:
+            speed = np.minimum(abs(command - target) / elapsed, self._fastest)
+            self._model.actuator_dynprm[self._actuators, _SLEWMAX] = speed
+
+
+class EffortServos:
+    """Lets joints run with the effort that is commanded, up to the velocity limit."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        actuators: NDArray[np.intp],
+        bounds: list[tuple[float | None, float | None]],
+    ) -> None:
+        """Bind to the effort-commanded ones of a robot's actuators.
+
+        Args:
+            model: Its force ranges are changed.
+            data: Of `model`.
+            actuators: What `keep_velocity_limit` left as a motor is left out.
+            bounds: Least and largest command of each; None where there is no bound [N or Nm].
+        """
+        self._model, self._data = model, data
+        made = model.actuator_biastype[actuators] != mujoco.mjtBias.mjBIAS_NONE
+        self._actuators = actuators[made]
+        self._velocity = model.actuator_ctrlrange[self._actuators, 1]
+        effort = model.actuator_forcerange[self._actuators, 1]
+        given = np.array(
+            [(-math.inf if low is None else low, math.inf if high is None else high) for low, high in bounds]
+        )
+        given = given.reshape(-1, 2)[made]
+        self._least: Array = np.maximum(given[:, 0], -effort)
+        self._most: Array = np.minimum(given[:, 1], effort)
+
+    def apply(self) -> None:
+        """Turn the efforts in `ctrl` into velocities; called once a tick."""
+        if not len(self._actuators):
+            return
+        effort = np.clip(self._data.ctrl[self._actuators], self._least, self._most)
+        self._model.actuator_forcerange[self._actuators, 0] = -abs(effort)
+        self._model.actuator_forcerange[self._actuators, 1] = abs(effort)
+        self._data.ctrl[self._actuators] = np.copysign(self._velocity, effort)
