@@ -143,6 +143,27 @@ def test_no_collision() -> None:
     assert fold({"no_collision": {"robot": "other"}}, hard).passed
 
 
+def test_no_collision_counts_what_robots_carry() -> None:
+    contact = ContactObservation(robot="bot", body="tote_a", other="machine", force_N=139.0, carried=True)
+    result = fold({"no_collision": {"allowed": [{"other": "tote_a"}]}}, [at(1, contacts=[contact])])
+    assert result.reason == "tote_a, carried by bot, hit machine with 139.0 N at 1.00 s"
+    allowed = {"no_collision": {"allowed": [{"other": "machine", "body": "tote_*"}]}}
+    assert fold(allowed, [at(1, contacts=[contact])]).passed
+
+
+def test_a_collision_of_two_robots_is_that_of_either() -> None:
+    def check(config: dict[str, Any]) -> CheckResult:
+        fold = CheckEntry.model_validate({"no_collision": config}).build(CheckContext(robots=("bot", "cart")))
+        fold.observe(at(1, contacts=[touch("cart/mast", 7.0)]))
+        return fold.result()
+
+    assert check({"robot": "bot"}).reason == "bot/base_link hit cart/mast with 7.0 N at 1.00 s"
+    assert check({"robot": "cart"}).reason == "cart/mast hit bot/base_link with 7.0 N at 1.00 s"
+    assert check({"robot": "cart", "allowed": [{"other": "bot/*", "body": "mast"}]}).passed
+    assert check({"allowed": [{"other": "bot/*", "body": "mast"}]}).passed
+    assert not check({"allowed": [{"other": "bot/*", "body": "base_link"}]}).passed
+
+
 def test_tote_slip() -> None:
     entry = {"tote_slip": {"max": "5 mm"}}
     result = fold(entry, [at(0), at(1.8, held=held(0.1)), at(2, held=held(0.104)), at(3)])

@@ -9,6 +9,7 @@ import numpy as np
 from twin.geometry import Pose3
 from twin.runtime.derive import GRASP_FRAME
 from twin.runtime.missions import MissionHandle
+from twin.runtime.payload import Payload
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
@@ -26,7 +27,8 @@ class Observer:
         self._mission = mission
         self._goods = tuple(goods)
         self._last: dict[str, tuple[int, Pose3]] = {}
-        self._contacts: dict[tuple[str, str], float] = {}
+        self._payload = Payload(world, self._goods)
+        self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
         self._power = dict.fromkeys((stack.name for stack in stacks), 0.0)
         self._gathered = 0
         self._fingers = {
@@ -39,9 +41,10 @@ class Observer:
     def gather(self) -> None:
         """Note contacts and power of the present control tick."""
         self._gathered += 1
-        for contact in self._world.contacts():
-            pair = contact.body1, contact.body2
-            self._contacts[pair] = max(contact.force_N, self._contacts.get(pair, 0.0))
+        for contact in (*map(_observed, self._world.contacts()), *self._payload.contacts()):
+            pair = contact.robot, contact.body, contact.other
+            if pair not in self._contacts or contact.force_N > self._contacts[pair].force_N:
+                self._contacts[pair] = contact
         for stack in self._stacks:
             reading = stack.handle.hardware.read()
             power = reading.effort * reading.velocity
@@ -56,12 +59,7 @@ class Observer:
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
             held=self._held(world.contacts(), goods),
-            contacts=[
-                ContactObservation(
-                    robot=link.partition("/")[0], body=link.partition("/")[2], other=other, force_N=force
-                )
-                for (link, other), force in self._contacts.items()
-            ],
+            contacts=tuple(self._contacts.values()),
             mission_state=mission.state,
             mission_done=mission.done,
             mission_succeeded=mission.succeeded,
@@ -101,3 +99,8 @@ class Observer:
                 grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
                 held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
         return held
+
+
+def _observed(contact: Contact) -> ContactObservation:
+    robot, _, body = contact.body1.partition("/")
+    return ContactObservation(robot=robot, body=body, other=contact.body2, force_N=contact.force_N)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -46,16 +46,26 @@ class Held:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ContactObservation:
-    """A robot touches something that is neither itself nor the floor."""
+    """A robot, or goods that it carries, touch something that is neither itself nor the floor."""
 
     robot: str
     """The robot."""
     body: str
-    """Its link."""
+    """Its link, or the goods."""
     other: str
     """What it touches: an obstacle, a good, a wall, another robot."""
     force_N: float
     """Normal force [N]."""
+    carried: bool = False
+    """Whether `body` is goods; what they are taken from and set down on does not count."""
+
+    def by_the_other(self, robots: Collection[str]) -> ContactObservation | None:
+        """Return the same contact as the other robot's; None if it is with no robot's link."""
+        robot, _, body = self.other.partition("/")
+        if self.carried or not body or robot not in robots:
+            return None
+        other = f"{self.robot}/{self.body}"
+        return ContactObservation(robot=robot, body=body, other=other, force_N=self.force_N)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

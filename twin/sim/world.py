@@ -13,7 +13,7 @@ import numpy as np
 from twin.errors import ScenarioError, nearest
 from twin.geometry import Array, Pose3
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
-from twin.sim.contacts import Contact, ContactReader
+from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
 from twin.sim.hardware import Hardware
 from twin.sim.physics import Physics
@@ -174,6 +174,15 @@ class World:
             self._contacts = self._contact_reader.read(self.data)
         return self._contacts
 
+    def touches(self, body: str) -> list[Touch]:
+        """Return what touches goods or a link, the floor too, point by point, as of the last physics step."""
+        return self._contact_reader.touches(self.data, body)
+
+    def weight(self, body: str) -> float:
+        """Return the weight of goods or of a link with all that hangs on it [N]."""
+        gravity = float(np.linalg.norm(self.model.opt.gravity))
+        return float(self.model.body_subtreemass[self._index[body]]) * gravity
+
     def shapes(self) -> list[BodyShape]:
         """Return everything there is to draw except for the floor."""
         return list(shapes(self.scene, self._placements))
@@ -218,7 +227,7 @@ class World:
         for static in self.scene.statics:
             for index in range(len(static.shapes)):
                 owners[model.geom(static_geom(static.name, index)).id] = static.name
-        robots[model.geom(FLOOR).id] = -2
+        owners[model.geom(FLOOR).id], robots[model.geom(FLOOR).id] = FLOOR, -2
         return owners, robots
 
     def _bind_robot(self, placement: RobotPlacement) -> RobotHandle:
