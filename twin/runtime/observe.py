@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -14,6 +15,9 @@ from twin.runtime.robot_stack import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
 from twin.sim.world import World
+
+_MOVED, _TURNED = 0.01, 0.05
+"""What has settled on the floor has come less far than this [m] and turned by less [rad]."""
 
 
 class Observer:
@@ -31,6 +35,8 @@ class Observer:
         self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
         self._power = dict.fromkeys((stack.name for stack in stacks), 0.0)
         self._gathered = 0
+        self._start = world.body_poses()
+        self._moved: set[str] = set()
         self._fingers = {
             f"{stack.name}/{link}": stack.name
             for stack in stacks
@@ -60,6 +66,7 @@ class Observer:
             goods=goods,
             held=self._held(world.contacts(), goods),
             contacts=tuple(self._contacts.values()),
+            moved=self._note_moved(),
             mission_state=mission.state,
             mission_done=mission.done,
             mission_succeeded=mission.succeeded,
@@ -82,9 +89,18 @@ class Observer:
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
             power_W=self._power[stack.name] / max(self._gathered, 1),
+            goals=stack.navigator.goals if stack.navigator is not None else 0,
             recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
             map=stack.slam.map if stack.slam is not None else None,
         )
+
+    def _note_moved(self) -> frozenset[str]:
+        xyz, quat_wxyz = self._world.body_poses()
+        came = np.linalg.norm(xyz - self._start[0], axis=1) > _MOVED
+        turned = np.abs((quat_wxyz * self._start[1]).sum(axis=1)) < math.cos(_TURNED / 2.0)
+        names = self._world.body_names
+        self._moved.update(names[i].partition("/")[0] for i in np.flatnonzero(came | turned))
+        return frozenset(self._moved)
 
     def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:
         """Return the goods that both fingers of a robot touch."""

@@ -28,6 +28,8 @@ class RobotObservation:
     """True planar speed of the base [m/s]."""
     power_W: float = 0.0
     """Mechanical power that the actuators put in, mean since the last observation [W]."""
+    goals: int = 0
+    """Goals that its navigator has taken so far."""
     recoveries: int = 0
     """Recovery behaviours that its navigator has started so far."""
     map: OccupancyMap | None = None
@@ -81,6 +83,8 @@ class Observation:
     """Only the goods that are in a gripper."""
     contacts: Sequence[ContactObservation] = ()
     """Of all control ticks since the last observation, the hardest of each pair."""
+    moved: Collection[str] = ()
+    """What has moved since the start: robots, with their base or a joint, goods and obstacles."""
     mission_state: str = ""
     mission_done: bool = False
     mission_succeeded: bool | None = None

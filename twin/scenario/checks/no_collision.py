@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated
 
-from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.checks.check import NOTHING, Check, CheckConfig, CheckResult
 from twin.scenario.fields import NotNegative
 from twin.scenario.observation import CheckContext, ContactObservation, Observation
 from twin.strict_yaml import Newtons, StrictModel
@@ -55,11 +55,13 @@ class NoCollision(Check):
         self._hardest: tuple[float, ContactObservation] | None = None
         self._force = 0.0
         self._allowed: dict[tuple[str, str, str], bool] = {}
+        self._moved = False
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
         self._at_s = observation.time_s
+        self._moved = bool(observation.moved)
         for contact in filter(None, map(self._of_interest, observation.contacts)):
             if self._is_allowed(contact):
                 continue
@@ -87,7 +89,9 @@ class NoCollision(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the hardest contact that is not allowed."""
-        reason = "" if self._at_s is not None else "the run made no step"
+        reason = "" if self._moved else f"{NOTHING}nothing moved"
+        if self._at_s is None:
+            reason = "the run made no step"
         if self._first is not None and self._hardest is not None:
             reason = _sentence(*self._first)
             if self._hardest != self._first:
