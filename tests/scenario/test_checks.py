@@ -284,8 +284,8 @@ def test_an_estimate_that_is_no_number_is_wrong() -> None:
     assert not fold({"localisation_error": {"max": 1}}, lost).passed
 
 
-def test_energy_integrates_positive_power() -> None:
-    run = [at(t, robots=bot(power_W=p), moved={"bot"}) for t, p in enumerate((100.0, 10.0, -5.0, 20.0))]
+def test_energy() -> None:
+    run = [at(t, robots=bot(work_J=w), moved={"bot"}) for t, w in enumerate((0.0, 10.0, 10.0, 30.0))]
     assert fold({"energy": {"max": 30}}, run).value == 30.0
     result = fold({"energy": {"max": 29}}, run)
     assert (result.passed, result.at_s, result.reason) == (False, 2.0, "bot used 30 J")

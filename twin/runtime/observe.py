@@ -33,8 +33,6 @@ class Observer:
         self._last: dict[str, tuple[int, Pose3]] = {}
         self._payload = Payload(world, self._goods)
         self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
-        self._power = dict.fromkeys((stack.name for stack in stacks), 0.0)
-        self._gathered = 0
         self._start = world.body_poses()
         self._moved: set[str] = set()
         self._fingers = {
@@ -45,19 +43,14 @@ class Observer:
         }
 
     def gather(self) -> None:
-        """Note contacts and power of the present control tick."""
-        self._gathered += 1
+        """Note the contacts of the present control tick."""
         for contact in (*map(_observed, self._world.contacts()), *self._payload.contacts()):
             pair = contact.robot, contact.body, contact.other
             if pair not in self._contacts or contact.force_N > self._contacts[pair].force_N:
                 self._contacts[pair] = contact
-        for stack in self._stacks:
-            reading = stack.handle.hardware.read()
-            power = reading.effort * reading.velocity
-            self._power[stack.name] += float(power[power > 0.0].sum())
 
     def observe(self) -> Observation:
-        """Return the present state, with the contacts and the mean power since the last observation."""
+        """Return the present state, with the contacts since the last observation."""
         world, mission = self._world, self._mission
         goods = {name: world.pose(name) for name in self._goods}
         observation = Observation(
@@ -73,8 +66,6 @@ class Observer:
             mission_reason=mission.reason,
         )
         self._contacts.clear()
-        self._power = dict.fromkeys(self._power, 0.0)
-        self._gathered = 0
         return observation
 
     def _robot(self, stack: RobotStack) -> RobotObservation:
@@ -88,7 +79,7 @@ class Observer:
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            power_W=self._power[stack.name] / max(self._gathered, 1),
+            work_J=self._world.work(stack.name),
             goals=stack.navigator.goals if stack.navigator is not None else 0,
             recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
             map=stack.slam.map if stack.slam is not None else None,

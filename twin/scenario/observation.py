@@ -26,8 +26,8 @@ class RobotObservation:
     """Believed pose of the base in `odom`; None without odometry."""
     speed: float = 0.0
     """True planar speed of the base [m/s]."""
-    power_W: float = 0.0
-    """Mechanical power that the actuators put in, mean since the last observation [W]."""
+    work_J: float = 0.0
+    """Mechanical work that its actuators have done so far; known only if a check asks for it [J]."""
     goals: int = 0
     """Goals that its navigator has taken so far."""
     recoveries: int = 0

@@ -79,10 +79,14 @@ class DrivenDistance(Check):
 
 
 class EnergyConfig(RobotCheckConfig):
-    """The actuators use no more than this."""
+    """The actuators do no more mechanical work than this.
+
+    It is the force on each joint times the joint's true velocity, summed over the physics steps in which
+    the product is positive: what a joint takes up while it brakes is lost.
+    """
 
     max: Annotated[Joules, Positive]
-    """Largest mechanical work; braking gives nothing back [J]."""
+    """Largest work [J]."""
 
     def build(self, kind: str, context: CheckContext) -> Check:
         """Return the fold."""
@@ -90,22 +94,19 @@ class EnergyConfig(RobotCheckConfig):
 
 
 class Energy(Check):
-    """Integrates positive power over time."""
+    """Keeps the work done so far, and since when it is too much."""
 
     def __init__(self, name: str, config: EnergyConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
         self._energy = 0.0
-        self._moved = False
-        self._previous_ns: int | None = None
+        self._moved = self._seen = False
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        if self._previous_ns is not None:
-            power = max(0.0, observation.robots[self._robot].power_W)
-            self._energy += power * (observation.time_ns - self._previous_ns) / 1e9
-        self._previous_ns = observation.time_ns
+        self._seen = True
+        self._energy = observation.robots[self._robot].work_J
         self._moved = self._robot in observation.moved
         if self._energy <= self._config.max:
             self._at_s = observation.time_s
@@ -113,7 +114,7 @@ class Energy(Check):
     def result(self) -> CheckResult:
         """Return the outcome so far; a failure's time is the last one within the limit."""
         reason = "" if self._moved else f"{NOTHING}{self._robot} did not move"
-        if self._previous_ns is None:
+        if not self._seen:
             reason = "the run made no step"
         if self._energy > self._config.max:
             reason = f"{self._robot} used {self._energy:.0f} J"
