@@ -129,7 +129,10 @@ def touch(other: str, force: float, body: str = "base_link") -> ContactObservati
 
 def test_no_collision() -> None:
     entry = {"no_collision": {"max_force": "5 N", "allowed": [{"other": "tote_*", "body": "*finger"}]}}
-    gentle = [at(1, contacts=[touch("wall", 4.0), touch("tote_a", 90.0, "left_finger")]), at(2)]
+    gentle = [
+        at(1, contacts=[touch("wall", 4.0), touch("tote_a", 90.0, "left_finger")]),
+        at(2, moved={"bot"}),
+    ]
     result = fold(entry, gentle)
     assert (result.passed, result.value, result.limit, result.at_s) == (True, 4.0, 5.0, 2.0)
     hard = [at(1, contacts=[touch("tote_a", 6.0)]), at(2, contacts=[touch("rack_a", 80.0)]), at(3)]
@@ -140,7 +143,28 @@ def test_no_collision() -> None:
         "hardest: bot/base_link hit rack_a with 80.0 N at 2.00 s"
     )
     assert not fold({"no_collision": None}, [at(1, contacts=[touch("wall", 1e-6)])]).passed
-    assert fold({"no_collision": {"robot": "other"}}, hard).passed
+    assert fold({"no_collision": {"robot": "other"}}, [*hard, at(4, moved={"walker"})]).passed
+
+
+def test_no_collision_counts_what_robots_carry() -> None:
+    contact = ContactObservation(robot="bot", body="tote_a", other="machine", force_N=139.0, carried=True)
+    result = fold({"no_collision": {"allowed": [{"other": "tote_a"}]}}, [at(1, contacts=[contact])])
+    assert result.reason == "tote_a, carried by bot, hit machine with 139.0 N at 1.00 s"
+    allowed = {"no_collision": {"allowed": [{"other": "machine", "body": "tote_*"}]}}
+    assert fold(allowed, [at(1, contacts=[contact], moved={"bot"})]).passed
+
+
+def test_a_collision_of_two_robots_is_that_of_either() -> None:
+    def check(config: dict[str, Any]) -> CheckResult:
+        fold = CheckEntry.model_validate({"no_collision": config}).build(CheckContext(robots=("bot", "cart")))
+        fold.observe(at(1, contacts=[touch("cart/mast", 7.0)], moved={"bot"}))
+        return fold.result()
+
+    assert check({"robot": "bot"}).reason == "bot/base_link hit cart/mast with 7.0 N at 1.00 s"
+    assert check({"robot": "cart"}).reason == "cart/mast hit bot/base_link with 7.0 N at 1.00 s"
+    assert check({"robot": "cart", "allowed": [{"other": "bot/*", "body": "mast"}]}).passed
+    assert check({"allowed": [{"other": "bot/*", "body": "mast"}]}).passed
+    assert not check({"allowed": [{"other": "bot/*", "body": "base_link"}]}).passed
 
 
 def test_tote_slip() -> None:
@@ -157,8 +181,10 @@ def test_tote_slip_survives_a_lost_contact_but_not_a_new_grasp() -> None:
     entry = {"tote_slip": {"max": "5 mm"}}
     flicker = [at(1, held=held(0.1)), at(1.02), at(1.04, held=held(0.12))]
     assert not fold(entry, flicker).passed
-    again = [at(1, held=held(0.1)), at(5), at(9, held=held(0.12))]
+    again = [at(1, held=held(0.1)), at(1.1, held=held(0.1)), at(5), at(9, held=held(0.12))]
     assert fold(entry, again).passed
+    assert fold(entry, [*again, at(9.1, held=held(0.13))]).value == pytest.approx(0.01)
+    assert fold(entry, [at(1, held=held(0.1))]).reason == "no tote was carried", "one look compares nothing"
 
 
 def test_localisation_error() -> None:
@@ -195,7 +221,8 @@ def test_odometry_drift_is_seen_from_the_start() -> None:
 
 def test_recoveries() -> None:
     def run(*counts: int) -> list[Observation]:
-        robots = [RobotObservation(pose=Pose3.from_xyz_rpy(), recoveries=count) for count in counts]
+        still = Pose3.from_xyz_rpy()
+        robots = [RobotObservation(pose=still, recoveries=count, goals=1) for count in counts]
         return [
             Observation(time_ns=i * 10**9, robots={"bot": robot}) for i, robot in enumerate(robots, start=1)
         ]
@@ -205,7 +232,9 @@ def test_recoveries() -> None:
     assert fold(forced, run(0, 1, 1)).at_s == 2.0, "when it last recovered"
     assert fold(forced, run(0, 0)).reason == "bot recovered 0 times"
     assert fold(forced, run(0, 3)).limit == 2.0
-    km = [at(t, robots=bot(x, 0.0, recoveries=int(x > 0))) for t, x in enumerate((0.0, 900.0, 1100.0))]
+    km = [
+        at(t, robots=bot(x, 0.0, recoveries=int(x > 0), goals=1)) for t, x in enumerate((0.0, 900.0, 1100.0))
+    ]
     assert not fold({"recoveries": {"max_per_km": 1}}, km[:2]).passed
     assert fold({"recoveries": {"max_per_km": 1}}, km).passed
 
@@ -218,8 +247,45 @@ def test_driven_distance() -> None:
     assert fold({"driven_distance": {"max": 1}}, run).reason == "bot drove 2.00 m, more than allowed"
 
 
-def test_energy_integrates_positive_power() -> None:
-    run = [at(t, robots=bot(power_W=p)) for t, p in enumerate((100.0, 10.0, -5.0, 20.0))]
+@pytest.mark.parametrize(
+    ("entry", "robots", "what"),
+    [
+        ({"no_collision": None}, bot(), "nothing moved"),
+        ({"energy": {"max": 1}}, bot(), "bot did not move"),
+        ({"driven_distance": {"max": 1}}, bot(), "bot did not move"),
+        ({"odometry_drift": {"max": 1}}, bot(odometry=Pose2(0, 0, 0)), "bot did not move"),
+        ({"path_on_circle": {"radius": 1, "tolerance": 0.1}}, bot(1.0), "bot did not move"),
+        ({"recoveries": {"max": 1}}, bot(), "bot had no goal to drive to"),
+        (
+            {"localisation_error": {"rms": 1, "after": 9}},
+            bot(estimate=Pose2(0, 0, 0)),
+            "the run ended before 9 s",
+        ),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_what_holds_because_nothing_happened_fails(
+    entry: dict[str, Any], robots: dict[str, RobotObservation], what: str
+) -> None:
+    result = fold(entry, [at(t, robots=robots) for t in (0, 1, 2)])
+    assert (result.passed, result.reason) == (False, f"nothing to look at: {what}")
+
+
+def test_a_robot_may_be_asked_to_stand_still() -> None:
+    run = [at(t, robots=bot()) for t in (0, 1)]
+    assert fold({"driven_distance": {"min": 0, "max": "1 cm"}}, run).passed
+    assert fold({"driven_distance": {"max": "1 cm"}}, [*run, at(2, robots=bot(yaw=0.1))]).passed, "it turned"
+    assert fold({"final_pose": {"x": 0, "y": 0}}, run).passed
+    assert fold({"no_collision": None}, [at(1, robots=bot(), moved={"walker"})]).passed
+
+
+def test_an_estimate_that_is_no_number_is_wrong() -> None:
+    lost = [at(1, robots=bot(estimate=Pose2(math.nan, 0.0, 0.0)))]
+    assert not fold({"localisation_error": {"max": 1}}, lost).passed
+
+
+def test_energy() -> None:
+    run = [at(t, robots=bot(work_J=w), moved={"bot"}) for t, w in enumerate((0.0, 10.0, 10.0, 30.0))]
     assert fold({"energy": {"max": 30}}, run).value == 30.0
     result = fold({"energy": {"max": 29}}, run)
     assert (result.passed, result.at_s, result.reason) == (False, 2.0, "bot used 30 J")
@@ -264,7 +330,7 @@ def test_closed_loop() -> None:
         {"tote_slip": {"max": 1}},
         {"localisation_error": {"rms": 1}},
         {"odometry_drift": {"max": 1}},
-        {"driven_distance": {"min": 0}},
+        {"driven_distance": {"min": 1}},
         {"recoveries": {"max": 1}},
         {"map_accuracy": {"mean": 1}},
         {"map_coverage": {"floor": 0.5}},

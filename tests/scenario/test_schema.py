@@ -97,6 +97,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("- mission_succeeded:", "- driven_distance: {min: 3, max: 2}", "demo.yaml:15: checks.0.driven_distance: min (3 m) must not exceed max (2 m)"),
         ("- mission_succeeded:", "- energy: {max: 3, robot: bit}", "demo.yaml:15: unknown robot 'bit'; did you mean 'bot'? Valid: bot"),
         ("- mission_succeeded:", "- tote_slip: {max: 3 mm, tote: tote_b}", "demo.yaml:15: the mission carries no tote 'tote_b'; did you mean 'tote_a'? Valid: tote_a"),
+        ("- mission_succeeded:", "- map_accuracy: {mean: 1}", "demo.yaml:15: map_accuracy needs the localisation of robot 'bot' of type slam"),
         ("{arena: warehouse}", "{arena: warehouse, obstacles: [{name: a, size: [1, 1, 1]}, {name: a, size: [1, 1, 1]}]}", "demo.yaml:3: the name 'a' is taken by world.obstacles.0; names must differ"),
         ("    navigation: {}", "    navigation: {collision_monitor: {polygons: [{name: a, action_type: stop, points: [[0, 0], [1, 1]]}]}}", "demo.yaml:9: robots.0.navigation.collision_monitor.polygons.0.points: must be three corners or more, not [[0,0],[1,1]]"),
         ("checks:\n  - mission_succeeded:\n", "checks: []\n", "demo.yaml:14: checks: must have at least 1 items, not []"),
@@ -139,6 +140,11 @@ def test_without_an_arena(tmp_path: Path) -> None:
         "demo.yaml:7: amcl without a map needs an arena; name one as world.arena, or a map",
         "demo.yaml:9: pick_and_place needs an arena; name one as world.arena",
     ]
+
+
+def test_recoveries_need_a_navigator(tmp_path: Path) -> None:
+    text = "name: demo\nduration: 1\nrobots: [{model: diff_bot}]\nchecks:\n  - recoveries: {max: 0}\n"
+    assert faults(tmp_path, text) == ["demo.yaml:5: recoveries needs a navigation of robot 'diff_bot'"]
 
 
 def test_several_robots(tmp_path: Path) -> None:

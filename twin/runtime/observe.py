@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,10 +10,14 @@ import numpy as np
 from twin.geometry import Pose3
 from twin.runtime.derive import GRASP_FRAME
 from twin.runtime.missions import MissionHandle
+from twin.runtime.payload import Payload
 from twin.runtime.robot_stack import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
 from twin.sim.world import World
+
+_MOVED, _TURNED = 0.01, 0.05
+"""What has settled on the floor has come less far than this [m] and turned by less [rad]."""
 
 
 class Observer:
@@ -26,9 +31,10 @@ class Observer:
         self._mission = mission
         self._goods = tuple(goods)
         self._last: dict[str, tuple[int, Pose3]] = {}
-        self._contacts: dict[tuple[str, str], float] = {}
-        self._power = dict.fromkeys((stack.name for stack in stacks), 0.0)
-        self._gathered = 0
+        self._payload = Payload(world, self._goods)
+        self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
+        self._start = world.body_poses()
+        self._moved: set[str] = set()
         self._fingers = {
             f"{stack.name}/{link}": stack.name
             for stack in stacks
@@ -37,18 +43,14 @@ class Observer:
         }
 
     def gather(self) -> None:
-        """Note contacts and power of the present control tick."""
-        self._gathered += 1
-        for contact in self._world.contacts():
-            pair = contact.body1, contact.body2
-            self._contacts[pair] = max(contact.force_N, self._contacts.get(pair, 0.0))
-        for stack in self._stacks:
-            reading = stack.handle.hardware.read()
-            power = reading.effort * reading.velocity
-            self._power[stack.name] += float(power[power > 0.0].sum())
+        """Note the contacts of the present control tick."""
+        for contact in (*map(_observed, self._world.contacts()), *self._payload.contacts()):
+            pair = contact.robot, contact.body, contact.other
+            if pair not in self._contacts or contact.force_N > self._contacts[pair].force_N:
+                self._contacts[pair] = contact
 
     def observe(self) -> Observation:
-        """Return the present state, with the contacts and the mean power since the last observation."""
+        """Return the present state, with the contacts since the last observation."""
         world, mission = self._world, self._mission
         goods = {name: world.pose(name) for name in self._goods}
         observation = Observation(
@@ -56,20 +58,14 @@ class Observer:
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
             held=self._held(world.contacts(), goods),
-            contacts=[
-                ContactObservation(
-                    robot=link.partition("/")[0], body=link.partition("/")[2], other=other, force_N=force
-                )
-                for (link, other), force in self._contacts.items()
-            ],
+            contacts=tuple(self._contacts.values()),
+            moved=self._note_moved(),
             mission_state=mission.state,
             mission_done=mission.done,
             mission_succeeded=mission.succeeded,
             mission_reason=mission.reason,
         )
         self._contacts.clear()
-        self._power = dict.fromkeys(self._power, 0.0)
-        self._gathered = 0
         return observation
 
     def _robot(self, stack: RobotStack) -> RobotObservation:
@@ -83,10 +79,19 @@ class Observer:
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            power_W=self._power[stack.name] / max(self._gathered, 1),
+            work_J=self._world.work(stack.name),
+            goals=stack.navigator.goals if stack.navigator is not None else 0,
             recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
             map=stack.slam.map if stack.slam is not None else None,
         )
+
+    def _note_moved(self) -> frozenset[str]:
+        xyz, quat_wxyz = self._world.body_poses()
+        came = np.linalg.norm(xyz - self._start[0], axis=1) > _MOVED
+        turned = np.abs((quat_wxyz * self._start[1]).sum(axis=1)) < math.cos(_TURNED / 2.0)
+        names = self._world.body_names
+        self._moved.update(names[i].partition("/")[0] for i in np.flatnonzero(came | turned))
+        return frozenset(self._moved)
 
     def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:
         """Return the goods that both fingers of a robot touch."""
@@ -101,3 +106,8 @@ class Observer:
                 grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
                 held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
         return held
+
+
+def _observed(contact: Contact) -> ContactObservation:
+    robot, _, body = contact.body1.partition("/")
+    return ContactObservation(robot=robot, body=body, other=contact.body2, force_N=contact.force_N)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
 
 _OBSERVED_TICKS = 5
-"""Checks see one observation in so many ticks; contacts and power of the others are in it."""
+"""Checks see one observation in so many control ticks; the contacts of the others are in it."""
 _SETTLE_NS = 1_000_000_000
 """The run goes on for so long after its mission has ended, so that the recording shows how it ended."""
 
@@ -63,6 +63,8 @@ class Run:
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
+        if any(entry.energy is not None for entry in scenario.checks):
+            self.world.measure_work()
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
         self._sink = sink

@@ -20,6 +20,7 @@ from twin.scenario.missions import (
 from twin.strict_yaml import Fault, Loc
 
 if TYPE_CHECKING:
+    from twin.scenario.checks import CheckEntry
     from twin.scenario.robots import RobotConfig
     from twin.scenario.schema import Scenario
 
@@ -162,6 +163,7 @@ def _faults(scenario: Scenario) -> Iterator[Fault]:
 
 def _checks(scenario: Scenario) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
+    by_name = {robot.id: robot for robot in scenario.robots}
     mission = scenario.mission
     totes = [task.tote for task in mission.tasks] if isinstance(mission, PickAndPlace) else []
     for i, entry in enumerate(scenario.checks):
@@ -174,8 +176,20 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
         if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
             names = ", ".join(robots)
             yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
+        if subject is not None and "robot" in subjects:
+            yield from _lacking(entry, subject, loc)
         if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
             yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
         tote = subjects.get("tote")
         if entry.kind == "tote_slip" and tote is not None and tote not in totes:
             yield Fault((*loc, "tote"), f"the mission carries no tote '{tote}'; {nearest(tote, totes)}")
+
+
+def _lacking(entry: CheckEntry, robot: RobotConfig, loc: Loc) -> Iterator[Fault]:
+    """Yield what a robot has not got that a check is about."""
+    if entry.recoveries is not None and robot.navigation is None:
+        yield Fault(loc, f"recoveries needs a navigation of robot '{robot.id}'")
+    slam = robot.localisation is not None and robot.localisation.type == "slam"
+    if entry.kind in ("map_accuracy", "map_coverage") and not slam:
+        yield Fault(loc, f"{entry.kind} needs the localisation of robot '{robot.id}' of type slam")

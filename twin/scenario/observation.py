@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -26,8 +26,10 @@ class RobotObservation:
     """Believed pose of the base in `odom`; None without odometry."""
     speed: float = 0.0
     """True planar speed of the base [m/s]."""
-    power_W: float = 0.0
-    """Mechanical power that the actuators put in, mean since the last observation [W]."""
+    work_J: float = 0.0
+    """Mechanical work that its actuators have done so far; known only if a check asks for it [J]."""
+    goals: int = 0
+    """Goals that its navigator has taken so far."""
     recoveries: int = 0
     """Recovery behaviours that its navigator has started so far."""
     map: OccupancyMap | None = None
@@ -46,16 +48,26 @@ class Held:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ContactObservation:
-    """A robot touches something that is neither itself nor the floor."""
+    """A robot, or goods that it carries, touch something that is neither itself nor the floor."""
 
     robot: str
     """The robot."""
     body: str
-    """Its link."""
+    """Its link, or the goods."""
     other: str
     """What it touches: an obstacle, a good, a wall, another robot."""
     force_N: float
     """Normal force [N]."""
+    carried: bool = False
+    """Whether `body` is goods; what they are taken from and set down on does not count."""
+
+    def by_the_other(self, robots: Collection[str]) -> ContactObservation | None:
+        """Return the same contact as the other robot's; None if it is with no robot's link."""
+        robot, _, body = self.other.partition("/")
+        if self.carried or not body or robot not in robots:
+            return None
+        other = f"{self.robot}/{self.body}"
+        return ContactObservation(robot=robot, body=body, other=other, force_N=self.force_N)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -71,6 +83,8 @@ class Observation:
     """Only the goods that are in a gripper."""
     contacts: Sequence[ContactObservation] = ()
     """Of all control ticks since the last observation, the hardest of each pair."""
+    moved: Collection[str] = ()
+    """What has moved since the start: robots, with their base or a joint, goods and obstacles."""
     mission_state: str = ""
     mission_done: bool = False
     mission_succeeded: bool | None = None

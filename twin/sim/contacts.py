@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
+
+from twin.geometry import Array
 
 
 class Contact(NamedTuple):
@@ -20,6 +23,15 @@ class Contact(NamedTuple):
     """Sum of the normal forces [N]."""
     geoms: tuple[tuple[str, str], ...]
     """The touching geoms, body1's first."""
+
+
+class Touch(NamedTuple):
+    """Something touches a body at one point."""
+
+    other: str
+    """What touches it: a link `<robot>/<link>`, a static, goods, or the floor."""
+    push: Array
+    """The normal force on the body, along the axes of the world, shape (3,) [N]."""
 
 
 _FLOOR = -2
@@ -47,6 +59,7 @@ class ContactReader:
         self._force = np.zeros(6)
         self._harmless = b""
         """Geoms of contacts that do not matter, as on most ticks: wheels on the floor."""
+        self._geoms_of: dict[str, NDArray[np.bool_]] = {}
 
     def read(self, data: mujoco.MjData) -> list[Contact]:
         """Return what robots touch except for themselves and the floor, one entry for each pair of bodies."""
@@ -72,3 +85,18 @@ class ContactReader:
             force, names = pairs.get(key, (0.0, []))
             pairs[key] = force + float(self._force[0]), [*names, (self._names[a], self._names[b])]
         return [Contact(*key, force, tuple(names)) for key, (force, names) in pairs.items()]
+
+    def touches(self, data: mujoco.MjData, body: str) -> list[Touch]:
+        """Return what touches a body, point by point, whatever it is."""
+        if body not in self._geoms_of:
+            self._geoms_of[body] = np.array([owner == body for owner in self._owners])
+        contact = data.contact
+        mine = self._geoms_of[body][contact.geom]
+        touches = []
+        for index in np.flatnonzero((mine[:, 0] != mine[:, 1]) & (contact.efc_address >= 0)):
+            mujoco.mj_contactForce(self._model, data, index, self._force)
+            outwards = bool(mine[index, 0])  # normals point from the first geom to the second
+            other = self._owners[contact.geom[index, int(outwards)]]
+            force = -self._force[0] if outwards else self._force[0]
+            touches.append(Touch(other, force * contact.frame[index, :3]))
+        return touches

@@ -13,7 +13,7 @@ import numpy as np
 from twin.errors import ScenarioError, nearest
 from twin.geometry import Array, Pose3
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
-from twin.sim.contacts import Contact, ContactReader
+from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
 from twin.sim.hardware import Hardware
 from twin.sim.physics import Physics
@@ -21,6 +21,7 @@ from twin.sim.robot import RobotHandle, RobotPlacement
 from twin.sim.scene import Scene
 from twin.sim.sensors import Mount, create_sensor
 from twin.sim.shapes import BodyShape, shapes
+from twin.sim.work import WorkMeter
 
 
 class World:
@@ -55,6 +56,7 @@ class World:
         """Physics steps since the start."""
         self._motion_step = self._contact_step = -1
         self._contacts: list[Contact] = []
+        self._work_meter: WorkMeter | None = None
         mujoco.mj_forward(self.model, self.data)
 
         self._guard = DivergenceGuard(self.model, self.data)
@@ -117,10 +119,20 @@ class World:
             SimulationError: The physics diverged; names joint or body, time, and the file of the last states.
         """
         self._guard.remember()
-        mujoco.mj_step(self.model, self.data, n)
+        if self._work_meter is None:
+            mujoco.mj_step(self.model, self.data, n)
+        else:
+            self._step_measured(n, self._work_meter)
         self.step_count += n
         self._guard.check(self.crash_folder)
         mujoco.mj_kinematics(self.model, self.data)
+
+    def _step_measured(self, n: int, meter: WorkMeter) -> None:
+        meter.begin()
+        for _ in range(n):
+            mujoco.mj_step(self.model, self.data)
+            meter.note()
+        meter.end()
 
     def refresh_motion(self) -> None:
         """Bring MuJoCo's body velocities and accelerations (cvel, cacc) to the present time, once a step."""
@@ -174,6 +186,27 @@ class World:
             self._contacts = self._contact_reader.read(self.data)
         return self._contacts
 
+    def touches(self, body: str) -> list[Touch]:
+        """Return what touches goods or a link, the floor too, point by point, as of the last physics step."""
+        return self._contact_reader.touches(self.data, body)
+
+    def weight(self, body: str) -> float:
+        """Return the weight of goods or of a link with all that hangs on it [N]."""
+        gravity = float(np.linalg.norm(self.model.opt.gravity))
+        return float(self.model.body_subtreemass[self._index[body]]) * gravity
+
+    def measure_work(self) -> None:
+        """Add up the work of actuators from now on; it costs a little of each step."""
+        self._work_meter = WorkMeter(self.model, self.data, tuple(self.robots))
+
+    def work(self, robot: str) -> float:
+        """Return the mechanical work of a robot's actuators, as far as it was measured [J].
+
+        The force on each joint times its true velocity, summed over the physics steps where it is positive:
+        braking gives nothing back.
+        """
+        return 0.0 if self._work_meter is None else self._work_meter.work(robot)
+
     def shapes(self) -> list[BodyShape]:
         """Return everything there is to draw except for the floor."""
         return list(shapes(self.scene, self._placements))
@@ -218,7 +251,7 @@ class World:
         for static in self.scene.statics:
             for index in range(len(static.shapes)):
                 owners[model.geom(static_geom(static.name, index)).id] = static.name
-        robots[model.geom(FLOOR).id] = -2
+        owners[model.geom(FLOOR).id], robots[model.geom(FLOOR).id] = FLOOR, -2
         return owners, robots
 
     def _bind_robot(self, placement: RobotPlacement) -> RobotHandle:

@@ -80,6 +80,11 @@ class BtNavigatorNode:
         self._own_client = ActionClient(node, NavigateToPose, "navigate_to_pose")
         node.create_subscription(PoseStamped, "goal_pose", self._on_goal_pose, 10)
 
+    @property
+    def goals(self) -> int:
+        """Goals taken since the beginning of the run."""
+        return sum(navigator.goals for navigator in self._navigators)
+
     @staticmethod
     def _setups(config: BtNavigatorConfig) -> tuple[NavigatorSetup, NavigatorSetup]:
         return (

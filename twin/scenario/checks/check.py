@@ -5,8 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from twin.geometry import Pose2, Pose3, wrap_angle
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import StrictModel
+
+NOTHING = "nothing to look at: "
+"""Begins the reason of a check that would hold because nothing happened; it fails."""
+_MOVED, _TURNED = 0.01, 0.05
+"""A base that stands has come less far than this [m] and turned by less [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +58,22 @@ class CheckConfig(StrictModel, ABC):
     def subjects(self) -> dict[str, str | None]:
         """Return the names the check refers to, by field: `robot`, `tote`, `zone`."""
         return {field: getattr(self, field) for field in ("robot", "tote", "zone") if hasattr(self, field)}
+
+
+class BaseMotion:
+    """Whether a robot's base ever left the pose at which it was first seen."""
+
+    def __init__(self) -> None:
+        self._start: Pose2 | None = None
+        self.seen = False
+        """So far."""
+
+    def take(self, pose: Pose3) -> None:
+        """Take the true pose of the base."""
+        here = pose.to_pose2()
+        self._start = start = self._start or here
+        if start.distance(here) > _MOVED or abs(wrap_angle(here.yaw - start.yaw)) > _TURNED:
+            self.seen = True
 
 
 class RobotCheckConfig(CheckConfig):

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import model_validator
 
 from twin.geometry import Pose2
-from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import Metres, Seconds
@@ -43,6 +43,7 @@ class LocalisationError(Check):
         self._config, self._robot = config, robot
         self._squares = 0.0
         self._count = 0
+        self._estimated = False
         self._worst = 0.0
         self._worst_at: float | None = None
         self._last: float | None = None
@@ -51,9 +52,13 @@ class LocalisationError(Check):
         """Take one observation."""
         self._last = observation.time_s
         robot = observation.robots[self._robot]
-        if robot.estimate is None or observation.time_s < self._config.after:
+        if robot.estimate is None:
+            return
+        self._estimated = True
+        if observation.time_s < self._config.after:
             return
         error = math.hypot(robot.estimate.x - robot.pose.xyz[0], robot.estimate.y - robot.pose.xyz[1])
+        error = error if math.isfinite(error) else math.inf
         self._squares += error * error
         self._count += 1
         if error >= self._worst:
@@ -78,6 +83,8 @@ class LocalisationError(Check):
         )
         if not self._count:
             reason = f"{self._robot} published no estimate of its pose"
+            if self._estimated:
+                reason = f"{NOTHING}the run ended before {self._config.after:g} s"
         return CheckResult(
             name=self.name,
             passed=passed,
@@ -106,6 +113,7 @@ class OdometryDrift(Check):
     def __init__(self, name: str, config: OdometryDriftConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
+        self._motion = BaseMotion()
         self._start: tuple[Pose2, Pose2] | None = None
         self._end: tuple[Pose2, Pose2] | None = None
         self._at_s: float | None = None
@@ -116,6 +124,7 @@ class OdometryDrift(Check):
         robot = observation.robots[self._robot]
         if robot.odometry is None:
             return
+        self._motion.take(robot.pose)
         self._end = (robot.pose.to_pose2(), robot.odometry)
         self._start = self._start or self._end
 
@@ -128,9 +137,9 @@ class OdometryDrift(Check):
                 start.inverse() @ end for start, end in zip(self._start, self._end, strict=True)
             )
             drift = true.distance(odometric)
-            reason = (
-                "" if drift <= self._config.max else f"odometry ends {drift:.3f} m from the true position"
-            )
+            reason = "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
+            if not drift <= self._config.max:
+                reason = f"odometry ends {drift:.3f} m from the true position"
         return CheckResult(
             name=self.name,
             passed=not reason,

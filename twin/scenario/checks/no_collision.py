@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated
 
-from twin.scenario.checks.check import Check, CheckConfig, CheckResult
+from twin.scenario.checks.check import NOTHING, Check, CheckConfig, CheckResult
 from twin.scenario.fields import NotNegative
 from twin.scenario.observation import CheckContext, ContactObservation, Observation
 from twin.strict_yaml import Newtons, StrictModel
@@ -18,7 +18,7 @@ class AllowedContact(StrictModel):
     other: str
     """What may be touched: `tote_*`."""
     body: str = "*"
-    """Which link of the robot may touch it: `*finger*`."""
+    """Which link of the robot, or which good that it carries, may touch it: `*finger*`, `tote_a`."""
 
     def matches(self, contact: ContactObservation) -> bool:
         """Whether the contact is meant."""
@@ -26,7 +26,11 @@ class AllowedContact(StrictModel):
 
 
 class NoCollisionConfig(CheckConfig):
-    """No robot touches anything but the floor and what is allowed."""
+    """No robot, nor what it carries, touches anything but the floor and what is allowed.
+
+    What a robot carries may stand on something where it is taken up or set down; to drag it along there, or
+    to press it down harder than it is gripped, is a collision.
+    """
 
     robot: str | None = None
     """Name of the robot; absent: all robots."""
@@ -37,26 +41,29 @@ class NoCollisionConfig(CheckConfig):
 
     def build(self, kind: str, context: CheckContext) -> Check:
         """Return the fold."""
-        return NoCollision(kind if self.robot is None else f"{kind}({self.robot})", self)
+        name = kind if self.robot is None else f"{kind}({self.robot})"
+        return NoCollision(name, self, context.robots)
 
 
 class NoCollision(Check):
     """Keeps the first collision and the hardest one."""
 
-    def __init__(self, name: str, config: NoCollisionConfig) -> None:
+    def __init__(self, name: str, config: NoCollisionConfig, robots: Sequence[str]) -> None:
         super().__init__(name)
-        self._config = config
+        self._config, self._robots = config, robots
         self._first: tuple[float, ContactObservation] | None = None
         self._hardest: tuple[float, ContactObservation] | None = None
         self._force = 0.0
-        self._allowed: dict[tuple[str, str], bool] = {}
+        self._allowed: dict[tuple[str, str, str], bool] = {}
+        self._moved = False
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
         self._at_s = observation.time_s
-        for contact in observation.contacts:
-            if self._config.robot not in (None, contact.robot) or self._is_allowed(contact):
+        self._moved = bool(observation.moved)
+        for contact in filter(None, map(self._of_interest, observation.contacts)):
+            if self._is_allowed(contact):
                 continue
             self._force = max(self._force, contact.force_N)
             if contact.force_N <= self._config.max_force:
@@ -66,15 +73,25 @@ class NoCollision(Check):
             if self._hardest is None or contact.force_N > self._hardest[1].force_N:
                 self._hardest = (observation.time_s, contact)
 
+    def _of_interest(self, contact: ContactObservation) -> ContactObservation | None:
+        """Return a contact as the check's robot sees it; None if it is not about that robot."""
+        if self._config.robot in (None, contact.robot):
+            return contact
+        turned = contact.by_the_other(self._robots)
+        return turned if turned is not None and turned.robot == self._config.robot else None
+
     def _is_allowed(self, contact: ContactObservation) -> bool:
-        pair = (contact.body, contact.other)
+        pair = (contact.robot, contact.body, contact.other)
         if pair not in self._allowed:
-            self._allowed[pair] = any(rule.matches(contact) for rule in self._config.allowed)
+            views = filter(None, (contact, contact.by_the_other(self._robots)))
+            self._allowed[pair] = any(rule.matches(view) for view in views for rule in self._config.allowed)
         return self._allowed[pair]
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the hardest contact that is not allowed."""
-        reason = "" if self._at_s is not None else "the run made no step"
+        reason = "" if self._moved else f"{NOTHING}nothing moved"
+        if self._at_s is None:
+            reason = "the run made no step"
         if self._first is not None and self._hardest is not None:
             reason = _sentence(*self._first)
             if self._hardest != self._first:
@@ -92,4 +109,6 @@ class NoCollision(Check):
 
 def _sentence(time_s: float, contact: ContactObservation) -> str:
     where = f"{contact.robot}/{contact.body}"
+    if contact.carried:
+        where = f"{contact.body}, carried by {contact.robot},"
     return f"{where} hit {contact.other} with {contact.force_N:.1f} N at {time_s:.2f} s"

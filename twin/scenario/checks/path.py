@@ -6,7 +6,7 @@ import math
 from typing import Annotated
 
 from twin.geometry import Pose2, wrap_angle
-from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
 from twin.scenario.fields import Positive
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import Metres, Radians
@@ -119,12 +119,15 @@ class PathOnCircle(Check):
     def __init__(self, name: str, config: PathOnCircleConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
+        self._motion = BaseMotion()
         self._worst: float | None = None
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        x, y, _ = observation.robots[self._robot].pose.xyz
+        pose = observation.robots[self._robot].pose
+        self._motion.take(pose)
+        x, y, _ = pose.xyz
         centre = self._config.centre
         off = abs(math.hypot(x - centre[0], y - centre[1]) - self._config.radius)
         if self._worst is None or off > self._worst:
@@ -135,7 +138,9 @@ class PathOnCircle(Check):
         reason = "the run made no step"
         if self._worst is not None:
             off = self._worst > self._config.tolerance
-            reason = f"{self._robot} was {self._worst:.3f} m off the circle" if off else ""
+            reason = "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
+            if off:
+                reason = f"{self._robot} was {self._worst:.3f} m off the circle"
         return CheckResult(
             name=self.name,
             passed=not reason,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import model_validator
 
-from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import NOTHING, Check, CheckResult, RobotCheckConfig
 from twin.scenario.fields import NotNegative
 from twin.scenario.observation import CheckContext, Observation
 
@@ -41,7 +41,7 @@ class Recoveries(Check):
     def __init__(self, name: str, config: RecoveriesConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
-        self._count = 0
+        self._count = self._goals = 0
         self._driven = 0.0
         self._last: tuple[float, float] | None = None
         self._at_s: float | None = None
@@ -50,6 +50,7 @@ class Recoveries(Check):
         """Take one observation."""
         robot = observation.robots[self._robot]
         count, here = robot.recoveries, (float(robot.pose.xyz[0]), float(robot.pose.xyz[1]))
+        self._goals = robot.goals
         self._driven += math.dist(self._last or here, here)
         self._last = here
         if count != self._count or self._at_s is None:
@@ -62,7 +63,9 @@ class Recoveries(Check):
             allowed = per_km * self._driven / 1000.0
             high = math.floor(allowed) if high is None else min(high, math.floor(allowed))
         too_many = high is not None and self._count > high
-        reason = f"{self._robot} recovered {self._count} times" if too_many or self._count < low else ""
+        reason = "" if self._goals else f"{NOTHING}{self._robot} had no goal to drive to"
+        if too_many or self._count < low:
+            reason = f"{self._robot} recovered {self._count} times"
         if self._at_s is None:
             reason = "the run made no step"
         return CheckResult(

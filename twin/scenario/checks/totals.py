@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import model_validator
 
 from twin.geometry import Array
-from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
 from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import Joules, Metres
@@ -18,13 +18,13 @@ class DrivenDistanceConfig(RobotCheckConfig):
     """The length of the true path lies between two bounds."""
 
     min: Annotated[Metres, NotNegative] | None = None
-    """Shortest path [m]."""
+    """Shortest path [m]; 0 allows a robot to stand still, which else would be nothing to look at."""
     max: Annotated[Metres, Positive] | None = None
     """Longest path [m]."""
 
     @model_validator(mode="after")
     def _has_a_limit(self) -> DrivenDistanceConfig:
-        if self.min is None and self.max is None:
+        if not self.min and self.max is None:
             raise ValueError("must have at least one of the keys min, max")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise ValueError(f"min ({self.min:g} m) must not exceed max ({self.max:g} m)")
@@ -42,12 +42,15 @@ class DrivenDistance(Check):
         super().__init__(name)
         self._config, self._robot = config, robot
         self._distance = 0.0
+        self._motion = BaseMotion()
         self._previous: Array | None = None
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        xy = observation.robots[self._robot].pose.xyz[:2].copy()
+        pose = observation.robots[self._robot].pose
+        self._motion.take(pose)
+        xy = pose.xyz[:2].copy()
         if self._previous is not None:
             self._distance += math.dist(xy, self._previous)
         self._previous, self._at_s = xy, observation.time_s
@@ -62,6 +65,8 @@ class DrivenDistance(Check):
             reason = (
                 f"{self._robot} drove {self._distance:.2f} m, {'less' if too_short else 'more'} than allowed"
             )
+        elif self._at_s is not None and low is None and not self._motion.seen:
+            reason = f"{NOTHING}{self._robot} did not move"
         return CheckResult(
             name=self.name,
             passed=not reason,
@@ -74,10 +79,14 @@ class DrivenDistance(Check):
 
 
 class EnergyConfig(RobotCheckConfig):
-    """The actuators use no more than this."""
+    """The actuators do no more mechanical work than this.
+
+    It is the force on each joint times the joint's true velocity, summed over the physics steps in which
+    the product is positive: what a joint takes up while it brakes is lost.
+    """
 
     max: Annotated[Joules, Positive]
-    """Largest mechanical work; braking gives nothing back [J]."""
+    """Largest work [J]."""
 
     def build(self, kind: str, context: CheckContext) -> Check:
         """Return the fold."""
@@ -85,27 +94,28 @@ class EnergyConfig(RobotCheckConfig):
 
 
 class Energy(Check):
-    """Integrates positive power over time."""
+    """Keeps the work done so far, and since when it is too much."""
 
     def __init__(self, name: str, config: EnergyConfig, robot: str) -> None:
         super().__init__(name)
         self._config, self._robot = config, robot
         self._energy = 0.0
-        self._previous_ns: int | None = None
+        self._moved = self._seen = False
         self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        if self._previous_ns is not None:
-            power = max(0.0, observation.robots[self._robot].power_W)
-            self._energy += power * (observation.time_ns - self._previous_ns) / 1e9
-        self._previous_ns = observation.time_ns
+        self._seen = True
+        self._energy = observation.robots[self._robot].work_J
+        self._moved = self._robot in observation.moved
         if self._energy <= self._config.max:
             self._at_s = observation.time_s
 
     def result(self) -> CheckResult:
         """Return the outcome so far; a failure's time is the last one within the limit."""
-        reason = "" if self._previous_ns is not None else "the run made no step"
+        reason = "" if self._moved else f"{NOTHING}{self._robot} did not move"
+        if not self._seen:
+            reason = "the run made no step"
         if self._energy > self._config.max:
             reason = f"{self._robot} used {self._energy:.0f} J"
         return CheckResult(

@@ -36,6 +36,8 @@ class _Grasp:
     """Origin of the tote in the gripper's frame when the grasp closed, shape (3,) [m]."""
     last_ns: int
     """When it was last seen."""
+    looks: int = 0
+    """How often it was seen; a single look is nothing to compare."""
 
 
 class ToteSlip(Check):
@@ -57,6 +59,8 @@ class ToteSlip(Check):
             if self._config.tote not in (None, tote):
                 continue
             grasp = self._grasp(tote, held, observation.time_ns)
+            if grasp.looks < 2:
+                continue
             slip = math.dist(held.T_gripper_good.xyz, grasp.start)
             if self._worst is None or slip > self._worst:
                 self._worst, self._at_s = slip, observation.time_s
@@ -72,6 +76,7 @@ class ToteSlip(Check):
             grasp = _Grasp(held.robot, held.T_gripper_good.xyz.copy(), time_ns)
             self._grasps[tote] = grasp
         grasp.last_ns = time_ns
+        grasp.looks += 1
         return grasp
 
     def result(self) -> CheckResult:

@@ -80,6 +80,8 @@ class Navigator:
         self.setup, self._context = setup, context
         self.after_tick: Callable[[], None] = lambda: None
         self.blackboard = Blackboard()
+        self.goals = 0
+        """Goals taken since the beginning."""
         self._trees: dict[str, Tree] = {}
         self._active: GoalHandle | None = None
         self._name = ""
@@ -178,6 +180,7 @@ class Navigator:
         board.set("number_recoveries", 0)
         self._due = self._due if self._active is not None else now
         self._tree, self._name, self._active, self._started = tree, name, handle, now
+        self.goals += 1
         return None
 
     def _was_for_an_older_goal(self, status: Status) -> bool:
