@@ -37,6 +37,8 @@ SLOPE_DEG = 5.0
 HEADINGS = (("uphill", 0.0), ("across", math.pi / 2.0), ("downhill", math.pi))
 RADII = (0.5, 2.0)
 """Of circles, each driven to the left and to the right; at least the effective track [m]."""
+LEAST_ARC = math.radians(30.0)
+"""Turned by, from which on a circle has a radius."""
 CALIBRATIONS, CALIBRATED_DEG = 4, 5.0
 """A skid steer is calibrated by one spin, and by more while one turned by so much too far or too little."""
 PLAUSIBLE_CALIBRATION = (0.5, 2.0)
@@ -233,10 +235,13 @@ def _circle_bar(drive: DriveSpec, description: RobotDescription) -> float:
 
 def _circle(ground: ProvingGround, radius: float, lateral: float, bar: float) -> Manoeuvre:
     def judge(driven: Driven) -> tuple[float, str]:
-        found, turned = fitted_radius(driven.path), math.copysign(1.0, radius) * driven.true_angle
-        share = max(abs(found / abs(radius) - 1.0), abs(driven.angle_error) / (2.0 * math.pi))
+        turned = math.copysign(1.0, radius) * driven.true_angle
+        share = abs(driven.angle_error) / (2.0 * math.pi)
+        if abs(turned) < LEAST_ARC:  # nearly straight, of no certain radius
+            return 100.0 * share, f"turns by {math.degrees(turned):.4g} of 360 degrees"
+        found = fitted_radius(driven.path)
         words = f"drives a radius of {found:.4g} m, turning by {math.degrees(turned):.4g} of 360 degrees"
-        return 100.0 * share, words
+        return 100.0 * max(share, abs(found / abs(radius) - 1.0)), words
 
     name = f"circle of {abs(radius):g} m {'left' if radius > 0 else 'right'}"
     return _judged(name, lambda: ground.circle(radius, lateral=lateral), judge, bar, "%")
