@@ -195,7 +195,7 @@ def test_a_wrong_radius_is_the_error_it_makes() -> None:
 @pytest.mark.skipif(not SEED.exists(), reason="the tutorials' models are not here")
 def test_the_tutorials_tumbling_wheels() -> None:
     report = check_drive(load(SEED))
-    assert report.guessed
+    assert report.drive.guessed
     assert (report.drive.left_joints, report.drive.wheel_radius) == (("wheel_left_joint",), 0.05)
     assert {"straight 5 m", "spin 360 degrees left"} <= set(missed(report))
 

@@ -22,6 +22,7 @@ from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.runtime.drives import with_drive
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack
@@ -91,7 +92,8 @@ def build(
     timestep = scenario.physics.timestep
     placements, heights, ratios = [], {}, {}
     for robot in scenario.robots:
-        description = load(robot.model, ReadOptions(args=robot.args))
+        described = load(robot.model, ReadOptions(args=robot.args))
+        description = with_drive(described, robot, scenario.mission)
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
         ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)

@@ -12,10 +12,10 @@ import numpy as np
 from twin.controllers.drive_config import analytic_track_ratio, drive_config
 from twin.convert import convert
 from twin.convert.conversion import Conversion
-from twin.errors import ModelError, SimulationError
+from twin.errors import ModelError, Problem, SimulationError
 from twin.geometry import Array
+from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.description import RobotDescription
-from twin.models.drive_guess import guess_drive
 from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.specs import DriveSpec
 from twin.sim.driving import Driven, ProvingGround
@@ -71,8 +71,6 @@ class DriveReport:
     """How truly a robot drives."""
 
     drive: DriveSpec
-    guessed: bool
-    """The file has no drive plugin; the drive was guessed by the wheels."""
     track_ratio: float
     """Effective over geometric track, measured by one spin if it is a skid steer; else 1."""
     analytic_track_ratio: float
@@ -154,11 +152,9 @@ def _check(
 ) -> DriveReport:
     drive = description.drive or guess_drive(description)
     if drive is None:
-        raise ModelError(
-            f"{description.source}: robot '{description.name}' has no drive to check; it needs a diff-drive "
-            "plugin, or wheels that turn freely on both sides"
-        )
-    guessed = description.drive is None
+        why, line = lack_of_drive(description)
+        message = f"robot '{description.name}' has no drive to check: {why}; {VALID_DRIVES}"
+        raise ModelError(Problem(message, description.source, line or None))
     description = replace(description, drive=drive)
     conversion = convert(description, timestep=timestep)
     measured = calibrated_track_ratio(conversion, timestep=timestep)
@@ -171,7 +167,6 @@ def _check(
         lines = (Manoeuvre(name="stand still", error=None, bar=HOLD_BAR_M, unit="m", words=words),)
     return DriveReport(
         drive=drive,
-        guessed=guessed,
         track_ratio=config.wheel_separation_multiplier,
         analytic_track_ratio=analytic_track_ratio(drive, description),
         equal_load_track_ratio=analytic_track_ratio(drive, description, equal_loads=True),
