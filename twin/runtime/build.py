@@ -28,6 +28,7 @@ from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack
 from twin.runtime.stack_context import StackContext
 from twin.runtime.surroundings import surroundings
+from twin.runtime.unheard import tell_unheard_scans
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone
@@ -141,6 +142,7 @@ def build(
         bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)
+        tell_unheard_scans(bus)
     except BaseException:
         bus.close()
         raise
