@@ -55,7 +55,7 @@ def test_nothing_to_drive(invoke: Invoke) -> None:
     assert code == 2
     assert "(7 links, 6 joints)" in out, "what was found is told all the same"
     assert json.loads(invoke("check", "r2d2", "--drive", "--json")[1])["robot"] == "r2d2"
-    assert "robot 'r2d2' has no drive to check; it needs a diff-drive plugin" in err
+    assert "robot 'r2d2' has no drive to check: the file has no drive plugin, nor wheels" in err
 
 
 def test_conversion_drives_what_it_wrote(invoke: Invoke, mirrored: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from twin.convert import convert
+from twin.convert.conversion import Guess
 from twin.convert.export import export
 from twin.convert.roles import roles_of
 from twin.models import load
@@ -26,9 +27,9 @@ def ball(name: str, x: float) -> str:
     )
 
 
-def robot(*lines: str) -> RobotDescription:
+def robot(*lines: str, at: float = 0.25) -> RobotDescription:
     base = f"<link name='base'>{INERTIAL}</link>"
-    text = f"<robot name='r'>{base}{ball('a', 0.0)}{ball('b', 0.15)}{''.join(lines)}</robot>"
+    text = f"<robot name='r'>{base}{ball('a', 0.0)}{ball('b', at)}{''.join(lines)}</robot>"
     return parse_urdf(text, Path("r.urdf"))
 
 
@@ -37,7 +38,9 @@ def on(reference: str, text: str) -> str:
 
 
 def touches(description: RobotDescription) -> bool:
-    model = convert(description).spec.copy().compile()
+    spec = convert(description).spec.copy()
+    spec.body("b").pos = [0.15, 0.0, 0.0]
+    model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return bool(data.ncon > 0)
@@ -46,8 +49,9 @@ def touches(description: RobotDescription) -> bool:
 @pytest.mark.parametrize(
     ("lines", "expected"),
     [
-        ((), True),
-        ((on("a", "<selfCollide>false</selfCollide>"),), False),
+        ((), False),
+        ((on("a", "<selfCollide>1</selfCollide>"),), True),
+        (("<gazebo><self_collide>1</self_collide></gazebo>", on("a", "<selfCollide>0</selfCollide>")), True),
         ((on("a", "<self_collide>0</self_collide>"), on("b", "<selfCollide>true</selfCollide>")), True),
         (("<gazebo><self_collide>false</self_collide></gazebo>",), False),
         (("<gazebo><self_collide>0</self_collide></gazebo>", on("b", "<selfCollide>1</selfCollide>")), True),
@@ -55,6 +59,15 @@ def touches(description: RobotDescription) -> bool:
 )
 def test_links_touch_each_other_if_one_of_them_wants_to(lines: tuple[str, ...], expected: bool) -> None:
     assert touches(robot(*lines)) is expected
+
+
+def test_links_inside_of_each_other_from_the_start_do_not_touch_and_that_is_told() -> None:
+    wish = on("a", "<selfCollide>true</selfCollide>")
+    assert not touches(robot(wish, at=0.15))
+    note = "none: their shapes are inside of each other at joint position zero"
+    told = Guess(element="contact of links 'a' and 'b'", note=note)
+    assert told in convert(robot(wish, at=0.15)).guesses
+    assert told not in convert(robot(at=0.15)).guesses  # nothing was asked for
 
 
 def test_gravity_pulls_only_what_it_shall() -> None:

@@ -42,6 +42,19 @@ def test_arguments_and_packages(tmp_path: Path) -> None:
         load(file)
 
 
+@pytest.mark.parametrize(
+    ("name", "address"),
+    [("r.urdf", "http://ros.org/wiki/xacro"), ("r.urdf.xacro", "http://wiki.ros.org/xacro")],
+)
+def test_xacro_goes_by_its_prefix_not_by_the_address(tmp_path: Path, name: str, address: str) -> None:
+    head = f"<robot name='r' xmlns:xacro='{address}'>"
+    part = "<xacro:macro name='base'><link name='base'/></xacro:macro>"
+    (tmp_path / "part.xacro").write_text(f"{head}{part}</robot>")
+    file = tmp_path / name
+    file.write_text(f"{head}<xacro:include filename='part.xacro'/><xacro:base/></robot>")
+    assert [*load(file).links] == ["base"]
+
+
 def test_what_xacro_offers_still_works(tmp_path: Path) -> None:
     (tmp_path / "sizes.yaml").write_text("wheel: {radius: 0.1, names: [l, r]}\ntilt: !degrees 180")
     body = """

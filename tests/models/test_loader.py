@@ -153,7 +153,28 @@ def test_two_roots_and_cycles() -> None:
     )
     (fault,) = faults(robot(loop))
     assert "the joints form a cycle: " in fault
-    assert "c -> d" in fault or "d -> c" in fault
+    assert fault.startswith("r.urdf:5: ")
+    assert fault.endswith("c -> d -> c, by 'k' (line 5), 'm' (line 5)")
+    loop = robot(joint_k(), "<joint name='m' type='fixed'><parent link='c'/><child link='a'/></joint>")
+    (fault,) = faults(loop)
+    assert fault == "r.urdf:5: the joints form a cycle: a -> c -> a, by 'k' (line 5), 'm' (line 6)"
+
+
+def test_a_bad_inertia_is_told_beside_a_bad_mass() -> None:
+    found = faults(robot(link_c(inertial(mass=-1, ixx=float("nan")))))
+    assert len(found) == 2
+    assert "link 'c' has mass -1 kg" in "\n".join(found)
+    assert "ixx='nan' is not finite" in "\n".join(found)
+
+
+def test_names_that_xacro_would_have_replaced_are_refused() -> None:
+    text = robot("<link name='${prefix}c'/>", "<gazebo reference='$(arg prefix)b'/>")
+    (fault,) = [fault for fault in faults(text) if "roots" not in fault and "root links" not in fault]
+    assert fault.startswith(
+        "r.urdf:5: link '${prefix}c' (and 1 more) is left as xacro found it; declare xmlns"
+    )
+    (fault,) = faults(robot("<x:include xmlns:x='http://www.ros.org/wiki/xacro' filename='c.xacro'/>"))
+    assert fault.startswith("r.urdf:5: <x:include> is left as xacro found it")
 
 
 def test_doctype_and_broken_xml_are_refused_with_line() -> None:

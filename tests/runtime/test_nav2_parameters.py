@@ -373,6 +373,25 @@ def test_sources_of_a_costmap(tmp_path: Path) -> None:
     assert told == ["nav2.yaml: local_costmap/local_costmap does not have layer.cloud.topic"]
 
 
+@pytest.mark.parametrize("tolerance", [-1.0, -0.1, 0.0])
+def test_any_failure_tolerance_is_one(tmp_path: Path, tolerance: float) -> None:
+    got, _ = applied(tmp_path, f"controller_server: {{ros__parameters: {{failure_tolerance: {tolerance}}}}}")
+    assert got.controller_server.failure_tolerance_ns == round(tolerance * 1e9)
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [
+        ("differential", "nav2_amcl::DifferentialMotionModel"),
+        ("omnidirectional", "nav2_amcl::OmniMotionModel"),
+    ],
+)
+def test_motion_models_of_amcl_as_they_were_called_first(tmp_path: Path, name: str, model: str) -> None:
+    file = _file(tmp_path, f"amcl: {{ros__parameters: {{robot_model_type: {name}}}}}")
+    got, told = amcl_with_file(AmclConfig(), frozenset(), file, "")
+    assert (got.filter.robot_model_type, told) == (model, [])
+
+
 def test_values_that_cannot_be(tmp_path: Path) -> None:
     text = """\
 controller_server:

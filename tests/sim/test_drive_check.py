@@ -10,10 +10,12 @@ import pytest
 
 from twin.controllers.drive_config import analytic_track_ratio, drive_config
 from twin.convert import convert
+from twin.errors import SimulationError
 from twin.geometry import Pose2
 from twin.models import load
 from twin.models.description import RobotDescription
 from twin.models.loader import parse_urdf
+from twin.models.specs import CommandSpec
 from twin.sim.drive_check import DriveReport, calibrated_track_ratio, check_drive, drive_self_check
 from twin.sim.driving import ProvingGround
 from twin.sim.physics import Physics
@@ -193,7 +195,7 @@ def test_a_wrong_radius_is_the_error_it_makes() -> None:
 @pytest.mark.skipif(not SEED.exists(), reason="the tutorials' models are not here")
 def test_the_tutorials_tumbling_wheels() -> None:
     report = check_drive(load(SEED))
-    assert report.guessed
+    assert report.drive.guessed
     assert (report.drive.left_joints, report.drive.wheel_radius) == (("wheel_left_joint",), 0.05)
     assert {"straight 5 m", "spin 360 degrees left"} <= set(missed(report))
 
@@ -205,6 +207,38 @@ def test_motors_too_weak_for_the_slope_are_no_brake() -> None:
     assert up.error is not None
     assert up.error > 0.1
     assert "its motors give 0.5 of 1.28 Nm a wheel" in up.words
+
+
+@pytest.mark.parametrize("limit", ["joint", "command"])
+def test_a_robot_is_driven_no_faster_than_its_wheels_may_turn(limit: str) -> None:
+    slow = cart(20.0, 0.1, 0.4)
+    if limit == "joint":
+        joints = {
+            name: replace(joint, limit=replace(joint.limit, velocity=2.0))
+            for name, joint in slow.joints.items()
+        }
+        slow = replace(slow, joints=joints)
+    else:
+        wheels = [*slow.drive.left_joints, *slow.drive.right_joints] if slow.drive else []
+        commands = {n: CommandSpec(joint=n, interface="velocity", lower=-2.0, upper=3.0) for n in wheels}
+        slow = replace(slow, commands=commands)
+    assert slow.drive is not None
+    ground = ProvingGround(convert(slow), drive_config(slow.drive, slow))
+    assert ground.straight(1.0).true.x == pytest.approx(1.0, abs=0.005)
+    turn = ground.circle(0.5)
+    assert math.degrees(turn.true_angle) == pytest.approx(360.0, abs=1.0)
+    crawling = replace(drive_config(slow.drive, slow), max_wheel_velocity=1e-3)
+    with pytest.raises(SimulationError, match="too slow: it would take"):
+        ProvingGround(convert(slow), crawling).straight(1.0)
+
+
+def test_a_robot_that_hardly_turns_has_no_radius() -> None:
+    heavy = cart(20.0, 0.1, 0.4, effort=1e-3)
+    report = check_drive(heavy)
+    circles = [item for item in report.manoeuvres if item.name.startswith("circle")]
+    assert all(item.error is not None and item.error <= 101.0 for item in circles)
+    assert "of 360 degrees" in circles[0].words
+    assert "radius" not in circles[0].words
 
 
 def test_the_hill_is_where_the_heading_says() -> None:

@@ -48,7 +48,7 @@ def drive_json(report: DriveReport) -> dict[str, Any]:
     return {
         "passed": report.passed,
         "kind": drive.kind,
-        "guessed": report.guessed,
+        "guessed": drive.guessed,
         "left_joints": list(drive.left_joints),
         "right_joints": list(drive.right_joints),
         "wheel_radius": drive.wheel_radius,
@@ -74,7 +74,7 @@ def _title(report: DriveReport) -> str:
     drive = report.drive
     wheels = f"{len(drive.left_joints)} + {len(drive.right_joints)} wheels of {1e3 * drive.wheel_radius:g} mm"
     kind = drive.kind.replace("_", " ")
-    guessed = "; no drive plugin, guessed by the wheels" if report.guessed else ""
+    guessed = "; no drive plugin, guessed by the wheels" if drive.guessed else ""
     return f"{kind}, {wheels}, {1e3 * drive.wheel_separation:g} mm apart{guessed}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -32,7 +33,7 @@ def drive_config(
         calibrated_ratio: Effective over geometric track, where it was measured; else the analytic one.
     """
     linear, angular = drive.max_linear_velocity or 1.0, drive.max_angular_velocity or 2.0
-    joints = (description.joints[name] for name in (*drive.left_joints, *drive.right_joints))
+    wheels = (*drive.left_joints, *drive.right_joints)
     return DiffDriveConfig(
         wheel_separation=drive.wheel_separation,
         wheel_radius=drive.wheel_radius,
@@ -43,7 +44,17 @@ def drive_config(
         angular=AxisLimits(
             max_velocity=angular, max_acceleration=drive.max_angular_acceleration or 3.0 * angular
         ),
-        max_wheel_velocity=min(joint.limit.velocity or float("inf") for joint in joints),
+        max_wheel_velocity=min(_fastest(description, joint) for joint in wheels),
+    )
+
+
+def _fastest(description: RobotDescription, wheel: str) -> float:
+    """Return how fast a wheel may turn either way, by its joint's limit and its command's [rad/s]."""
+    command, limit = description.commands.get(wheel), description.joints[wheel].limit.velocity
+    if command is None or command.interface != "velocity":
+        return limit or math.inf
+    return min(
+        speed for speed in (limit, command.upper, -(command.lower or 0.0), math.inf) if speed and speed > 0
     )
 
 

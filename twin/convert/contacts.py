@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Iterator
+from itertools import combinations, product
 
 import mujoco
 import numpy as np
 
+from twin.convert.conversion import Guess
 from twin.convert.geoms import GROUP_COLLISION
 from twin.errors import ConversionError, Problem
 from twin.models.description import RobotDescription
 from twin.models.kinematics import rigid_groups
 
-MOST_PAIRS = 250_000
+LEAST_DEPTH = 1e-4
+"""Shapes that just touch are meant to [m]."""
+MOST_PAIRS = 50_000
 """Of links that do not touch each other; MuJoCo keeps each of them."""
 _TYPE = mujoco.mjtGeom
 
 
 def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
-    """Exclude contacts between rigid groups that a joint connects, and of links that shall not touch others.
+    """Exclude contacts between rigid groups that a joint connects, and of links that do not touch each other.
 
     MuJoCo has the first filter itself, but not towards a group that is welded to the world.
     """
@@ -34,12 +38,9 @@ def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
                 pairs.setdefault(frozenset(pair), pair)
     every = [name for group in solid.values() for name in group]
     loners = [name for name in every if not may_touch(description, name, name)]
-    if len(loners) * len(every) > MOST_PAIRS:
-        message = f"{len(loners)} links that touch no other of {len(every)} need too many pairs"
-        fault = f"{message}; leave out <self_collide> or collision shapes"
-        raise ConversionError(Problem(fault, description.source, code="too-large", element="robot"))
-    for pair in product(loners, every):
-        if heads[pair[0]] != heads[pair[1]] and not may_touch(description, *pair):
+    _refuse_many(len(loners) ** 2 / 2, description)
+    for pair in combinations(loners, 2):
+        if heads[pair[0]] != heads[pair[1]]:
             pairs.setdefault(frozenset(pair), pair)
     for one, other in pairs.values():
         spec.add_exclude(bodyname1=one, bodyname2=other)
@@ -48,12 +49,38 @@ def add_excludes(spec: mujoco.MjSpec, description: RobotDescription) -> None:
 def may_touch(description: RobotDescription, link: str, other: str) -> bool:
     """Tell whether two links touch each other, as SDFormat's self_collide says: if one of them wants to.
 
-    In Gazebo links that say nothing do not; here they do, as nobody builds a robot whose parts pass through
-    each other.
+    As in Gazebo, links that say nothing do not: shapes of real robots reach into each other's places.
     """
     said = [description.links[name].surface.self_collide for name in (link, other)]
-    wishes = [description.self_collide if wish is None else wish for wish in said]
-    return True in wishes or False not in wishes
+    return any(description.self_collide if wish is None else wish for wish in said)
+
+
+def exclude_overlaps(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, description: RobotDescription
+) -> Iterator[Guess]:
+    """Exclude, and yield, pairs of links inside of each other at joint position zero, with `model` of `spec`.
+
+    They would push each other apart from the first step on.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    deep = data.contact.geom[data.contact.dist < -LEAST_DEPTH]
+    pairs = dict.fromkeys(map(tuple, model.geom_bodyid[deep].tolist()))
+    _refuse_many(len(pairs), description)
+    for one, other in pairs:
+        names = [model.body(body).name for body in (one, other)]
+        spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
+        note = "none: their shapes are inside of each other at joint position zero"
+        yield Guess(element=f"contact of links '{names[0]}' and '{names[1]}'", note=note)
+
+
+def _refuse_many(pairs: float, description: RobotDescription) -> None:
+    if pairs > MOST_PAIRS:
+        fault = f"more than {MOST_PAIRS} pairs of links do not touch each other"
+        message = f"{fault}; leave out collision shapes, or say <self_collide>true where they are apart"
+        raise ConversionError(Problem(message, description.source, code="too-large", element="robot"))
 
 
 def spawn_height(model: mujoco.MjModel) -> float:

@@ -8,7 +8,7 @@ import mujoco
 
 from twin.convert.actuators import add_actuators, moved_inertia
 from twin.convert.bodies import Base, add_bodies, free_name
-from twin.convert.contacts import add_excludes, spawn_height
+from twin.convert.contacts import add_excludes, exclude_overlaps, spawn_height
 from twin.convert.conversion import Conversion
 from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
@@ -65,12 +65,13 @@ def convert(
     carry_load(spec, moving, roles)
     moved = moved_inertia(description, moving)
     servos = add_actuators(spec, description, moved, timestep=timestep)
+    model = _compile(spec, description)
     return Conversion(
         description=description,
         spec=spec,
-        spawn_height=spawn_height(_compile(spec, description)),
+        spawn_height=spawn_height(model),
         root_joint=root_joint,
-        guesses=(*contact_guesses(description, roles), *servos),
+        guesses=(*contact_guesses(description, roles), *exclude_overlaps(spec, model, description), *servos),
         moved_inertia=moved,
     )
 

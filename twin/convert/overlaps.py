@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.convert.contacts import LEAST_DEPTH
 from twin.convert.geoms import primitive
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.wheels import wheels_of
@@ -20,8 +21,6 @@ from twin.models.mesh.hulls import hull_of
 from twin.models.shapes import Geometry, Mesh
 from twin.models.solids import is_solid
 
-LEAST_DEPTH = 1e-4
-"""Shapes that just touch are meant to [m]."""
 MOST_PAIRS = 50_000
 """Pairs of shapes that are looked at; robots have some hundreds near each other."""
 LEAST_VOLUME = 1e-15
@@ -60,7 +59,7 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
                 line,
                 message=f"the collision shapes of '{a}' and '{b}' are {-distance:.3g} m inside of each other "
                 "at joint position zero",
-                fix="move or shrink one of them: they push each other apart from the first step on",
+                fix="move or shrink one of them: they pass through each other, whatever <self_collide> says",
             )
         elif neighbours and distance < WHEEL_GAP and (a in wheels or b in wheels):
             wheel, other = (a, b) if a in wheels else (b, a)

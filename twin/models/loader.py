@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -28,7 +29,8 @@ from twin.models.urdf.xml_text import as_utf8, read_utf8
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 """1.1 adds the capsule, 1.2 quaternions (urdfdom 5); most files say nothing."""
-XACRO = "http://www.ros.org/wiki/xacro"
+XACRO_PREFIX = re.compile(rb"xmlns:xacro\s*=")
+XACRO_MARKS = (b"$", b"<xacro:")
 MOST = {
     "link": 2000,
     "joint": 2000,
@@ -135,11 +137,12 @@ def _check_version(root: Element, report: Report) -> None:
 
 
 def _has_xacro(source: Path, raw: bytes) -> bool:
-    """Tell whether there is anything to expand: a file without it keeps its line numbers."""
-    if source.suffix != ".xacro" and XACRO.encode() not in raw:
-        return False
-    root = parse(raw, Report(source))
-    return b"$" in raw or any(element.tag.startswith(f"{{{XACRO}}}") for element in root.iter())
+    """Tell whether there is anything to expand: a file without it keeps its line numbers.
+
+    As xacro itself, this goes by the prefix; files of real robots give it several addresses.
+    """
+    is_xacro = source.suffix == ".xacro" or XACRO_PREFIX.search(raw) is not None
+    return is_xacro and any(mark in raw for mark in XACRO_MARKS)
 
 
 def _read_links(

@@ -35,7 +35,16 @@ class DriveSpec:
     """[rad/s²]"""
     odometry_frame: str = "odom"
     base_frame: str = "base_footprint"
+    guessed: bool = False
+    """The file has no drive plugin; its wheels suggest this drive."""
     line: int = 0
+
+    @property
+    def words(self) -> str:
+        """What it is, for people."""
+        joints = [", ".join(f"'{name}'" for name in side) for side in (self.left_joints, self.right_joints)]
+        size = f"wheel_radius {self.wheel_radius:g} m, wheel_separation {self.wheel_separation:g} m"
+        return f"{self.kind} with {joints[0]} left, {joints[1]} right, {size}"
 
 
 @dataclass(frozen=True, kw_only=True)

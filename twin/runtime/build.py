@@ -22,11 +22,13 @@ from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.runtime.drives import with_drive
 from twin.runtime.missions import MissionHandle, build_mission
 from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.robot_stack import RobotStack
 from twin.runtime.stack_context import StackContext
 from twin.runtime.surroundings import surroundings
+from twin.runtime.unheard import tell_unheard_scans
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone
@@ -91,7 +93,8 @@ def build(
     timestep = scenario.physics.timestep
     placements, heights, ratios = [], {}, {}
     for robot in scenario.robots:
-        description = load(robot.model, ReadOptions(args=robot.args))
+        described = load(robot.model, ReadOptions(args=robot.args))
+        description = with_drive(described, robot, scenario.mission)
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
         ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)
@@ -141,6 +144,7 @@ def build(
         bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)
+        tell_unheard_scans(bus)
     except BaseException:
         bus.close()
         raise

@@ -6,9 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from twin.bridge.msgs import LaserScan
 from twin.geometry import Pose2
-from twin.models.specs import LidarSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
@@ -21,7 +19,6 @@ from twin.runtime.nav2_parameters import amcl_with_file
 from twin.runtime.overrides import overridden
 from twin.runtime.slam_file import slam_with_file
 from twin.runtime.stack_context import StackContext
-from twin.runtime.unheard import tell_unheard
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.sim.noise import NoiseStream
 
@@ -85,9 +82,6 @@ def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> S
     node = SlamToolboxNode(context.bus, pose, node_config, namespace=context.namespace)
     for sentence in told:
         node.node.get_logger().warn(sentence)
-    lidars = {spec.topic for spec in context.handle.description.sensors if isinstance(spec, LidarSpec)}
-    if node_config.scan_topic not in lidars:
-        tell_unheard(node.node, {"scan_topic": (node_config.scan_topic, LaserScan)})
     return node
 
 

@@ -38,7 +38,7 @@ class WaypointFollowerParameters(BaseModel):
 
 
 _SENTINELS = ("failure_tolerance",)
-"""A negative value of these means that there is no limit."""
+"""Negative values of these have a meaning of their own."""
 
 
 def why_not(model: type[BaseModel], name: str, value: Any) -> str:
@@ -62,7 +62,7 @@ def why_not(model: type[BaseModel], name: str, value: Any) -> str:
             return ""
         model = inner
     field = model.model_fields.get(last)
-    if field is None or (last in _SENTINELS and value == -1.0):
+    if field is None or (last in _SENTINELS and isinstance(value, int | float) and value < 0.0):
         return ""
     try:
         adapter: TypeAdapter[Any] = TypeAdapter(field.rebuild_annotation())

@@ -35,6 +35,11 @@ _SECTIONS = {
 
 _MOTION_MODELS = {"diff_drive": "DiffDrive", "ackermann": "Ackermann"}
 """Names of MPPI's motion models since Lyrical."""
+_ROBOT_MODELS = {
+    "differential": "nav2_amcl::DifferentialMotionModel",
+    "omnidirectional": "nav2_amcl::OmniMotionModel",
+}
+"""amcl's motion models until Galactic."""
 _ENDLESS = 1_000_000_000
 """Poses of a search that Nav2 does not limit."""
 
@@ -104,6 +109,8 @@ def converted(values: dict[str, Value]) -> dict[str, Value]:
         section, _, last = name.rpartition(".")
         if last == "motion_model" and entry.value in _MOTION_MODELS:
             out[name] = entry._replace(value=_MOTION_MODELS[entry.value])
+        elif last == "robot_model_type" and entry.value in _ROBOT_MODELS:
+            out[name] = entry._replace(value=_ROBOT_MODELS[entry.value])
         elif name == "GridBased.max_iterations" and type(entry.value) is int and entry.value <= 0:
             out[name] = entry._replace(value=_ENDLESS)
         elif last == "min_turning_r" and section.endswith(".AckermannConstraints"):

@@ -20,6 +20,7 @@ from twin.runtime.nav2_file import Nav2Parameters
 from twin.runtime.nav2_lists import database_of, sources_of
 from twin.runtime.nav2_monitor import monitor_of
 from twin.runtime.nav2_names import PLANNERS
+from twin.runtime.nav2_trees import with_trees
 from twin.runtime.navigation_config import NavigationParameters
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerParameters
@@ -180,9 +181,11 @@ def with_file(
         ),
         waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
     )
+    navigator, told = with_trees(file, changed.navigator, nav2_given.for_navigator(config.navigator))
+    changed = replace(changed, navigator=navigator)
     if config.collision_monitor is None:
         monitor_of(file)
-    return changed, file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))
+    return changed, [*told, *file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))]
 
 
 def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:

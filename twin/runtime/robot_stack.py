@@ -78,7 +78,7 @@ class RobotStack:
         drive, context = description.drive, self._context
         if drive is None:
             return None
-        return DiffDriveControllerNode(
+        node = DiffDriveControllerNode(
             context.bus,
             self.handle.hardware,
             DiffDriveNodeConfig(
@@ -94,6 +94,11 @@ class RobotStack:
             ),
             namespace=context.namespace,
         )
+        if drive.guessed:
+            node.node.get_logger().warn(
+                f"'{self.name}' has no drive plugin; by its wheels it is {drive.words}"
+            )
+        return node
 
     def _build_arm(self, description: RobotDescription) -> None:
         bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware

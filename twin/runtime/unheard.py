@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import LaserScan
 from twin.bridge.node import Node
+from twin.bridge.topics import Publisher, Subscription
 
 
 def tell_unheard(node: Node, topics: Mapping[str, tuple[str, type[Any]]]) -> None:
@@ -28,3 +31,23 @@ def tell_unheard(node: Node, topics: Mapping[str, tuple[str, type[Any]]]) -> Non
         ]
         there = f"; of {name} there is {', '.join(others)}" if others else f"; there is no {name}"
         node.get_logger().warn(f"{parameter}: nobody publishes {node.resolve_name(topic)}{there}")
+
+
+def tell_unheard_scans(bus: Bus) -> None:
+    """Warn of scans that nodes of the bus wait for and nobody publishes, here or on the network."""
+    kind = LaserScan.__msgtype__
+    both = [e for node in bus.nodes for e in node.endpoints if isinstance(e, Publisher | Subscription)]
+    scans = [endpoint for endpoint in both if endpoint.codec.msgtype == kind]
+    there = {endpoint.name for endpoint in scans if isinstance(endpoint, Publisher)}
+    waiting: dict[str, list[Node]] = {}
+    for endpoint in scans:
+        if endpoint.name not in there:
+            waiting.setdefault(endpoint.name, []).append(endpoint.node)
+    for topic, nodes in waiting.items():
+        if nodes[0].count_publishers(topic):
+            continue
+        names = " and ".join(dict.fromkeys(node.fully_qualified_name for node in nodes))
+        others = f"there is {', '.join(sorted(there))}; name one of these, or" if there else "there is none;"
+        nodes[0].get_logger().warn(
+            f"nobody publishes {topic}, awaited by {names}; of {kind} {others} give a lidar this topic"
+        )

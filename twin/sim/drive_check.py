@@ -12,10 +12,10 @@ import numpy as np
 from twin.controllers.drive_config import analytic_track_ratio, drive_config
 from twin.convert import convert
 from twin.convert.conversion import Conversion
-from twin.errors import ModelError, SimulationError
+from twin.errors import ModelError, Problem, SimulationError
 from twin.geometry import Array
+from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.description import RobotDescription
-from twin.models.drive_guess import guess_drive
 from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.specs import DriveSpec
 from twin.sim.driving import Driven, ProvingGround
@@ -37,6 +37,8 @@ SLOPE_DEG = 5.0
 HEADINGS = (("uphill", 0.0), ("across", math.pi / 2.0), ("downhill", math.pi))
 RADII = (0.5, 2.0)
 """Of circles, each driven to the left and to the right; at least the effective track [m]."""
+LEAST_ARC = math.radians(30.0)
+"""Turned by, from which on a circle has a radius."""
 CALIBRATIONS, CALIBRATED_DEG = 4, 5.0
 """A skid steer is calibrated by one spin, and by more while one turned by so much too far or too little."""
 PLAUSIBLE_CALIBRATION = (0.5, 2.0)
@@ -69,8 +71,6 @@ class DriveReport:
     """How truly a robot drives."""
 
     drive: DriveSpec
-    guessed: bool
-    """The file has no drive plugin; the drive was guessed by the wheels."""
     track_ratio: float
     """Effective over geometric track, measured by one spin if it is a skid steer; else 1."""
     analytic_track_ratio: float
@@ -152,11 +152,9 @@ def _check(
 ) -> DriveReport:
     drive = description.drive or guess_drive(description)
     if drive is None:
-        raise ModelError(
-            f"{description.source}: robot '{description.name}' has no drive to check; it needs a diff-drive "
-            "plugin, or wheels that turn freely on both sides"
-        )
-    guessed = description.drive is None
+        why, line = lack_of_drive(description)
+        message = f"robot '{description.name}' has no drive to check: {why}; {VALID_DRIVES}"
+        raise ModelError(Problem(message, description.source, line or None))
     description = replace(description, drive=drive)
     conversion = convert(description, timestep=timestep)
     measured = calibrated_track_ratio(conversion, timestep=timestep)
@@ -169,7 +167,6 @@ def _check(
         lines = (Manoeuvre(name="stand still", error=None, bar=HOLD_BAR_M, unit="m", words=words),)
     return DriveReport(
         drive=drive,
-        guessed=guessed,
         track_ratio=config.wheel_separation_multiplier,
         analytic_track_ratio=analytic_track_ratio(drive, description),
         equal_load_track_ratio=analytic_track_ratio(drive, description, equal_loads=True),
@@ -233,10 +230,13 @@ def _circle_bar(drive: DriveSpec, description: RobotDescription) -> float:
 
 def _circle(ground: ProvingGround, radius: float, lateral: float, bar: float) -> Manoeuvre:
     def judge(driven: Driven) -> tuple[float, str]:
-        found, turned = fitted_radius(driven.path), math.copysign(1.0, radius) * driven.true_angle
-        share = max(abs(found / abs(radius) - 1.0), abs(driven.angle_error) / (2.0 * math.pi))
+        turned = math.copysign(1.0, radius) * driven.true_angle
+        share = abs(driven.angle_error) / (2.0 * math.pi)
+        if abs(turned) < LEAST_ARC:  # nearly straight, of no certain radius
+            return 100.0 * share, f"turns by {math.degrees(turned):.4g} of 360 degrees"
+        found = fitted_radius(driven.path)
         words = f"drives a radius of {found:.4g} m, turning by {math.degrees(turned):.4g} of 360 degrees"
-        return 100.0 * share, words
+        return 100.0 * max(share, abs(found / abs(radius) - 1.0)), words
 
     name = f"circle of {abs(radius):g} m {'left' if radius > 0 else 'right'}"
     return _judged(name, lambda: ground.circle(radius, lateral=lateral), judge, bar, "%")

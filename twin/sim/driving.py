@@ -10,12 +10,15 @@ import numpy as np
 
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.convert.conversion import Conversion
+from twin.errors import SimulationError
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Scene
 from twin.sim.world import World
 
+LONGEST_S = 300.0
+"""Of a manoeuvre; a robot that takes longer is not driven."""
 _STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_ACT
 _ROBOT = "robot"
 
@@ -30,6 +33,8 @@ class ProvingGroundConfig:
     """Turning speed, if the drive allows as much [rad/s]."""
     control_period: float = 0.02
     """[s]"""
+    wheel_share: float = 0.9
+    """Of the wheels' own speed limit, at most; a motor at its limit has nothing left to correct with."""
     settle: float = 1.0
     """Time to come to rest before and after each manoeuvre [s]."""
 
@@ -154,7 +159,17 @@ class ProvingGround:
             option.gravity = [0.0, 0.0, -gravity]
 
     def _drive(self, v: float, w: float, seconds: float) -> Driven:
-        """Command a velocity for some time, then a stop, through the drive's limits."""
+        """Command a velocity for some time, then a stop, through the drive's limits.
+
+        Where the wheels cannot turn so fast, the same way is driven more slowly.
+        """
+        fastest = (abs(v) + abs(w) * self.track / 2.0) / self.drive.wheel_radius
+        share = min(1.0, self.config.wheel_share * self.drive.max_wheel_velocity / fastest)
+        v, w, seconds = v * share, w * share, seconds / share
+        if seconds > LONGEST_S:
+            raise SimulationError(
+                f"it is too slow: it would take {seconds:.0f} s, at {v:.3g} m/s, {w:.3g} rad/s"
+            )
         self._restore()
         controller = DiffDriveController(self.drive)
         period = self.config.control_period

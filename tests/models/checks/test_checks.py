@@ -51,7 +51,7 @@ def cart(**changes: str) -> str:
         "caster": f"<link name='caster'><visual>{BALL}</visual><collision>{BALL}</collision></link>",
         "caster_joint": "<joint name='caster_joint' type='fixed'><origin xyz='0.12 0 -0.03'/>"
         "<parent link='base'/><child link='caster'/></joint>",
-        "extra": "",
+        "extra": PLUGIN.format(0.3, 0.05),
         "end": "</robot>",
     }
     return "\n".join((lines | changes).values())
@@ -91,11 +91,20 @@ TRINKET = (
 
 FOUND = {
     "wheel-axis": (cart(left=TUMBLING), 3, "90.0 degrees off the axis of joint 'left_joint'"),
-    "wheel-fixed": (cart(left_joint=FIXED_WHEEL).replace("'left'", "'wheel'"), 4, "to 'base' at 0 0.15 0 m"),
+    "wheel-fixed": (
+        cart(extra="", left_joint=FIXED_WHEEL).replace("'left'", "'wheel'"),
+        4,
+        "to 'base' at 0 0.15 0 m",
+    ),
     "drive-mismatch": (
         cart(extra=PLUGIN.format(0.3, 0.06)),
         9,
         "says wheel_radius 0.06 m, the collision shape of 'left' has 0.05 m",
+    ),
+    "missing-drive": (
+        cart(extra=""),
+        4,
+        "takes it for diff_drive with 'left_joint' left, 'right_joint' right",
     ),
     "base-on-ground": (cart().replace("0.3 0.2 0.06", "0.3 0.2 0.1"), 2, "it ends at z = -0.05 m"),
     "wheels-off-ground": (cart().replace("0 -0.03", "0 -0.04"), 7, "10 mm lower"),
@@ -180,6 +189,13 @@ def test_fault_is_found_with_line_and_number(code: str) -> None:
 def test_sound_robots_are_left_in_peace() -> None:
     assert diagnose(cart()) == ()
     assert diagnose(arm(AXIS + LIMIT)) == ()
+
+
+def test_a_robot_that_another_plugin_moves_is_taken_for_nothing() -> None:
+    text = cart(extra="<gazebo><plugin name='p' filename='libgazebo_ros_planar_move.so'/></gazebo>")
+    (found,) = (diagnostic for diagnostic in diagnose(text) if diagnostic.code == "missing-drive")
+    assert found.line == 9
+    assert found.message == "the plugin 'gazebo_ros_planar_move', which moves it, is not simulated"
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ DEFECTS = {
     "simple_robot.urdf.xacro": {
         "wheel-axis": ("link 'wheel_left'", "link 'wheel_right'"),
         "wheel-rubs": ("link 'wheel_left'", "link 'wheel_right'"),
+        "missing-drive": ("robot",),
         "base-on-ground": ("link 'base_link'",),
         "few-supports": ("robot",),
         "inertia-placeholder": ("link 'base_link'", "link 'wheel_left'", "link 'wheel_right'"),

@@ -94,6 +94,18 @@ def test_it_stops_before_what_blocks_its_path(bench: Bench, stack: Stack) -> Non
     assert stack.robot.commands[-1] == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(("tolerance_s", "ends"), [(-0.1, True), (-1.0, False)])
+def test_only_a_tolerance_of_minus_one_is_endless(bench: Bench, tolerance_s: float, ends: bool) -> None:
+    stack = Stack(bench, failure_tolerance_ns=round(tolerance_s * 1e9), maneuver=ManeuverConfig(reach=0.0))
+    stack.room.add_box(0.18, -0.6, 0.8, 0.6)
+    bench.run(0.5)
+    goal = stack.drive(np.array([[0, 0, 0], [2, 0, 0]], dtype=float))
+    bench.run(3.0)
+    assert goal.done is ends
+    if ends:
+        assert goal.result.error_code == 106
+
+
 def beside_a_box(bench: Bench, reach: float, **config: Any) -> tuple[Stack, Any]:
     """Follow a path around a box that stands before the robot's nose, too near to turn."""
     stack = Stack(bench, failure_tolerance_ns=4_000_000_000, maneuver=ManeuverConfig(reach=reach), **config)

@@ -82,7 +82,7 @@ NAMES = {
             joint("2", child="a~b"),
             joint("3", parent="a~b", child="c"),
         ),
-        lambda m: m.nexclude == 3,
+        lambda m: m.nexclude == 6,
     ),
 }
 """What is odd about the names, and the outcome."""

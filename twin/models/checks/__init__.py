@@ -8,7 +8,7 @@ from twin.models.checks.angles import rounded_angle
 from twin.models.checks.axes import axis_length
 from twin.models.checks.codes import ERRORS, WARNINGS
 from twin.models.checks.diagnostic import Diagnostic, from_problems, in_file_order
-from twin.models.checks.drive import drive_mismatch
+from twin.models.checks.drive import drive_mismatch, missing_drive
 from twin.models.checks.gazebo import gazebo
 from twin.models.checks.ground import ground
 from twin.models.checks.ignored import ignored
@@ -32,6 +32,7 @@ CHECKS: tuple[Check, ...] = (
     wheel_axis,
     wheel_fixed,
     drive_mismatch,
+    missing_drive,
     ground,
     impossible_inertia,
     inertia,

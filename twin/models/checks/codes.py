@@ -58,6 +58,7 @@ WARNINGS: Mapping[str, str] = MappingProxyType(
         "wheel-fixed": "a wheel that cannot turn",
         "wheel-rubs": "the wheel's collision shape touches its neighbour's",
         "drive-mismatch": "the drive plugin's numbers are not those of the wheels it names",
+        "missing-drive": "the robot has wheels and no drive plugin; if they allow it, twin guesses a drive",
         "base-on-ground": "a part that is no wheel and no caster rests on the ground beside the wheels",
         "wheels-off-ground": "something reaches lower than a wheel does",
         "few-supports": "the robot stands on fewer than three points",

@@ -8,6 +8,8 @@ import numpy as np
 
 from twin.geometry import Array, rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
+from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
+from twin.models.checks.wheels import wheels_of
 from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import link_poses
 from twin.models.shapes import Capsule, Cylinder, Sphere
@@ -15,6 +17,20 @@ from twin.models.specs import DriveSpec
 
 TOLERANCE = 0.005
 """Relative; 25 mm on 5 m."""
+
+
+def missing_drive(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield that a robot with wheels has no drive plugin, and what drives it then."""
+    wheels = wheels_of(description)
+    if description.drive is not None or description.static or not wheels:
+        return
+    drive = guess_drive(description)
+    why, line = lack_of_drive(description)
+    if drive is not None:
+        why = f"the file has no drive plugin; by its wheels twin takes it for {drive.words}"
+    yield finding(
+        description, "missing-drive", "robot", line or wheels[0].joint.line, message=why, fix=VALID_DRIVES
+    )
 
 
 def drive_mismatch(description: RobotDescription) -> Iterator[Diagnostic]:

@@ -178,6 +178,7 @@ def parse(text: bytes, report: Report) -> Element:
     _drop_default_namespace(root)
     report.locate(root, lines)
     _check_names(root, report)
+    _refuse_unexpanded(root, report)
     if root.tag != "robot":
         report.add(
             root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>", code="not-urdf"
@@ -252,6 +253,21 @@ def _check_names(root: Element, report: Report) -> None:
                     f"{describe(element)}: {attribute}= has spaces at its ends or line breaks; remove them",
                     code="bad-name",
                 )
+
+
+def _refuse_unexpanded(root: Element, report: Report) -> None:
+    """Note names and elements that xacro would have replaced, had the file declared its prefix."""
+    declare = "declare xmlns:xacro='http://www.ros.org/wiki/xacro' in <robot> and use that prefix"
+    found = [
+        element
+        for element in root.iter()
+        if any(mark in element.get(name, "") for name in NAMES for mark in ("${", "$("))
+        or (etree.QName(element).namespace or "").endswith("/xacro")
+    ]
+    if found:
+        first, more = found[0], f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        what = f"<{first.prefix}:{etree.QName(first).localname}>" if first.prefix else describe(first)
+        report.add(first, f"{what}{more} is left as xacro found it; {declare}", code="xacro")
 
 
 def _count(count: int) -> str:

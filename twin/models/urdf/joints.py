@@ -152,11 +152,7 @@ def check_tree(
     if not links:
         report.add(None, "the robot has no links", code="no-links")
     elif not roots:
-        report.add(
-            None,
-            f"the joints form a cycle through all links: {_cycle(next(iter(links)), parent_joint)}",
-            code="cycle",
-        )
+        _add_cycle(next(iter(links)), parent_joint, elements, report)
     elif len(roots) > 1:
         report.add(
             None,
@@ -164,7 +160,7 @@ def check_tree(
             code="several-roots",
         )
     else:
-        _check_reachable(links, parent_joint, report)
+        _check_reachable(links, parent_joint, elements, report)
     return roots[0] if roots else ""
 
 
@@ -191,7 +187,12 @@ def _parent_joints(
     return parent_joint
 
 
-def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint], report: Report) -> None:
+def _check_reachable(
+    links: Mapping[str, Link],
+    parent_joint: Mapping[str, Joint],
+    elements: Mapping[str, Element],
+    report: Report,
+) -> None:
     safe: set[str] = set()
     for name in links:
         path: dict[str, None] = {}
@@ -200,19 +201,26 @@ def _check_reachable(links: Mapping[str, Link], parent_joint: Mapping[str, Joint
             path[link] = None
             link = parent_joint[link].parent
         if link in path:
-            report.add(None, f"the joints form a cycle: {_cycle(link, parent_joint)}", code="cycle")
+            _add_cycle(link, parent_joint, elements, report)
             return
         safe.update(path)
 
 
-def _cycle(link: str, parent_joint: Mapping[str, Joint]) -> str:
-    seen = {link: None}
-    while (link := parent_joint[link].parent) not in seen and link in parent_joint:
+def _add_cycle(
+    link: str, parent_joint: Mapping[str, Joint], elements: Mapping[str, Element], report: Report
+) -> None:
+    """Note the cycle that the way up from a link ends in: its links, and its joints with their lines."""
+    seen: dict[str, None] = {}
+    while link not in seen and link in parent_joint:
         seen[link] = None
+        link = parent_joint[link].parent
     path = [*seen]
-    path = [*path[path.index(link) if link in seen else 0 :], link]
-    middle = ["..."] if len(path) > SHOWN else []
-    return " -> ".join([*path[::-1][:SHOWN], *middle, *([path[0]] if middle else [])])
+    joints = [parent_joint[child] for child in reversed(path[path.index(link) if link in seen else 0 :])]
+    more = ["..."] if len(joints) > SHOWN else []
+    links = " -> ".join([link, *(joint.child for joint in joints[:SHOWN]), *more, *(more and [link])])
+    names = [f"'{joint.name}'" + (f" (line {joint.line})" if joint.line else "") for joint in joints]
+    told = ", ".join([*names[:SHOWN], *more])
+    report.add(elements[joints[0].name], f"the joints form a cycle: {links}, by {told}", code="cycle")
 
 
 def without_idle_mimics(

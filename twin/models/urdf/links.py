@@ -111,16 +111,14 @@ def _read_inertial(element: Element, link: str, report: Report) -> Inertial | No
         )
         return None
     mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
+    inertia, centre = _read_inertia(inertia_element, report), read_origin(element, report)
     if mass < 0.0 or 0.0 < mass <= LEAST:
         valid = f"a mass is more than {LEAST:g} kg, or zero for a mere frame"
         report.add(mass_element, f"link '{link}' has mass {mass:g} kg; {valid}", code="bad-mass")
         return None
-    inertia = _read_inertia(inertia_element, report)
     if mass <= LEAST and np.max(np.abs(inertia)) <= LEAST:
         return None  # written for a mere frame
-    return Inertial(
-        T_link_com=read_origin(element, report), mass=mass, inertia=inertia, line=report.line(element)
-    )
+    return Inertial(T_link_com=centre, mass=mass, inertia=inertia, line=report.line(element))
 
 
 def _read_inertia(element: Element, report: Report) -> Array:

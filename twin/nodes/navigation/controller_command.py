@@ -13,6 +13,8 @@ from twin.nodes.navigation.controller_goal import CONTROLLER_TIMED_OUT, PATIENCE
 from twin.nodes.navigation.controller_server_config import ControllerServerConfig
 from twin.nodes.navigation.costmap import CostmapNode
 
+FOR_EVER_NS = -1_000_000_000
+"""`failure_tolerance` of Nav2's -1.0; it takes other negative values as 0."""
 _AGAIN_NS = 1_000_000_000
 """A robot that was blocked so short a time ago is blocked again and again."""
 
@@ -89,7 +91,7 @@ class Commander:
     def _be_patient(self, goal: FollowGoal, failure: NoValidControl) -> None:
         """Wait for a valid control for as long as the tolerance says; raises Abort."""
         tolerance = self._config.failure_tolerance_ns
-        if tolerance == 0:
+        if tolerance <= 0 and tolerance != FOR_EVER_NS:
             raise Abort(failure.error_code, str(failure))
         if 0 < tolerance < self._node.now_ns - goal.last_valid_ns:
             raise Abort(PATIENCE_EXCEEDED, f"no valid control for {tolerance * 1e-9:g} s: {failure}")

@@ -27,7 +27,7 @@ class ControllerServerConfig:
     )
     controller_period_ns: int = 60_000_000
     failure_tolerance_ns: int = 300_000_000
-    """How long no valid control is borne before an abort; 0: not at all, negative: for ever [ns]."""
+    """How long no valid control is borne before an abort; -1 s: for ever, 0 and less: not at all [ns]."""
     costmap_update_timeout_ns: int = 5_000_000_000
     """How long the robot stands and waits for a local costmap that is not current [ns]; Nav2: 0.3 s."""
     maneuver: ManeuverConfig = field(default_factory=ManeuverConfig)
