@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from twin.errors import RecordingError
-from twin.files import check_file, replaced, write_whole, written_alone
+from twin.files import absence, check_file, replaced, write_whole, written_alone
 
 _HOLDER = """
 import pathlib, sys
@@ -53,6 +53,16 @@ def test_folders_are_made_links_are_followed_and_devices_stay(tmp_path: Path) ->
     write_whole(pipe, "3")  # and not a file in its place: /dev/null would be lost
     assert (pipe.is_fifo(), os.read(reader, 9)) == (True, b"3")
     os.close(reader)
+
+
+def test_a_file_that_is_not_there_suggests_the_one_that_is(tmp_path: Path) -> None:
+    file = tmp_path / "warehouse.yaml"
+    file.touch()
+    assert absence(file) == ""
+    assert absence(tmp_path) == "is a folder; name a file"
+    for name in ("warehous.yaml", "warehouse"):
+        assert absence(tmp_path / name) == f"no such file; did you mean {file}?"
+    assert absence(tmp_path / "other.yaml") == absence(tmp_path / "no" / "warehouse.yaml") == "no such file"
 
 
 def test_what_cannot_be_written_is_known_before_the_work(tmp_path: Path) -> None:

@@ -39,6 +39,22 @@ def _fault(path: Path) -> str:
     return "" if os.access(folder, os.W_OK | os.X_OK) else f"the folder {folder} is read-only; name another"
 
 
+def absence(path: Path) -> str:
+    """Return why there is no such file to read, and which may have been meant; empty if there is one."""
+    from difflib import get_close_matches
+
+    if path.is_dir():
+        return "is a folder; name a file"
+    if path.exists():
+        return ""
+    try:
+        names = sorted(each.name for each in path.parent.iterdir() if each.is_file())
+    except OSError:  # its folder is missing, too
+        names = []
+    like = get_close_matches(path.name, names, n=1, cutoff=0.7)
+    return f"no such file; did you mean {path.parent / like[0]}?" if like else "no such file"
+
+
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file so that no reader ever sees a part of it; its folder is made, links are followed.
 

@@ -11,6 +11,7 @@ import sys
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -151,6 +152,33 @@ def test_a_full_disk_under_the_output_is_told(arguments: list[str]) -> None:
         2,
         "error: No space left on device: what is printed is not whole; make room\n",
     )
+
+
+@pytest.mark.parametrize(
+    "surroundings",
+    [
+        {"PYTHONIOENCODING": "ascii"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""},
+    ],
+    ids=["ascii", "C"],
+)
+def test_a_terminal_of_few_characters_shows_what_it_can(tmp_path: Path, surroundings: dict[str, str]) -> None:
+    def run(*words: str) -> tuple[int, str, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "twin.cli", *words],
+            env={**os.environ, **surroundings, "COLUMNS": "200"},
+            capture_output=True, text=True, encoding="ascii", check=False, cwd=tmp_path,
+        )  # fmt: skip
+        return done.returncode, done.stdout, done.stderr
+
+    code, out, err = run("bench", "--help")
+    assert (code, err, "K?mmerle" in out) == (0, "", True)
+    code, _, err = run("run", "böse.yaml")
+    assert (code, re.sub(r"\?+", "?", err)) == (2, "error: b?se.yaml: no such file\n")
+
+
+def test_version_needs_nothing_heavy(invoke: Invoke) -> None:
+    assert invoke("--version") == (0, f"twin {version('twin')}\n", "")
 
 
 def test_a_closed_output_is_no_fault() -> None:
@@ -450,7 +478,7 @@ def test_test_runs_all_and_writes_one_junit(
 
 
 def test_test_names_a_wrong_path(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="no such file or folder"):
+    with pytest.raises(ScenarioError, match="no such file"):
         batch.scenario_files([tmp_path / "nope"])
     with pytest.raises(ScenarioError, match="no scenario"):
         batch.scenario_files([tmp_path])
@@ -458,7 +486,7 @@ def test_test_names_a_wrong_path(tmp_path: Path) -> None:
 
 def test_a_dead_child_is_an_error_not_a_crash(tmp_path: Path) -> None:
     done = twin("test", str(tmp_path / "bad.yaml"), cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (2, f"error: {tmp_path}/bad.yaml: no such file or folder\n")
+    assert (done.returncode, done.stderr) == (2, f"error: {tmp_path}/bad.yaml: no such file\n")
     (tmp_path / "bad.yaml").write_text("name: bad\n", encoding="utf-8")
     done = twin("test", str(tmp_path / "bad.yaml"), "--json", cwd=tmp_path)
     assert done.returncode == 2

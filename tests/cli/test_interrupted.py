@@ -140,7 +140,9 @@ def test_a_run_that_is_ended_from_outside_says_so_in_its_verdict(
     tmp_path: Path, number: int, handled: str, code: int, error: str | None
 ) -> None:
     scenario = tmp_path / "a.yaml"
-    scenario.write_text("name: a\nduration: 1\nrobots: [{model: a}]\nchecks: [{energy: {max: 1}}]\n", "utf-8")
+    scenario.write_text(
+        "name: a\nduration: 1\nrobots: [{model: r2d2}]\nchecks: [{energy: {max: 1}}]\n", "utf-8"
+    )
     words = [str(int(number)), handled, "run", str(scenario), "--out", str(tmp_path / "out")]
     done = subprocess.run(
         [sys.executable, "-c", _SIGNALLED, *words], capture_output=True, text=True, check=False

@@ -22,7 +22,7 @@ _BASE: dict[str, Any] = {
     "name": "a",
     "duration": 1,
     "world": {"arena": "warehouse"},
-    "robots": [{"model": "a", "name": "a", "localisation": {"type": "amcl"}, "navigation": {}}],
+    "robots": [{"model": "diff_bot", "name": "a", "localisation": {"type": "amcl"}, "navigation": {}}],
     "mission": {"type": "idle"},
     "checks": [{"energy": {"max": 1}}],
 }
@@ -132,7 +132,7 @@ def test_every_number_of_the_schema_is_read_or_refused_in_a_sentence() -> None:
 
 def test_the_sentence_names_place_and_valid_sizes(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
-    rest = "robots: [{model: a, command_latency: 1e-320}]\nchecks: [{energy: {max: 1}}]\n"
+    rest = "robots: [{model: diff_bot, command_latency: 1e-320}]\nchecks: [{energy: {max: 1}}]\n"
     path.write_text(f"name: a\nduration: 1e308\nseed: 123456789012345678901\n{rest}", encoding="utf-8")
     with pytest.raises(ScenarioError) as fault:
         load(path, {"recording.poses_hz": "1e-20"})
@@ -143,7 +143,9 @@ def test_the_sentence_names_place_and_valid_sizes(tmp_path: Path) -> None:
         f"{path}:4: robots.0.command_latency: {in_size}, not 1e-320",
         f"override recording.poses_hz=1e-20: recording.poses_hz: {in_size}, not 1e-20",
     ]
-    path.write_text("name: a\nduration: 1e10\nrobots: [{model: a}]\nchecks: [{energy: {max: 1}}]\n", "utf-8")
+    path.write_text(
+        "name: a\nduration: 1e10\nrobots: [{model: diff_bot}]\nchecks: [{energy: {max: 1}}]\n", "utf-8"
+    )
     with pytest.raises(ScenarioError) as fault:
         load(path, {"physics.timestep": "1e999999999 ms"})
     in_size = "must be 0, or from 1e-09 to 1e+09 s in size"

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from twin.errors import ScenarioError
+from twin.files import absence
 
 
 def run_batch(
@@ -67,6 +68,6 @@ def scenario_files(paths: list[Path]) -> list[Path]:
                 f"{path}: the folder holds no scenario (*.yaml); name files or a folder of them"
             )
         if not found[0].exists():
-            raise ScenarioError(f"{path}: no such file or folder")
+            raise ScenarioError(f"{path}: {absence(path)}")
         files |= dict.fromkeys(found)
     return list(files)

@@ -11,6 +11,7 @@ import yaml
 from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
+from twin.files import absence
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""
@@ -141,7 +142,8 @@ def read(path: Path, error: type[TwinError]) -> Document:
     try:
         node = _compose(path.read_text(encoding="utf-8"))
     except OSError as fault:
-        raise error(Problem(f"cannot read the file: {fault.strerror}", path)) from None
+        hint = absence(path) or f"cannot read the file: {fault.strerror}"
+        raise error(Problem(hint, path)) from None
     except UnicodeDecodeError as fault:
         raise error(
             Problem(f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}", path)
