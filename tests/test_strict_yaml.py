@@ -176,7 +176,7 @@ def test_aliases_that_multiply_end_soon(tmp_path: Path) -> None:
 
 
 def test_missing_file_and_wrong_encoding(tmp_path: Path) -> None:
-    with pytest.raises(MapError, match=r"no\.yaml: cannot read the file: No such file"):
+    with pytest.raises(MapError, match=r"no\.yaml: no such file$"):
         load(tmp_path / "no.yaml", File, error=MapError)
     (tmp_path / "latin.yaml").write_bytes(b"name: caf\xe9\n")
     with pytest.raises(MapError, match="not UTF-8 text: byte 9 is 0xe9"):

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -25,6 +27,7 @@ from twin.cli.child import run_in_child
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 from twin.cli.play import find_recording
 from twin.errors import RecordingError, ScenarioError, SimulationError
+from twin.files import written_alone
 from twin.scenario.checks import CheckResult
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -155,6 +158,33 @@ def test_a_full_disk_under_the_output_is_told(arguments: list[str]) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    "surroundings",
+    [
+        {"PYTHONIOENCODING": "ascii"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""},
+    ],
+    ids=["ascii", "C"],
+)
+def test_a_terminal_of_few_characters_shows_what_it_can(tmp_path: Path, surroundings: dict[str, str]) -> None:
+    def run(*words: str) -> tuple[int, str, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "twin.cli", *words],
+            env={**os.environ, **surroundings, "COLUMNS": "200"},
+            capture_output=True, text=True, encoding="ascii", check=False, cwd=tmp_path,
+        )  # fmt: skip
+        return done.returncode, done.stdout, done.stderr
+
+    code, out, err = run("bench", "--help")
+    assert (code, err, "K?mmerle" in out) == (0, "", True)
+    code, _, err = run("run", "böse.yaml")
+    assert (code, re.sub(r"\?+", "?", err)) == (2, "error: b?se.yaml: no such file\n")
+
+
+def test_version_needs_nothing_heavy(invoke: Invoke) -> None:
+    assert invoke("--version") == (0, f"twin {version('twin')}\n", "")
+
+
 def test_a_closed_output_is_no_fault() -> None:
     command = f"{sys.executable} -m twin.cli interface list >&-"
     done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
@@ -275,6 +305,87 @@ def test_two_runs_in_one_second_get_two_folders(demo: Path, runtime: FakeRuntime
     assert len(list((demo.parent / "runs" / "demo").iterdir())) == 3
 
 
+def _no_run(*_: object) -> None:
+    raise AssertionError("something ran")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "demo.yaml", "--out", "held"],
+        ["run", "demo.yaml", "--save-model", "held"],
+        ["run", "demo.yaml", "--repeat", "2", "--out", "held"],
+        ["test", "demo.yaml", "--out", "held"],
+    ],
+)
+def test_two_commands_do_not_write_into_one_folder(
+    demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    for place in ("twin.cli.child.run_in_child", "twin.cli.repeat.run_in_child"):
+        monkeypatch.setattr(place, _no_run)
+    held = demo.parent / "held"
+    held.mkdir()
+    (held / "verdict.json").write_text("the other's", encoding="utf-8")
+    with written_alone(held):
+        code, _, err = invoke(*command)
+    assert (code, runtime.calls) == (2, [])
+    assert err == (
+        f"error: held: process {os.getpid()} is writing there; wait for its end, or name another folder\n"
+    )
+    assert (held / "verdict.json").read_text(encoding="utf-8") == "the other's"
+
+
+def test_a_folder_is_used_again_and_an_old_verdict_is_not_taken_for_a_new_one(
+    demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ["run", str(demo), "--out", "here", "--save-model", "here"]
+    assert invoke(*command)[0] == 0
+    assert invoke(*command)[0] == 0
+    assert sorted(each.name for each in Path("here").iterdir()) == ["junit.xml", "verdict.json"]
+    full = RecordingError("here/junit.xml: cannot be written: No space left on device")
+    monkeypatch.setattr("twin.scenario.verdict.write_junit", lambda *_: (_ for _ in ()).throw(full))
+    assert invoke(*command) == (2, "", f"error: {full}\n")  # the run passed, and nobody can know
+    assert not any(Path("here").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        (["schema", "-o", "PLACE"], "--output"),
+        (["test", "demo.yaml", "--junit", "PLACE"], "--junit"),
+        (["graph", "diff_bot", "-o", "PLACE.gv"], "--output"),
+        (["tf", "frames", "-o", "PLACE.svg"], "--output"),
+        (["node", "graph", "-o", "PLACE.svg"], "--output"),
+        (["view", "diff_bot", "--save", "PLACE"], "--save"),
+        (["map", "convert", "warehouse", "-o", "PLACE.yaml"], "--output"),
+        (["map", "render", "warehouse", "-o", "PLACE.yaml"], "--output"),
+        (["map", "save", "-f", "PLACE.yaml"], "--output"),
+        (["map", "show", "warehouse", "-o", "PLACE.png"], "--output"),
+    ],
+)
+@pytest.mark.parametrize("place", ["folder", "file/in"])
+def test_where_nothing_can_be_written_is_told_before_any_work(
+    demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str], option: str, place: str
+) -> None:
+    for work in (
+        "twin.cli.child.run_in_child",
+        "twin.models.loader.load",
+        "twin.cli.ros.joining.Joining.open",
+        "twin.scenario.schema.json_schema",
+        "twin.navigation.maps.occupancy_map.OccupancyMap.load",
+        "twin.warehouse.arena.load",
+    ):
+        monkeypatch.setattr(work, _no_run)
+    words = [word.replace("PLACE", place) for word in command]
+    Path("file").touch()
+    Path(words[-1].replace("file/in", "other")).mkdir()
+    code, out, err = invoke(*words)
+    why = "it is a folder; name a file"
+    if place == "file/in":
+        why = f"{demo.parent / 'file'} is not a folder; name another place"
+    assert (code, out, err) == (2, "", f"error: {option} {words[-1]}: cannot be written: {why}\n")
+
+
 def test_wrong_options_say_what_is_valid() -> None:
     with pytest.raises(ScenarioError, match=r"--set seed: must be KEY=VALUE"):
         parse_overrides(["seed"], None)
@@ -384,7 +495,7 @@ def test_test_runs_all_and_writes_one_junit(
 
 
 def test_test_names_a_wrong_path(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="no such file or folder"):
+    with pytest.raises(ScenarioError, match="no such file"):
         batch.scenario_files([tmp_path / "nope"])
     with pytest.raises(ScenarioError, match="no scenario"):
         batch.scenario_files([tmp_path])
@@ -392,7 +503,7 @@ def test_test_names_a_wrong_path(tmp_path: Path) -> None:
 
 def test_a_dead_child_is_an_error_not_a_crash(tmp_path: Path) -> None:
     done = twin("test", str(tmp_path / "bad.yaml"), cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (2, f"error: {tmp_path}/bad.yaml: no such file or folder\n")
+    assert (done.returncode, done.stderr) == (2, f"error: {tmp_path}/bad.yaml: no such file\n")
     (tmp_path / "bad.yaml").write_text("name: bad\n", encoding="utf-8")
     done = twin("test", str(tmp_path / "bad.yaml"), "--json", cwd=tmp_path)
     assert done.returncode == 2

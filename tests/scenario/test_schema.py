@@ -86,6 +86,8 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("- mission_succeeded:", "- map_accuracy: {}", "demo.yaml:15: checks.0.map_accuracy: must have at least one of the keys mean, p95"),
         ("    navigation: {}", "    base: fixed\n    navigation: {}", "demo.yaml:9: navigation needs the base 'free', not 'fixed'"),
         ("    navigation: {}\n", "", "demo.yaml:5: the mission pick_and_place needs a navigation of robot 'bot'"),
+        ("model: warehouse_bot", "model: warehouse_bat", "demo.yaml:5: no robot 'warehouse_bat': neither a file nor known; did you mean 'warehouse_bot'? Valid: diff_bot, jackal, r2d2, sp1s, test_robot, warehouse_bot"),
+        ("arena: warehouse", "arena: warehous", "demo.yaml:3: no arena 'warehous': neither a file nor known; did you mean 'warehouse'? Valid: warehouse"),
         ("  robot: bot", "  robot: bob", "demo.yaml:12: unknown robot 'bob'; did you mean 'bot'? Valid: bot"),
         ("pick_and_place", "pick_n_place", "demo.yaml:11: mission.type: unknown value 'pick_n_place'; did you mean 'pick_and_place'? Valid: "),
         ("tasks: [{tote: tote_a, to: unloading}]", "tasks: []", "demo.yaml:13: mission.tasks: must have at least 1 items, not []"),
@@ -166,6 +168,10 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     text = GOOD.replace("arena: warehouse", "arena: ../hall.yaml").replace(
         "model: warehouse_bot", "model: my/bot.xacro"
     )
+    hall, bot = tmp_path / "../hall.yaml", tmp_path / "my" / "bot.xacro"
+    bot.parent.mkdir()
+    bot.touch()
+    hall.touch()
     scenario = load(write(tmp_path, text))
     assert scenario.world.arena == str(tmp_path / "../hall.yaml")
     assert (scenario.robots[0].model, scenario.robots[0].id) == (str(tmp_path / "my/bot.xacro"), "bot")

@@ -10,7 +10,7 @@ import pytest
 
 from twin.scenario.checks import CheckResult
 from twin.scenario.provenance import cpu_class, versions
-from twin.scenario.verdict import Verdict, write_atomically, write_junit
+from twin.scenario.verdict import Verdict, write_junit
 
 
 def check(name: str, passed: bool, value: float | None = 1.0, reason: str = "") -> CheckResult:
@@ -71,22 +71,6 @@ def test_junit_separates_failures_from_errors(tmp_path: Path) -> None:
     assert error is not None
     assert (error.get("message"), error.text) == ("no such arena", "no such arena\nat all")
     assert {p.get("name") for p in first.findall("properties/property")} == {"seed", "digest", "cpu"}
-
-
-def test_a_failed_write_leaves_the_old_file_and_no_litter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "verdict.json"
-    write_atomically(file, b"old")
-
-    def broken(*_: object) -> None:
-        raise OSError("disk full")
-
-    monkeypatch.setattr("os.replace", broken)
-    with pytest.raises(OSError, match="disk full"):
-        write_atomically(file, b"new")
-    assert file.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_provenance_names_what_decides_the_bytes() -> None:

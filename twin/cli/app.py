@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
+from typing import Annotated, TextIO
 
 import typer
 
@@ -73,15 +75,30 @@ app.add_typer(map_app, name="map", rich_help_panel=_NAVIGATION)
 app.add_typer(bench_app, name="bench", rich_help_panel=_NAVIGATION)
 
 
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"twin {version('twin')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
-    """Keep `twin` a group of commands."""
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_tell_version, help="Say which twin this is.")
+    ] = False,
+) -> None:
+    pass
 
 
 def run_app() -> None:
     """Run the command line and exit: 0 pass, 1 a check failed, 2 a mistake or a bug, 130 interrupted."""
     if sys.stdout is None:  # started with `>&-`
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # what a terminal cannot show must not end the command
+            stream.reconfigure(errors="replace")
     try:
         app()
     except TwinError as fault:
@@ -102,6 +119,15 @@ def _tell(fault: Exception) -> None:
 
         traceback.print_exception(fault)
         return
-    print_error(TwinError(f"{fault.strerror}: {fault.filename or 'what is printed'} is not whole; make room"))
+    what = fault.filename or ("what is printed" if _is_full(sys.stdout) else "a file that was written")
+    print_error(TwinError(f"{fault.strerror}: {what} is not whole; make room"))
     # What is still buffered goes nowhere; otherwise the interpreter complains when it flushes at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _is_full(stream: TextIO) -> bool:
+    try:
+        stream.flush()
+    except OSError:
+        return True
+    return False

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from twin.errors import ScenarioError
+from twin.files import absence
 
 
 def run_batch(
@@ -32,24 +33,24 @@ def run_batch(
     """
     from twin.cli.child import run_in_child
     from twin.cli.console import stderr, stdout
-    from twin.cli.folders import make_folder, run_folder
+    from twin.cli.folders import results_folder
     from twin.cli.options import RunOptions
     from twin.cli.verdict_table import many_report
+    from twin.files import check_file, write_whole
 
     files = scenario_files(paths or [Path("scenarios")])
-    folder = make_folder(out) if out else run_folder("test")
+    if junit is not None:
+        check_file(junit, "--junit")
     verdicts: list[dict[str, Any]] = []
-    with stderr().status("") as status:
+    with results_folder(out, "test") as folder, stderr().status("") as status:
         for number, file in enumerate(files, 1):
             status.update(f"{number} of {len(files)}: {file}")
             target = folder / f"{number:02d}-{file.stem}"
             verdicts.append(run_in_child(RunOptions(scenario=file, record=record), target))
     if junit is not None:
         from twin.scenario.junit import junit_xml
-        from twin.scenario.verdict import write_atomically
 
-        make_folder(junit.parent)
-        write_atomically(junit, junit_xml(verdicts))
+        write_whole(junit, junit_xml(verdicts))
     if json:
         sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")
     else:
@@ -67,6 +68,6 @@ def scenario_files(paths: list[Path]) -> list[Path]:
                 f"{path}: the folder holds no scenario (*.yaml); name files or a folder of them"
             )
         if not found[0].exists():
-            raise ScenarioError(f"{path}: no such file or folder")
+            raise ScenarioError(f"{path}: {absence(path)}")
         files |= dict.fromkeys(found)
     return list(files)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +18,12 @@ COMMAND = (sys.executable, "-m", "twin.cli")
 def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
     """Return the content of the run's `verdict.json`; a process that dies gives a verdict of error."""
     child = subprocess.run(
-        [*COMMAND, *options.arguments(out)], capture_output=True, text=True, encoding="utf-8", check=False
+        [*COMMAND, *options.arguments(out)],
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},  # whatever this process's terminal can show
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
     )
     if child.returncode == 130:
         raise KeyboardInterrupt

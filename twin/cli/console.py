@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 from twin.errors import Problem, TwinError
 
+WIDE = 100_000
+"""Columns where no terminal says how many: what is read by a program, or copied, is not cut."""
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
@@ -15,7 +18,10 @@ def stdout() -> Console:
     """Return the console for results."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True)
+    if not console.is_terminal:
+        console.width = WIDE
+    return console
 
 
 def stderr() -> Console:

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from twin.errors import RecordingError
+from twin.files import check_file, write_whole
 
 Output = Annotated[
     Path | None,
@@ -18,9 +19,11 @@ Output = Annotated[
 
 
 def check_ending(output: Path | None) -> None:
-    """Refuse, before any work, a file that is neither .gv nor .svg; raises RecordingError."""
+    """Refuse, before any work, a file that is neither .gv nor .svg, or cannot be written."""
     if output is not None and output.suffix not in (".gv", ".svg"):
         raise RecordingError(f"--output {output}: must end in .gv or .svg")
+    if output is not None:
+        check_file(output)
 
 
 def write_drawing(output: Path | None, graphviz: Callable[[], str], svg: Callable[[], str]) -> None:
@@ -29,14 +32,7 @@ def write_drawing(output: Path | None, graphviz: Callable[[], str], svg: Callabl
     Raises:
         RecordingError: the file cannot be written.
     """
-    from twin.scenario.verdict import write_atomically
-
     if output is None:
         sys.stdout.write(graphviz())
-        return
-    text = svg() if output.suffix == ".svg" else graphviz()
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(output, text.encode())
-    except OSError as fault:
-        raise RecordingError(f"--output {output}: cannot be written: {fault.strerror}") from fault
+    else:
+        write_whole(output, svg() if output.suffix == ".svg" else graphviz())

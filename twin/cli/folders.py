@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
 from twin.errors import RecordingError
+from twin.files import written_alone
 
 
 def run_folder(scenario: str) -> Path:
@@ -20,6 +23,18 @@ def run_folder(scenario: str) -> Path:
             continue
         return folder
     raise FileExistsError(f"{parent / name}: a thousand runs were started in this second")
+
+
+@contextmanager
+def results_folder(out: Path | None, name: str) -> Iterator[Path]:
+    """Make the folder of the results, `out` or `runs/<name>/<time>`, and keep other processes from it.
+
+    Raises:
+        RecordingError: It cannot be made, or another process is writing there.
+    """
+    folder = run_folder(name) if out is None else make_folder(out)
+    with written_alone(folder):
+        yield folder
 
 
 def bag_folder() -> Path:

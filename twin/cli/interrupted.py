@@ -1,4 +1,4 @@
-"""Ctrl-C at any moment of a command: exit code 130, and nothing on the screen."""
+"""Ctrl-C, or a terminal that closes, at any moment of a command: exit code 130, and nothing on the screen."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def ends_on_interrupt() -> Iterator[None]:
         if not _is_callback_of_c(frame):
             raise KeyboardInterrupt
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, on_signal)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup wants it
+            _be_ctrl_c(signal.SIGHUP)
     try:
         yield
     except KeyboardInterrupt:
@@ -63,4 +65,8 @@ def raise_swallowed() -> None:
 def sigterm_is_ctrl_c() -> None:
     """Let SIGTERM, with which CI systems end a job that takes too long, end the command as Ctrl-C does."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+        _be_ctrl_c(signal.SIGTERM)
+
+
+def _be_ctrl_c(number: signal.Signals) -> None:
+    signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))

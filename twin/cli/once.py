@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.cli.console import print_error, stdout
-from twin.cli.folders import make_folder, run_folder
+from twin.cli.folders import make_folder, results_folder
 from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
+from twin.files import check_file, written_alone
 
 if TYPE_CHECKING:
     from twin.scenario.outside import ClockMode
@@ -19,6 +22,11 @@ if TYPE_CHECKING:
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
+    with ExitStack() as held:
+        return _run_once(options, out, held, as_json=as_json)
+
+
+def _run_once(options: RunOptions, out: Path | None, held: ExitStack, *, as_json: bool) -> int:
     from twin.bridge.programs.console_log import show_warnings
     from twin.scenario import schema
     from twin.scenario.outside import Outside
@@ -29,7 +37,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     name, seed, folder = options.scenario.stem, 0, None
     clock: ClockMode = "inproc"
     try:
-        folder = None if out is None else make_folder(out)
+        folder = None if out is None else held.enter_context(_fresh(out, ""))
         outside = Outside(
             nodes=options.nodes,
             wait_for=options.wait_for,
@@ -43,7 +51,9 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         name, seed = scenario.name, scenario.seed
         from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
 
-        folder = folder or run_folder(name)
+        folder = folder or held.enter_context(_fresh(None, name))
+        if options.save_model is not None and make_folder(options.save_model).resolve() != folder.resolve():
+            held.enter_context(written_alone(options.save_model))
         with run_progress(name) as bar:
 
             def progress(now: runtime.Progress) -> None:
@@ -88,3 +98,15 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
 
         stdout().print(verdict_report(verdict.to_dict(), folder))
     return verdict.exit_code
+
+
+@contextmanager
+def _fresh(out: Path | None, name: str) -> Iterator[Path]:
+    """Hold the folder of the results; a verdict of an earlier run there must not pass for this one's."""
+    from twin.scenario.verdict import VERDICT
+
+    with results_folder(out, name) as folder:
+        for file in (folder / "junit.xml", folder / VERDICT):
+            check_file(file, "--out")
+            file.unlink(missing_ok=True)
+        yield folder

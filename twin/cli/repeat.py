@@ -9,7 +9,7 @@ from typing import Any
 
 from twin.cli.child import run_in_child
 from twin.cli.console import stderr, stdout
-from twin.cli.folders import make_folder, run_folder
+from twin.cli.folders import results_folder
 from twin.cli.options import RunOptions
 
 
@@ -19,10 +19,9 @@ def run_repeatedly(
     """Run `runs` times in fresh processes, print the digests, and return the exit code."""
     from twin.scenario import schema
 
-    parent = make_folder(out) if out else run_folder(schema.load(options.scenario, options.overrides).name)
-    console = stderr()
+    name = "" if out else schema.load(options.scenario, options.overrides).name
     verdicts: list[dict[str, Any]] = []
-    with console.status("") as status:
+    with results_folder(out, name) as parent, stderr().status("") as status:
         for number in range(1, runs + 1):
             status.update(f"run {number} of {runs}")
             verdicts.append(run_in_child(options, parent / str(number)))

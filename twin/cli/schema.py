@@ -17,11 +17,14 @@ def schema(
     import json
     import sys
 
+    from twin.files import check_file, write_whole
+
+    if output is not None:
+        check_file(output)
     from twin.scenario.schema import json_schema
-    from twin.scenario.verdict import write_atomically
 
     text = json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None:
         sys.stdout.write(text)
     else:
-        write_atomically(output, text.encode())
+        write_whole(output, text)

@@ -59,10 +59,13 @@ def view(
     Ctrl-C ends it, and so does closing the viewer. Exit code 0, or 2 for a file with errors.
     """
     from twin.cli.console import stderr
+    from twin.files import check_file
     from twin.models import load
     from twin.recording.posture import Posture
     from twin.recording.robot_view import save as save_recording
 
+    if save is not None:
+        check_file(save, "--save")
     description = load(file, read)
     posture = Posture(description)
     posture.set(joint_values(joint or ()))

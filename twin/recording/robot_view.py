@@ -17,7 +17,7 @@ from twin.models.shapes import Geometry, Mesh
 from twin.models.solids import Shape, reach
 from twin.recording.posture import Posture
 from twin.recording.robot_layers import LAYERS, Canvas
-from twin.recording.stream import open_recording
+from twin.recording.stream import FLUSH_TIMEOUT_S, end_recording, open_recording, whole_recording
 
 APPLICATION_ID = "twin-view"
 TIMELINE = "posture"
@@ -75,7 +75,7 @@ class RobotView:
                     child_frame=pa.array([joint.child for joint in joints], pa.string()),
                 ),
             )
-        self._recording.flush()
+        self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
         self._count += 1
 
     def close(self) -> None:
@@ -96,10 +96,11 @@ def save(path: Path, posture: Posture, description: RobotDescription, show: Coll
         RecordingError: The file cannot be written.
     """
     blueprint = robot_layout(description, posture, show)
-    recording = open_recording(path, APPLICATION_ID, description.name, blueprint)
-    view = RobotView(recording, description)
-    view.move(posture)
-    view.close()
+    with whole_recording(path) as new:
+        recording = open_recording(new, APPLICATION_ID, description.name, blueprint)
+        view = RobotView(recording, description)
+        view.move(posture)
+        end_recording(recording, new)
 
 
 def robot_layout(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,7 +108,6 @@ class RerunSink:
         Raises:
             RecordingError: The file cannot be written.
         """
-        os.environ.setdefault("RERUN_ANALYTICS", "0")
         from twin.recording.blueprint import extent, layout
         from twin.recording.channel import Context
         from twin.recording.columns import TransformColumns
@@ -168,17 +166,23 @@ class RerunSink:
             self._send()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
-        """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored."""
+        """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored.
+
+        Raises:
+            RecordingError: The file is not whole.
+        """
         if self._world is None or self._closed:
             return
-        from twin.recording.stream import log_verdict
+        from twin.recording.stream import end_recording, log_verdict
 
         self._closed = True
         self._sample_poses(self._world.time_ns, self._world)
-        if verdict is not None:
-            log_verdict(self._recording, verdict)
-        self._send()
-        self._recording.disconnect()
+        try:
+            if verdict is not None:
+                log_verdict(self._recording, verdict)
+            self._send()
+        finally:
+            end_recording(self._recording, self._path)
 
     def _sample_poses(self, time_ns: int, world: World) -> None:
         xyz, quat = world.body_poses()
@@ -193,11 +197,13 @@ class RerunSink:
             self._poses.append(time_ns, WORLD, names, xyz[rows], quat[rows][:, [1, 2, 3, 0]])
 
     def _send(self) -> None:
+        from twin.recording.stream import flush
+
         self._poses.send(self._recording)
         for channel in self._channels.values():
             if channel is not None:
                 channel.send(self._recording)
-        self._recording.flush()
+        flush(self._recording, self._path)
 
     def _belief(self, namespace: str) -> Belief:
         assert self._world is not None

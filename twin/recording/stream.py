@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,17 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from twin.errors import RecordingError
+from twin.files import replaced
 from twin.recording.frames import WORLD, Frames
 
 WALL_CLOCK_METRICS = frozenset(
     {"wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s"}
 )
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
+FLUSH_TIMEOUT_S = 600.0
+"""A flush without any limit waits for ever for a writer that a full disk has ended."""
+_FOOTER = b"RRF2FOOT"
+"""Begins the last twelve bytes of a file that was closed."""
 
 
 def open_recording(
@@ -47,6 +54,49 @@ def open_recording(
     recording.set_log_time_enabled(False)
     recording.save(path, default_blueprint=blueprint)
     return recording
+
+
+def flush(recording: rr.RecordingStream, path: Path) -> None:
+    """Wait until everything so far is in the file.
+
+    Raises:
+        RecordingError: It could not be written.
+    """
+    try:
+        recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+    except RuntimeError as fault:
+        raise _not_whole(path) from fault
+
+
+def end_recording(recording: rr.RecordingStream, path: Path) -> None:
+    """Write the footer and close the file.
+
+    Raises:
+        RecordingError: The file is not whole.
+    """
+    recording.disconnect()
+    with path.open("rb") as file:
+        file.seek(-min(len(_FOOTER) + 4, path.stat().st_size), os.SEEK_END)
+        if not file.read().startswith(_FOOTER):
+            raise _not_whole(path)
+
+
+@contextmanager
+def whole_recording(path: Path) -> Iterator[Path]:
+    """Yield where to write a recording that takes the place of `path` only once it is whole.
+
+    Raises:
+        RecordingError: The file cannot be written.
+    """
+    try:
+        with replaced(path) as new:
+            yield new
+    except (OSError, RuntimeError, RecordingError) as fault:
+        raise _not_whole(path) from fault
+
+
+def _not_whole(path: Path) -> RecordingError:
+    return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 
 def declare_frames(recording: rr.RecordingStream, frames: Frames) -> None:

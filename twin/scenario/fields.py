@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,8 +17,9 @@ from pydantic import (
     model_validator,
 )
 
+from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.strict_yaml import Metres, Radians, StrictModel
+from twin.strict_yaml import Fault, Faults, Metres, Radians, StrictModel
 
 
 def _ros_name(value: str) -> str:
@@ -46,6 +47,18 @@ ArgumentText = Annotated[
     str, BeforeValidator(_scalar_text), WithJsonSchema({"type": ["string", "number", "boolean"]})
 ]
 """A xacro argument: numbers and booleans become their text."""
+
+
+def known(what: str, catalogue: Callable[[], Collection[str]]) -> AfterValidator:
+    """Return the validator of a name or path: it must be one that ships with twin, or a file."""
+
+    def check(value: str) -> str:
+        names = catalogue()
+        if value in names or Path(value).is_file():
+            return value
+        raise Faults([Fault((), f"no {what} '{value}': neither a file nor known; {nearest(value, names)}")])
+
+    return AfterValidator(check)
 
 
 NameOrPath = Annotated[str, AfterValidator(_beside_the_file)]

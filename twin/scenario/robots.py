@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from twin.scenario.fields import ArgumentText, NameOrPath, NotNegative, PoseConfig, RosName
+from twin.models.catalogue import catalogue
+from twin.scenario.fields import ArgumentText, NameOrPath, NotNegative, PoseConfig, RosName, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
 from twin.strict_yaml import Fault, Faults, Seconds, StrictModel
@@ -16,7 +17,7 @@ from twin.strict_yaml import Fault, Faults, Seconds, StrictModel
 class RobotConfig(StrictModel):
     """One robot."""
 
-    model: NameOrPath
+    model: Annotated[NameOrPath, known("robot", catalogue)]
     """Name in the catalogue (`twin robots`), or path of a URDF or xacro file."""
     name: RosName | None = None
     """Name of this robot; absent: the model's. Several robots live in `/<name>/`."""

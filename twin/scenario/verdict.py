@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from twin.files import write_whole
 from twin.scenario.checks import CheckResult
 from twin.scenario.junit import junit_xml
+
+VERDICT = "verdict.json"
+"""The file of a run's folder that says how it ended; the last that is written."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,28 +71,18 @@ class Verdict:
         return json.dumps(_finite(self.to_dict()), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def write(self, folder: Path) -> None:
-        """Write `verdict.json` and `junit.xml`; each file appears whole or not at all."""
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(folder / "verdict.json", self.to_json().encode())
+        """Write `junit.xml` and `verdict.json`; each file appears whole or not at all.
+
+        Raises:
+            RecordingError: One of them cannot be written; then there is no `verdict.json` of this run.
+        """
         write_junit(folder / "junit.xml", [self])
+        write_whole(folder / VERDICT, self.to_json())
 
 
 def write_junit(file: Path, verdicts: Sequence[Verdict]) -> None:
     """Write one JUnit file over several runs, for CI."""
-    write_atomically(file, junit_xml([verdict.to_dict() for verdict in verdicts]))
-
-
-def write_atomically(file: Path, content: bytes) -> None:
-    """Write a file so that no reader ever sees a part of it."""
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{file.name}.", dir=file.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(content)
-        os.chmod(temporary, 0o644)  # mkstemp's 0600 would lock out a CI server's other user
-        os.replace(temporary, file)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    write_whole(file, junit_xml([verdict.to_dict() for verdict in verdicts]))
 
 
 def _finite(value: Any) -> Any:

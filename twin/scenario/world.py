@@ -6,8 +6,9 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName
+from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName, known
 from twin.strict_yaml import Fault, Faults, Hertz, Kilograms, Metres, MetresPerSecond, Seconds, StrictModel
+from twin.warehouse.arena import catalogue
 
 Length = Annotated[Metres, Positive]
 
@@ -62,7 +63,7 @@ class GoodOverride(StrictModel):
 class WorldConfig(StrictModel):
     """What surrounds the robots."""
 
-    arena: NameOrPath | None = None
+    arena: Annotated[NameOrPath, known("arena", catalogue)] | None = None
     """Name of a shipped arena, or path of an arena file; absent: an empty floor."""
     obstacles: tuple[Obstacle, ...] = ()
     """Boxes added to the arena, on no map."""

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from twin.errors import ScenarioError, nearest
+from twin.files import write_whole
 from twin.geometry import Array, Pose3
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
 from twin.sim.contacts import Contact, ContactReader, Touch
@@ -229,7 +230,7 @@ class World:
             asset.write_bytes(content if isinstance(content, bytes) else content.encode())
         spec.meshdir = spec.texturedir = "assets"
         file = folder / "world.xml"
-        file.write_text(spec.to_xml(), encoding="utf-8")
+        write_whole(file, spec.to_xml())
         return file
 
     # -- binding ---------------------------------------------------------------------------------------------

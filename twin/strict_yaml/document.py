@@ -11,12 +11,19 @@ import yaml
 from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
+from twin.files import absence
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""
 
 _MAX_NODES = 100_000
 """More values than any file we read has; stops a file whose aliases multiply without end."""
+
+
+LARGEST, SMALLEST = 1e15, 1e-15
+"""Of a file's numbers: beyond are none of the physical world, and squares and ratios leave the floats."""
+_DIGITS = 20
+"""Of the longest whole number: a seed of 64 bits."""
 
 
 class _CoreLoader(yaml.SafeLoader):
@@ -43,6 +50,8 @@ class Document:
     lines: dict[Loc, int] = field(default_factory=dict)
     overrides: dict[Loc, str] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    outsized: list[Problem] = field(default_factory=list)
+    """Numbers that are too large or too small to compute with; the data has 0 instead."""
 
     def alias(self, loc: Loc, original: Loc) -> None:
         """Let everything below `loc` come from where everything below `original` came from."""
@@ -61,15 +70,27 @@ class Document:
         return Problem(message, self.file, 1)
 
 
-def _scalar(node: yaml.ScalarNode) -> Any:
+def _scalar(document: Document, node: yaml.ScalarNode, loc: Loc) -> Any:
     kind = node.tag.rpartition(":")[2]
     if kind == "null":
         return None
     if kind == "bool":
         return node.value.lower() == "true"
     if kind == "int":
-        return int(node.value, 10 if node.value[:2] not in ("0x", "0o") else 0)
-    return float(node.value) if kind == "float" else node.value
+        if len(node.value.lstrip("+-0xo")) <= _DIGITS:
+            return int(node.value, 10 if node.value[:2] not in ("0x", "0o") else 0)
+        valid = f"at most {_DIGITS} digits"
+    elif kind == "float":
+        value = float(node.value)
+        if value == 0.0 or SMALLEST <= abs(value) <= LARGEST:
+            return value
+        valid = f"0, or a number from {SMALLEST:g} to {LARGEST:g} in size"
+    else:
+        return node.value
+    name = ".".join(map(str, loc)) or "the value"
+    given = node.value if len(node.value) <= 40 else node.value[:37] + "..."
+    document.outsized.append(document.problem(loc, f"{name}: must be {valid}, not {given}"))
+    return 0
 
 
 def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, ...]) -> Any:
@@ -81,7 +102,7 @@ def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, 
         )
         return None
     if isinstance(node, yaml.ScalarNode):
-        return _scalar(node)
+        return _scalar(document, node, loc)
     above = (*above, id(node))
     if isinstance(node, yaml.SequenceNode):
         return [_construct(document, item, (*loc, i), above) for i, item in enumerate(node.value)]
@@ -121,7 +142,8 @@ def read(path: Path, error: type[TwinError]) -> Document:
     try:
         node = _compose(path.read_text(encoding="utf-8"))
     except OSError as fault:
-        raise error(Problem(f"cannot read the file: {fault.strerror}", path)) from None
+        hint = absence(path) or f"cannot read the file: {fault.strerror}"
+        raise error(Problem(hint, path)) from None
     except UnicodeDecodeError as fault:
         raise error(
             Problem(f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}", path)
@@ -166,7 +188,10 @@ def apply_override(document: Document, dotted: str, text: str) -> None:
             return
         if last:
             document.overrides[tuple(keys)] = name
-            target[keys[-1]] = None if node is None else _construct(Document(document.file), node, (), ())
+            given = Document(document.file)
+            target[keys[-1]] = None if node is None else _construct(given, node, tuple(keys), ())
+            document.problems += [Problem(f"override {name}: {p.message}") for p in given.problems]
+            document.outsized += [Problem(f"override {name}: {p.message}") for p in given.outsized]
         else:
             if isinstance(target, dict) and target.get(part) is None:
                 target[part] = {}

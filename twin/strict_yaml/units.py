@@ -19,11 +19,13 @@ class Unit:
     quantity: str
     factors: tuple[tuple[str, str | float], ...]
     """Unit and its size in SI (exact text, or a float for irrational ones); the SI unit comes first."""
+    sizes: tuple[float, float] = (1e-12, 1e12)
+    """Smallest and largest size in SI of what is not 0."""
 
     def parse(self, value: object) -> float:
         """Return `value` in SI; raises PydanticCustomError naming the valid units."""
         if isinstance(value, int | float) and not isinstance(value, bool):
-            return float(value)
+            return self._sized(float(value))
         match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
         names = ", ".join(name for name, _ in self.factors)
         si = self.factors[0][0]
@@ -40,8 +42,18 @@ class Unit:
                 "must have a unit of {q} ({n})",
                 {"u": match[2], "q": self.quantity, "n": names},
             )
-        number = Fraction(match[1])
-        return float(number) * factor if isinstance(factor, float) else float(number * Fraction(factor))
+        rough = self._sized(float(match[1]) * float(Fraction(factor)))  # an exact 1e999999999 takes for ever
+        if rough == 0.0 or isinstance(factor, float):
+            return rough
+        return float(Fraction(match[1]) * Fraction(factor))
+
+    def _sized(self, value: float) -> float:
+        low, high = self.sizes
+        if value == 0.0 or low <= abs(value) <= high:
+            return value
+        words = "must be 0, or from {low} to {high} {si} in size"
+        given = {"low": f"{low:g}", "high": f"{high:g}", "si": self.factors[0][0]}
+        raise PydanticCustomError("size", words, given)
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
@@ -56,7 +68,12 @@ _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\
 _DEG = math.pi / 180.0
 
 Seconds = Annotated[
-    float, Unit("time", (("s", "1"), ("ms", "1/1000"), ("us", "1/1000000"), ("min", "60"), ("h", "3600")))
+    float,
+    Unit(
+        "time",
+        (("s", "1"), ("ms", "1/1000"), ("us", "1/1000000"), ("min", "60"), ("h", "3600")),
+        sizes=(1e-9, 1e9),  # whole nanoseconds, and their number has 64 bits
+    ),
 ]
 Metres = Annotated[float, Unit("length", (("m", "1"), ("cm", "1/100"), ("mm", "1/1000"), ("km", "1000")))]
 Radians = Annotated[float, Unit("angle", (("rad", "1"), ("deg", _DEG), ("°", _DEG)))]
@@ -68,5 +85,5 @@ RadiansPerSecond = Annotated[
     float, Unit("turn rate", (("rad/s", "1"), ("deg/s", _DEG), ("°/s", _DEG), ("rpm", math.pi / 30.0)))
 ]
 Newtons = Annotated[float, Unit("force", (("N", "1"), ("mN", "1/1000"), ("kN", "1000")))]
-Hertz = Annotated[float, Unit("frequency", (("Hz", "1"), ("kHz", "1000")))]
+Hertz = Annotated[float, Unit("frequency", (("Hz", "1"), ("kHz", "1000")), sizes=(1e-9, 1e9))]
 Joules = Annotated[float, Unit("energy", (("J", "1"), ("kJ", "1000"), ("Wh", "3600"), ("kWh", "3600000")))]

@@ -22,6 +22,9 @@ M = TypeVar("M", bound=BaseModel)
 
 def validate(schema: type[M], document: Document) -> M | None:
     """Return the model, or None after adding every fault to the document's problems."""
+    if document.outsized:
+        document.problems += document.outsized
+        return None
     context = {"folder": document.file.parent}
     model, first = _findings(schema, document.data, context)
     if model is not None:

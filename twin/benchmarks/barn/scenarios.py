@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
+from twin.files import write_whole
 
 ROBOT = "jackal"
 _MARGIN = 3.0
@@ -172,4 +173,4 @@ def navigation(options: BarnOptions) -> dict[str, Any]:
 
 
 def _dump(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None), encoding="utf-8")
+    write_whole(path, yaml.safe_dump(content, sort_keys=False, default_flow_style=None))

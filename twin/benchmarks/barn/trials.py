@@ -13,9 +13,9 @@ from pathlib import Path
 from twin.benchmarks.barn.referee import Referee, Trial
 from twin.benchmarks.barn.scenarios import BarnOptions, write
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
+from twin.files import write_whole
 from twin.runtime import run
 from twin.scenario import schema
-from twin.scenario.verdict import write_atomically
 
 
 def run_world(
@@ -31,7 +31,7 @@ def run_world(
         recoveries=int(verdict.metrics["recoveries"]),
         real_time_factor=verdict.metrics["real_time_factor"],
     )
-    write_atomically(folder / "trial.json", (json.dumps(trial.to_dict(), indent=2) + "\n").encode())
+    write_whole(folder / "trial.json", json.dumps(trial.to_dict(), indent=2) + "\n")
     return trial
 
 

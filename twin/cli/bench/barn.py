@@ -61,9 +61,9 @@ def barn(
     from twin.benchmarks.barn.scenarios import BarnOptions
     from twin.benchmarks.barn.trials import run_worlds
     from twin.cli.console import stdout
-    from twin.cli.folders import make_folder, run_folder
+    from twin.cli.folders import results_folder
     from twin.cli.options import parse_overrides
-    from twin.scenario.verdict import write_atomically
+    from twin.files import write_whole
 
     options = BarnOptions(
         seed=seed,
@@ -73,16 +73,16 @@ def barn(
         command_latency=latency,
         overrides=tuple(parse_overrides(sets or [], None).items()),
     )
-    folder = make_folder(out) if out else run_folder("barn")
+    workers = jobs or os.cpu_count() or 1
     trials: list[Trial] = []
-    with _progress(len(rules.worlds) * runs) as show:
-        for trial in run_worlds(rules, options, folder, workers=jobs or os.cpu_count() or 1, record=record):
+    with results_folder(out, "barn") as folder, _progress(len(rules.worlds) * runs) as show:
+        for trial in run_worlds(rules, options, folder, workers=workers, record=record):
             trials.append(trial)
             show(trials)
-    report = BarnReport(sorted(trials, key=lambda trial: (trial.world, trial.seed)), options)
-    text = json_module.dumps(report.to_dict(), indent=2) + "\n"
-    write_atomically(folder / "report.json", text.encode())
-    write_atomically(folder / "trajectories.svg", svg(rules, report.trials).encode())
+        report = BarnReport(sorted(trials, key=lambda trial: (trial.world, trial.seed)), options)
+        text = json_module.dumps(report.to_dict(), indent=2) + "\n"
+        write_whole(folder / "trajectories.svg", svg(rules, report.trials))
+        write_whole(folder / "report.json", text)
     if json:
         sys.stdout.write(text)
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_module
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -43,7 +43,7 @@ def slam(
     from twin.benchmarks.slam.relations import load_relations, relations_of
     from twin.benchmarks.slam.trial import run_log
     from twin.cli.console import stdout
-    from twin.cli.folders import make_folder
+    from twin.cli.folders import results_folder
 
     paths = list(
         dict.fromkeys(path.with_suffix(".npz") if path.suffix == ".relations" else path for path in files)
@@ -54,9 +54,11 @@ def slam(
         load_relations(path, len(log.ranges)) if path.exists() else relations_of(log.reference)
         for path, log in zip(beside, logs, strict=True)
     ]
-    folder = None if out is None else make_folder(out)
     trials: list[SlamTrial] = []
-    with _progress(sum(len(log.ranges) for log in logs)) as show:
+    with (
+        nullcontext() if out is None else results_folder(out, "") as folder,
+        _progress(sum(len(log.ranges) for log in logs)) as show,
+    ):
         for log, truth in zip(logs, truths, strict=True):
             done = sum(trial.scans for trial in trials)
             trial, mapped = run_log(log, truth, partial(show, log.name, done))
@@ -76,9 +78,10 @@ def slam(
 
 def _write(folder: Path, name: str, mapped: Slam) -> None:
     from twin.benchmarks.slam.picture import png
+    from twin.files import write_whole
 
     mapped.map().save(folder / f"{name}.yaml")
-    (folder / f"{name}.png").write_bytes(png(mapped))
+    write_whole(folder / f"{name}.png", png(mapped))
     mapped.save(folder / f"{name}.posegraph")
 
 

@@ -42,6 +42,7 @@ def convert(
     from twin.navigation.maps.map_saver import LOSSLESS_SCALE, SaveParameters, save_map
     from twin.navigation.maps.resampling import resampled
 
+    path = yaml_path(output)
     occupancy = load(name)
     if resolution is not None:
         occupancy = resampled(occupancy, resolution)
@@ -54,7 +55,6 @@ def convert(
         occupied_thresh=defaults.occupied_thresh if occupied is None else occupied,
         free_thresh=defaults.free_thresh if free is None else free,
     )
-    path = yaml_path(output)
     if path.exists() and Path(name).is_file() and path.samefile(name):
         raise MapError(f"--output {path} is the map itself; valid is another file")
     typer.echo(told(occupancy, path, save_map(occupancy, path, parameters)))

@@ -32,8 +32,12 @@ def map_path(name_or_path: str) -> Path:
 
 
 def yaml_path(output: Path) -> Path:
-    """Return the YAML file that an output names, with or without its ending."""
-    return output if output.suffix in (".yaml", ".yml") else output.with_name(output.name + ".yaml")
+    """Return the YAML file that an output names, with or without its ending; raises if it cannot be."""
+    from twin.files import check_file
+
+    path = output if output.suffix in (".yaml", ".yml") else Path(f"{output}.yaml")
+    check_file(path)
+    return path
 
 
 def told(occupancy: OccupancyMap, path: Path, image: Path) -> str:

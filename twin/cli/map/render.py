@@ -27,8 +27,8 @@ def render(
     from twin.navigation.maps.map_saver import SaveParameters, save_map
     from twin.warehouse import map_renderer
 
-    occupancy = map_renderer.render(_arena(name), resolution=resolution, height=height, margin=margin)
     path = yaml_path(output)
+    occupancy = map_renderer.render(_arena(name), resolution=resolution, height=height, margin=margin)
     image = save_map(occupancy, path, SaveParameters(image_format=image_format))
     typer.echo(told(occupancy, path, image))
 

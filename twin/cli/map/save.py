@@ -50,10 +50,10 @@ def save(
         occupied_thresh=occupied,
         free_thresh=free,
     )
+    path = yaml_path(name or map_name())
     with joining.open() as process:
         message = _first_map(process, absolute(topic), transient_local, timeout)
     occupancy = occupancy_map(message)
-    path = yaml_path(name or map_name())
     typer.echo(told(occupancy, path, save_map(occupancy, path, parameters)))
 
 

@@ -25,9 +25,12 @@ def show(
 ) -> None:
     """Draw a map: in the terminal, or as a picture with the map frame's axes and masks over it."""
     from twin.errors import RecordingError
+    from twin.files import check_file, write_whole
 
     if output is not None and output.suffix not in (".png", ".svg"):
         raise RecordingError(f"--output {output}: must end in .png or .svg")
+    if output is not None:
+        check_file(output)
     if mask and output is None:
         raise typer.BadParameter("--mask is drawn in a picture: give --output, too")
     occupancy = load(name)
@@ -45,7 +48,7 @@ def show(
     content = _png(colours(occupancy, [load(each) for each in mask or ()], size=size))
     if output.suffix == ".svg":
         content = _svg(content).encode()
-    _write(output, content)
+    write_whole(output, content)
     typer.echo(str(output))
 
 
@@ -71,14 +74,3 @@ def _svg(png: bytes) -> str:
         f'viewBox="0 0 {width} {height}"><image width="{width}" height="{height}" '
         f'style="image-rendering:pixelated" href="data:image/png;base64,{data}"/></svg>\n'
     )
-
-
-def _write(output: Path, content: bytes) -> None:
-    from twin.errors import RecordingError
-    from twin.scenario.verdict import write_atomically
-
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(output, content)
-    except OSError as fault:
-        raise RecordingError(f"--output {output}: cannot be written: {fault.strerror}") from fault

@@ -35,7 +35,7 @@ def router(
 
     settings = RouterConfig(listen=tuple(listen or ()), connect=tuple(connect or ()), file=config)
     # Blocked and waited for: a handler that sets an Event can lock itself out while the Event is waited for.
-    ends = {signal.SIGINT, signal.SIGTERM}
+    ends = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     try:
         with run_router(settings) as running:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.errors import MapError
+from twin.files import replaced
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
 from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
@@ -136,7 +137,8 @@ class Slam:
         """
         if self.empty:
             raise MapError(f"{path}: there is no scan to save yet; valid is a call after the first one")
-        Path(path).write_bytes(self.to_bytes())
+        with replaced(Path(path)) as new:
+            new.write_bytes(self.to_bytes())
 
     @staticmethod
     def load(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError
+from twin.files import replaced
 from twin.navigation.maps.map_image import write_image
 from twin.navigation.maps.map_yaml import MODES, Mode
 from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
@@ -93,8 +94,10 @@ def save_map(occupancy: OccupancyMap, path: Path, parameters: SaveParameters | N
         f"free_thresh: {thresholds[1]}",
     )
     try:
-        write_image(image, gray, alpha)
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with replaced(image) as new:
+            write_image(new, gray, alpha)
+        with replaced(path) as new:
+            new.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as fault:
         raise MapError(f"the map {path} cannot be written: {fault.strerror or fault}") from fault
     return image
