@@ -6,6 +6,7 @@ import errno
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -17,6 +18,27 @@ _KINDS = {
 MOST_BYTES = 1 << 30
 
 
+def refusal(path: str | Path) -> str | None:
+    """Return why something is not to be opened: `it is a pipe, not a regular file`."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return None  # whoever opens it says what is wrong
+    return None if stat.S_ISREG(mode) else f"it is {_KINDS.get(stat.S_IFMT(mode), 'odd')}, not a regular file"
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a file for reading.
+
+    Raises:
+        OSError: It cannot be read, or is a folder, pipe, socket or device, which is told at once.
+    """
+    why = refusal(path)
+    if why is not None:
+        raise OSError(errno.EINVAL, why, str(path))
+    return path.open("rb")
+
+
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """Return the content of a file.
 
@@ -25,14 +47,9 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         most: The largest size [bytes].
 
     Raises:
-        OSError: It cannot be read, is larger, or is a folder, pipe, socket or device, which is told at once.
+        OSError: As by `open_file`, or it is larger.
     """
-    # Opening a pipe would wait for its other end.
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
-        mode = os.fstat(stream.fileno()).st_mode
-        if not stat.S_ISREG(mode):
-            kind = _KINDS.get(stat.S_IFMT(mode), "something else")
-            raise OSError(errno.EINVAL, f"it is {kind}; give a regular file", str(path))
+    with open_file(path) as stream:
         content = stream.read(most + 1)
     if len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most} bytes", str(path))

@@ -86,9 +86,10 @@ def _dae(points: Array, faces: Array, rng: np.random.Generator) -> bytes:
     return f"""<?xml version="1.0"?><COLLADA><library_geometries><geometry id="g"><mesh><source id="p">
 <float_array id="a">{" ".join(f"{x:.6g}" for x in points.ravel())} {unused}</float_array>
 <technique_common><accessor source="#a" count="{said}" stride="{stride}"/></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>{primitive}</mesh></geometry>
-</library_geometries><library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>""".encode()
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+{primitive}</mesh></geometry>
+</library_geometries><library_visual_scenes><visual_scene id="s">{nodes}</visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>""".encode()
 
 
 def _ascii_stl(points: Array, faces: Array) -> bytes:

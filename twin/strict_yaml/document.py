@@ -11,6 +11,7 @@ import yaml
 from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
+from twin.regular_file import read_text
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""
@@ -119,7 +120,7 @@ def read(path: Path, error: type[TwinError]) -> Document:
     """Read a file; faults of the YAML itself are raised as `error`."""
     document = Document(path)
     try:
-        node = _compose(path.read_text(encoding="utf-8"))
+        node = _compose(read_text(path))
     except OSError as fault:
         raise error(Problem(f"cannot read the file: {fault.strerror}", path)) from None
     except UnicodeDecodeError as fault:
