@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError, Problem
+from twin.regular_file import read_text
 
 PASSABLE = ".GS"
 """Ground, grass and swamp; trees (T), water (W) and what is out of bounds (@, O) are not."""
@@ -64,7 +65,7 @@ def read_grid_problems(path: Path) -> GridProblems:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_text(path)
     except OSError as error:
         raise MapError(f"{path} cannot be read ({error.strerror}); valid is {FORMATS}") from error
     except UnicodeDecodeError as error:

@@ -9,6 +9,8 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from twin.regular_file import read_text
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -117,7 +119,7 @@ class _Sources:
             return ""
         key = str(diagnostic.file)
         if key not in self._lines:
-            self._lines[key] = diagnostic.file.read_text("utf-8", errors="replace").splitlines()
+            self._lines[key] = read_text(diagnostic.file, errors="replace").splitlines()
         lines = self._lines[key]
         text = lines[diagnostic.line - 1].strip() if diagnostic.line <= len(lines) else ""
         return text if len(text) <= EXCERPT else ""

@@ -26,6 +26,7 @@ from twin.convert.tag_ledger import counts, tag_ledger
 from twin.errors import ConversionError, Problem
 from twin.models.checks import Diagnostic
 from twin.models.description import WORLD, RobotDescription
+from twin.regular_file import read_bytes
 
 MODEL, REPORT, ASSETS = "robot.xml", "report.json", "assets"
 
@@ -166,7 +167,7 @@ def _report(
     return {
         "robot": description.name,
         "source": description.source.name,
-        "sha256": hashlib.sha256(description.source.read_bytes()).hexdigest(),
+        "sha256": hashlib.sha256(read_bytes(description.source)).hexdigest(),
         "mujoco": mujoco.__version__,
         "base": "fixed" if conversion.root_joint is None else "free",
         "spawn_height": conversion.spawn_height,

@@ -9,9 +9,12 @@ from pathlib import Path
 from twin.models.mesh.mesh_formats import write_msh, write_stl
 from twin.models.mesh.meshes import TriangleMesh, read_mesh
 from twin.models.shapes import Mesh
+from twin.regular_file import read_bytes
 
 MOST_STL_FACES = 200_000
 """MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""
+MOST_FACE_BYTES = 1000
+"""Of a triangle, on average, in a file that stays as it is; an OBJ file may hold anything beside triangles."""
 _KEPT = {"stl": ".stl", "obj": ".obj", "msh": ".msh"}
 
 
@@ -34,8 +37,9 @@ def plain_stem(path: Path) -> str:
 @lru_cache(maxsize=128)
 def _content(path: Path, triangles: TriangleMesh) -> tuple[str, bytes]:
     few = len(triangles.faces) <= MOST_STL_FACES
-    if triangles.format in _KEPT and triangles.is_verbatim and (few or triangles.format != "stl"):
-        return _KEPT[triangles.format], path.read_bytes()
+    lean = path.stat().st_size <= MOST_FACE_BYTES * (len(triangles.faces) + 4)
+    if triangles.format in _KEPT and triangles.is_verbatim and lean and (few or triangles.format != "stl"):
+        return _KEPT[triangles.format], read_bytes(path)
     if few:
         return ".stl", write_stl(triangles.points, triangles.faces)
     return ".msh", write_msh(triangles.points, triangles.faces)

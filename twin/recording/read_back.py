@@ -17,6 +17,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from twin.errors import RecordingError, nearest
+from twin.regular_file import open_file
 
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""
@@ -84,7 +85,7 @@ def check_recording(path: Path) -> Path:
         RecordingError: There is no such file, or it is something else.
     """
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             magic = file.read(4)
     except OSError as error:
         raise RecordingError(

@@ -8,11 +8,12 @@ from pathlib import Path
 import yaml
 
 from twin.bridge.parameters import files
+from twin.regular_file import read_text
 
 
 def lines_of(path: Path) -> dict[tuple[str, str], int]:
     """Return the line of every value: (node, parameter) -> line."""
-    root = yaml.compose(path.read_text("utf-8"), Loader=yaml.SafeLoader)
+    root = yaml.compose(read_text(path), Loader=yaml.SafeLoader)
     return dict(_walk(root, "", None)) if root is not None else {}
 
 

@@ -13,6 +13,7 @@ from twin.navigation.mapping.slam import Mode
 from twin.navigation.mapping.storage import unpack
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig
+from twin.regular_file import read_bytes
 from twin.runtime.absent_parameters import Absent
 from twin.runtime.localisation_files import SLAM, differing, file_for
 from twin.runtime.nav2_file import Nav2Parameters
@@ -122,7 +123,7 @@ def _saved(file: Nav2Parameters, node: str, name: str) -> Path:
     plain = file.path.parent / name
     path = plain if plain.suffix == _SUFFIX else plain.with_name(plain.name + _SUFFIX)
     try:
-        unpack(path.read_bytes(), str(path))
+        unpack(read_bytes(path), str(path))
     except OSError as fault:
         file.wrong(node, "map_file_name", f"is {name}, but {path}: {fault.strerror}")
     except MapError as fault:

@@ -12,6 +12,7 @@ from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
 from twin.files import absence
+from twin.regular_file import read_text
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""
@@ -140,7 +141,7 @@ def read(path: Path, error: type[TwinError]) -> Document:
     """Read a file; faults of the YAML itself are raised as `error`."""
     document = Document(path)
     try:
-        node = _compose(path.read_text(encoding="utf-8"))
+        node = _compose(read_text(path))
     except OSError as fault:
         hint = absence(path) or f"cannot read the file: {fault.strerror}"
         raise error(Problem(hint, path)) from None

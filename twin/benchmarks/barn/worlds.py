@@ -11,6 +11,7 @@ from typing import Any
 
 from twin.errors import BenchmarkError, nearest
 from twin.geometry import Pose2
+from twin.regular_file import read_text
 
 FORMAT = "twin-barn/1"
 TOP_SPEED = 2.0
@@ -77,7 +78,7 @@ def load(path: Path) -> BarnSet:
         BenchmarkError: It cannot be read, is of another format, or a value is missing or impossible.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_text(path))
     except OSError as fault:
         raise BenchmarkError(f"{path}: {fault.strerror}") from fault
     except ValueError as fault:

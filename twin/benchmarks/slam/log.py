@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import zipfile
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 
 from twin.errors import MapError
 from twin.geometry import Array
+from twin.regular_file import read_bytes
 
 SPEED = 1.0
 """Of a robot whose log has no usable times [m/s]; faster than most of these drove."""
@@ -52,7 +54,7 @@ def load_log(path: Path) -> SlamLog:
         MapError: the file cannot be read or is no such archive.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
             centimetres = np.asarray(archive["ranges"], dtype=np.float64)
             columns = np.asarray(archive["t_odom_ref"], dtype=np.float64)
     except OSError as fault:

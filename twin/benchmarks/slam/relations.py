@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from twin.errors import MapError
 from twin.geometry import Array, wrap_angles
+from twin.regular_file import read_text
 
 APART = 60
 """So many scans lie at least between the two of a place seen again ..."""
@@ -56,7 +57,7 @@ def load_relations(path: Path, scans: int) -> Relations:
     """
     rows = []
     try:
-        lines = path.read_text("utf-8").splitlines()
+        lines = read_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as fault:
         raise MapError(
             f"{path}: cannot be read as text ({type(fault).__name__}); valid are relations"

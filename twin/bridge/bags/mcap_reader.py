@@ -25,6 +25,7 @@ from twin.bridge.bags.mcap_records import (
     Statistics,
 )
 from twin.errors import RecordingError
+from twin.regular_file import open_file
 
 _LARGEST_RECORD = 1 << 32
 
@@ -62,7 +63,7 @@ class McapReader:
         self._blocks: list[_Block] = []
         self._attachments: dict[str, tuple[int, int]] = {}
         try:
-            self._file: BinaryIO = path.open("rb")
+            self._file: BinaryIO = open_file(path)
             self._size = path.stat().st_size
         except OSError as fault:
             raise RecordingError(f"{path}: cannot be read: {fault.strerror}") from fault

@@ -14,6 +14,7 @@ import yaml
 from twin.bridge.bags import offered_qos
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.errors import RecordingError
+from twin.regular_file import read_text
 
 FILE = "metadata.yaml"
 VERSION = 9
@@ -166,7 +167,7 @@ def read(folder: Path) -> BagInfo:
     """
     path = folder / FILE
     try:
-        root = yaml.load(path.read_text("utf-8"), Loader=_LOADER)[_ROOT]
+        root = yaml.load(read_text(path), Loader=_LOADER)[_ROOT]
         return _info(root)
     except OSError as fault:
         raise RecordingError(f"{path}: cannot be read: {fault.strerror}") from fault

@@ -11,6 +11,7 @@ from twin.bridge.bags import metadata
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.sources import McapSource, Rosbag1Source, Rosbag2Source, Source
 from twin.errors import RecordingError, nearest
+from twin.regular_file import open_file
 
 _MAGIC = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V2.0\n": "rosbag1"}
 _FOREVER = 2**63 - 2
@@ -107,7 +108,7 @@ def _open_folder(path: Path) -> Source:
         source.notices.insert(0, f"{path}: has no {metadata.FILE}, its recorder was stopped")
         return source
     info = metadata.read(path)
-    missing = [name for name in info.files if not (path / name).exists()]
+    missing = [name for name in info.files if not (path / name).is_file()]
     if missing or not info.files:
         raise RecordingError(f"{path}: {', '.join(missing) or 'its file'} is missing")
     if info.storage not in ("mcap", "sqlite3"):
@@ -119,7 +120,7 @@ def _open_folder(path: Path) -> Source:
 
 def _kind(path: Path) -> str:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             head = file.read(16)
     except OSError as fault:
         raise RecordingError(f"{path}: cannot be read: {fault.strerror}") from fault

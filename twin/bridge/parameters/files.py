@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from twin.errors import BridgeError, Problem
+from twin.regular_file import read_text
 
 KEY = "ros__parameters"
 _TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
@@ -68,7 +69,7 @@ def read(path: Path) -> tuple[Section, ...]:
         BridgeError: it cannot be read, or is no parameter file; says in which line.
     """
     try:
-        text = path.read_text("utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8"
         raise BridgeError(f"the parameter file {path} cannot be read: {reason}") from error

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from twin.bridge.types.parser import SECTIONS, Definition
 from twin.errors import BridgeError, Problem
+from twin.regular_file import read_text
 
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
 _FILE = re.compile(r"[A-Za-z][A-Za-z0-9]*")
@@ -74,7 +75,7 @@ def _definitions(package: Path, problems: list[Problem]) -> Iterator[Definition]
             try:
                 if file.stat().st_size > _LARGEST:
                     raise ValueError("too large for a definition")
-                text = file.read_text(encoding="utf-8")
+                text = read_text(file, _LARGEST)
             except (OSError, ValueError) as error:
                 problems.append(Problem(f"cannot be read as UTF-8 text: {error}", file))
                 continue

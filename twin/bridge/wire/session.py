@@ -16,6 +16,7 @@ import zenoh
 from twin.bridge.wire import Wire
 from twin.bridge.wire.interrupts import from_zenoh
 from twin.errors import BridgeError
+from twin.regular_file import refusal
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 """rmw_zenoh's: 'key=value;key=value', values in JSON5 (zenoh_config.cpp)."""
@@ -125,6 +126,9 @@ def _zenoh_config(config: SessionConfig) -> zenoh.Config:
 
 
 def _from_file(file: Path) -> zenoh.Config:
+    why = refusal(file)
+    if why is not None:
+        raise BridgeError(f"{file}: not a Zenoh configuration: {why}")
     try:
         return zenoh.Config.from_file(str(file))
     except zenoh.ZError as error:

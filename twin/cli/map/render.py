@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.map.map_files import Format, told, yaml_path
+from twin.regular_file import read_text
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena
@@ -53,7 +54,7 @@ def _is_scenario(path: Path) -> bool:
     import yaml
 
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.safe_load(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError):
         return False  # whoever reads it next says what is wrong
     return isinstance(content, dict) and ("robots" in content or "world" in content)

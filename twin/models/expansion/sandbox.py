@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 from twin.models.urdf.packages import MANIFEST, Packages
+from twin.regular_file import refusal
 
 CPU_SECONDS = 15
 ADDRESS_SPACE_BYTES = 1 << 30
@@ -84,6 +85,9 @@ def close_the_door(packages: Packages) -> None:
                 raise Refused(f"the file writes '{name}', which a model file may not do")
             if not is_of_interpreter(os.path.realpath(name)):
                 refuse_outside(name, packages)
+            why = None if os.path.isdir(name) else refusal(name)
+            if why is not None:
+                raise Refused(f"the file opens '{name}': {why}")
         elif event.startswith(FORBIDDEN_EVENTS) and event not in HARMLESS_EVENTS:
             raise Refused(f"the file tries '{event}', which a model file may not do")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.parsers import expat
 
@@ -16,13 +16,13 @@ import numpy as np
 from lxml import etree
 
 from twin.geometry import Array
-from twin.models.mesh.dae_geometry import Part, read_geometry
-from twin.models.mesh.mesh_formats import Faces
+from twin.models.mesh.allowance import Allowance
+from twin.models.mesh.dae_geometry import GeometryReader, Part
+from twin.models.mesh.mesh_formats import MOST_FACES, Faces, too_many
 from twin.models.urdf.document import Element
 
-MOST_NODES = 10_000
-"""Nodes and instances that a scene may have once instances of instances are followed."""
-DEEPEST = 200
+MOST_TAGS = 300_000
+"""Start and end tags, comments and the like; as many attributes."""
 UP_AXES = {
     "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -51,7 +51,7 @@ class Collada:
     """`X_UP`, `Y_UP` or `Z_UP`."""
 
 
-def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
+def read_dae(data: bytes, *, apply_up_axis: bool) -> Collada:
     """Return what a COLLADA file shows.
 
     `<unit meter>` and the nodes' transforms are applied, and `<up_axis>` if it is there and wanted. RViz,
@@ -60,47 +60,60 @@ def read_dae(data: bytes, *, apply_up_axis: bool, most_faces: int) -> Collada:
     rely on that: TIAGo's and Baxter's meshes that say Y_UP fit their STL twins only unturned.
 
     Args:
-        data: The file.
+        data: The file, in UTF-8.
         apply_up_axis: Turn the mesh so that what it calls up becomes z.
-        most_faces: More triangles are an error.
 
     Raises:
-        ValueError: The file is broken, or has no triangles.
+        ValueError: The file is broken, has no triangles, or has more of something than is read.
     """
     root = _parse(data)
-    by_id = {element.get("id"): element for element in root.iter("{*}*") if element.get("id")}
-    parts: list[tuple[Part, Array]] = []
-    colours: list[Rgb | None] = []
+    by_id = {element.get("id"): element for element in root.xpath("//*[@id!='']")}
+    scene, colours = _Scene(by_id), _Colours(by_id)
+    placed: list[tuple[Part, Array]] = []
+    shades: list[Rgb | None] = []
     count = 0
-    for instance, transform in _instances(root, by_id):
-        geometry, bind = _geometry(instance, by_id)
-        for part in read_geometry(geometry, by_id):
+    for instance, transform in scene.instances(root):
+        geometry, bind = scene.geometry(instance)
+        for part in scene.reader.parts(geometry):
+            scene.allowance.take_piece()
             count += len(part.faces)
-            if count > most_faces:
-                raise ValueError(f"has more than {most_faces} triangles")
-            parts.append((part, transform @ bind))
-            colours += [_colour(instance, part.material, by_id)] * len(part.faces)
+            if count > MOST_FACES:
+                raise too_many()
+            placed.append((part, transform @ bind))
+            shades.append(colours.of(instance, part.material))
     if not count:
         raise ValueError("has no triangles in its scene")
-    points, faces = _joined(parts)
+    points, faces = _joined(placed)
     points *= _unit(root)
     up_axis = _up_axis(root)
     if apply_up_axis:
         points = points @ UP_AXES[up_axis].T
-    known = Counter(colour for colour in colours if colour is not None)
+    sizes = [len(part.faces) for part, _ in placed]
+    known: Counter[Rgb] = Counter()
+    for shade, size in zip(shades, sizes, strict=True):
+        if shade is not None:
+            known[shade] += size
     return Collada(
         points=points,
         faces=faces,
         colour=known.most_common(1)[0][0] if known else None,
-        face_colours=np.array([colour or NO_COLOUR for colour in colours]) if known else None,
+        face_colours=np.repeat([shade or NO_COLOUR for shade in shades], sizes, axis=0) if known else None,
         up_axis=up_axis,
     )
 
 
 def _parse(data: bytes) -> Element:
     _refuse_doctype(data)
+    for sign, noun in ((b"<", "tags"), (b"=", "attributes")):
+        if data.count(sign) > MOST_TAGS:
+            raise ValueError(f"has more than {MOST_TAGS} {noun}")
     parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, huge_tree=True
+        encoding="utf-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=True,
+        huge_tree=True,
     )
     try:
         root = etree.fromstring(data, parser)
@@ -156,31 +169,80 @@ def _target(element: Element, attribute: str, by_id: dict[str, Element]) -> Elem
     return target
 
 
-def _instances(root: Element, by_id: dict[str, Element]) -> Iterator[tuple[Element, Array]]:
-    """Yield the geometry and controller instances of the scene with their transforms."""
-    scene = root.find("{*}scene/{*}instance_visual_scene")
-    if scene is None:
-        raise ValueError("has no scene")
-    pending = [(node, np.eye(4), 0) for node in reversed(_children(_target(scene, "url", by_id), "node"))]
-    visited = 0
-    while pending:
-        node, T_scene_parent, depth = pending.pop()
-        visited += 1
-        if visited > MOST_NODES or depth > DEEPEST:
-            raise ValueError(f"has a scene of more than {MOST_NODES} nodes, or deeper than {DEEPEST}")
-        if not any(True for _ in node.iter(*(f"{{*}}{tag}" for tag in _INSTANCES))):
-            continue  # cameras and lights may have transforms that no mesh has
-        T_scene_node = T_scene_parent @ _transform(node)
-        below: list[Element] = []
-        for child in node:
-            tag = _tag(child)
-            if tag in ("instance_geometry", "instance_controller"):
-                yield child, T_scene_node
-            elif tag == "instance_node":
-                below.append(_target(child, "url", by_id))
-            elif tag == "node":
-                below.append(child)
-        pending += [(child, T_scene_node, depth + 1) for child in reversed(below)]
+class _Scene:
+    """Goes through the nodes of a scene; what instances repeat is read once."""
+
+    def __init__(self, by_id: dict[str, Element]) -> None:
+        self._by_id = by_id
+        self._nodes: dict[Element, _Node] = {}
+        self._bound: dict[Element, tuple[Element, Array]] = {}
+        self.allowance = Allowance()
+        self.reader = GeometryReader(by_id, self.allowance)
+
+    def instances(self, root: Element) -> Iterator[tuple[Element, Array]]:
+        """Yield the geometry and controller instances of the scene with their transforms."""
+        scene = root.find("{*}scene/{*}instance_visual_scene")
+        if scene is None:
+            raise ValueError("has no scene")
+        showing = _showing(root)
+        top = _target(scene, "url", self._by_id)
+        pending = [(node, np.eye(4)) for node in reversed(_children(top, "node"))]
+        while pending:
+            element, T_scene_parent = pending.pop()
+            if element not in showing:
+                continue  # cameras and lights may have transforms that no mesh has
+            node = self._node(element)
+            T_scene_node = T_scene_parent @ node.transform
+            for instance in node.instances:
+                self.allowance.take_piece()
+                yield instance, T_scene_node
+            for child in reversed(node.below):
+                self.allowance.take_piece()
+                pending.append((child, T_scene_node))
+
+    def _node(self, element: Element) -> _Node:
+        if element not in self._nodes:
+            below = [
+                _target(child, "url", self._by_id) if _tag(child) == "instance_node" else child
+                for child in element
+                if _tag(child) in ("node", "instance_node")
+            ]
+            instances = [child for child in element if _tag(child) in _INSTANCES[:2]]
+            transform = _transform(element, self.allowance)
+            self._nodes[element] = _Node(transform=transform, instances=instances, below=below)
+        return self._nodes[element]
+
+    def geometry(self, instance: Element) -> tuple[Element, Array]:
+        """Return the geometry of an instance, and for a skin the pose in which it is bound."""
+        target = _target(instance, "url", self._by_id)
+        if _tag(target) != "controller":
+            return target, np.eye(4)
+        if target not in self._bound:
+            skin = target.find("{*}skin")
+            if skin is None:
+                raise ValueError("has a controller that is no skin")
+            bind = skin.findtext("{*}bind_shape_matrix")
+            matrix = np.eye(4) if bind is None else self.allowance.numbers(bind, np.float64).reshape(4, 4)
+            self._bound[target] = _target(skin, "source", self._by_id), matrix
+        return self._bound[target]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Node:
+    transform: Array
+    instances: Sequence[Element]
+    below: Sequence[Element]
+
+
+def _showing(root: Element) -> set[Element]:
+    """Return all elements with an instance in them."""
+    showing: set[Element] = set()
+    for instance in root.iter(*(f"{{*}}{tag}" for tag in _INSTANCES)):
+        above = instance
+        while above is not None and above not in showing:
+            showing.add(above)
+            above = above.getparent()
+    return showing
 
 
 def _tag(element: Element) -> str:
@@ -191,12 +253,13 @@ def _children(element: Element, tag: str) -> list[Element]:
     return [child for child in element if _tag(child) == tag]
 
 
-def _transform(node: Element) -> Array:
+def _transform(node: Element, allowance: Allowance) -> Array:
     matrix = np.eye(4)
     for child in node:
         tag = _tag(child)
         if tag in ("matrix", "translate", "rotate", "scale"):
-            matrix = matrix @ _step(tag, np.array((child.text or "").split(), dtype=np.float64))
+            allowance.take_piece()
+            matrix = matrix @ _step(tag, allowance.numbers(child.text, np.float64))
         elif tag in ("lookat", "skew"):
             raise ValueError(f"places a mesh by <{tag}>, which is not read; apply transforms when exporting")
     return matrix
@@ -219,19 +282,6 @@ def _step(tag: str, values: Array) -> Array:
     return matrix
 
 
-def _geometry(instance: Element, by_id: dict[str, Element]) -> tuple[Element, Array]:
-    """Return the geometry of an instance, and for a skin the pose in which it is bound."""
-    target = _target(instance, "url", by_id)
-    if _tag(target) != "controller":
-        return target, np.eye(4)
-    skin = target.find("{*}skin")
-    if skin is None:
-        raise ValueError("has a controller that is no skin")
-    bind = skin.findtext("{*}bind_shape_matrix")
-    matrix = np.eye(4) if bind is None else np.array(bind.split(), dtype=np.float64).reshape(4, 4)
-    return _target(skin, "source", by_id), matrix
-
-
 def _joined(parts: list[tuple[Part, Array]]) -> tuple[Array, Faces]:
     points, faces, count = [], [], 0
     for part, transform in parts:
@@ -242,17 +292,30 @@ def _joined(parts: list[tuple[Part, Array]]) -> tuple[Array, Faces]:
     return np.concatenate(points), np.concatenate(faces)
 
 
-def _colour(instance: Element, symbol: str, by_id: dict[str, Element]) -> Rgb | None:
-    """Return the diffuse colour of a part; None without one, with a texture, or if a reference is broken."""
-    bound = [
-        use.get("target", "") for use in instance.iter("{*}instance_material") if use.get("symbol") == symbol
-    ]
-    material = by_id.get((bound[0] if bound else symbol).removeprefix("#"))
-    use = None if material is None else material.find("{*}instance_effect")
-    effect = None if use is None else by_id.get(use.get("url", "").removeprefix("#"))
-    text = None if effect is None else effect.findtext(".//{*}technique/*/{*}diffuse/{*}color")
-    try:
-        r, g, b = (min(1.0, max(0.0, float(word))) for word in (text or "").split()[:3])
-    except ValueError:
-        return None
-    return (r, g, b)
+class _Colours:
+    """Finds the diffuse colours of materials, each once."""
+
+    def __init__(self, by_id: dict[str, Element]) -> None:
+        self._by_id = by_id
+        self._targets: dict[Element, dict[str | None, str]] = {}
+        self._found: dict[str, Rgb | None] = {}
+
+    def of(self, instance: Element, symbol: str) -> Rgb | None:
+        """Return a part's colour; None without one, with a texture, or if a reference is broken."""
+        if instance not in self._targets:
+            uses = reversed(list(instance.iter("{*}instance_material")))  # the first one of a symbol counts
+            self._targets[instance] = {use.get("symbol"): use.get("target", "") for use in uses}
+        material = self._targets[instance].get(symbol, symbol).removeprefix("#")
+        if material not in self._found:
+            self._found[material] = self._diffuse(self._by_id.get(material))
+        return self._found[material]
+
+    def _diffuse(self, material: Element | None) -> Rgb | None:
+        use = None if material is None else material.find("{*}instance_effect")
+        effect = None if use is None else self._by_id.get(use.get("url", "").removeprefix("#"))
+        text = None if effect is None else effect.findtext(".//{*}technique/*/{*}diffuse/{*}color")
+        try:
+            r, g, b = (min(1.0, max(0.0, float(word))) for word in (text or "").split(None, 3)[:3])
+        except ValueError:
+            return None
+        return (r, g, b)

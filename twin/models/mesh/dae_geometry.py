@@ -9,7 +9,8 @@ import numpy as np
 from lxml import etree
 
 from twin.geometry import Array
-from twin.models.mesh.mesh_formats import Faces
+from twin.models.mesh.allowance import Allowance
+from twin.models.mesh.mesh_formats import MOST_FACES, Faces, too_many
 from twin.models.urdf.document import Element
 
 
@@ -25,38 +26,88 @@ class Part:
     """The symbol that an instance binds to a material."""
 
 
-def read_geometry(geometry: Element, by_id: dict[str, Element]) -> Iterator[Part]:
-    """Yield the parts of a `<geometry>`; lines are left out, other polygons become fans.
+class GeometryReader:
+    """Reads the geometries of one file, everything in it once, however often it is referred to."""
 
-    Raises:
-        ValueError: Something refers to what is not there.
-    """
-    for primitive in geometry.iterfind("{*}mesh/*"):
-        if not isinstance(primitive.tag, str):
-            continue
-        read = _PRIMITIVES.get(etree.QName(primitive).localname)
-        if read is None:
-            continue
-        offset, stride, points = _inputs(primitive, by_id)
-        faces = read(primitive, offset, stride)
-        if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
-            raise ValueError(f"has triangles between points 0 to {faces.max()}, of {len(points)}")
-        yield Part(points=points, faces=faces, material=primitive.get("material", ""))
+    def __init__(self, by_id: dict[str, Element], allowance: Allowance) -> None:
+        self._by_id = by_id
+        self._allowance = allowance
+        self._parts: dict[Element, tuple[Part, ...]] = {}
+        self._positions: dict[Element, Array] = {}
+        self._sources: dict[Element, Array] = {}
 
+    def parts(self, geometry: Element) -> tuple[Part, ...]:
+        """Return the parts of a `<geometry>`; lines are left out, other polygons become fans.
 
-def _inputs(primitive: Element, by_id: dict[str, Element]) -> tuple[int, int, Array]:
-    """Return where in a tuple of indices the point's stands, how long the tuple is, and the points."""
-    offset, stride, points = None, 1, np.zeros((0, 3))
-    for entry in primitive.iterfind("{*}input"):
-        place = int(entry.get("offset", "0"))
-        if not 0 <= place < 64:
-            raise ValueError(f"has an input at offset {place}")
-        stride = max(stride, place + 1)
-        if entry.get("semantic") == "VERTEX":
-            offset, points = place, _positions(_referred(entry, by_id), by_id)
-    if offset is None:
-        raise ValueError("has triangles without an input VERTEX")
-    return offset, stride, points
+        Raises:
+            ValueError: Something refers to what is not there, or there is more than is read.
+        """
+        if geometry not in self._parts:
+            self._parts[geometry] = tuple(self._read(geometry))
+        return self._parts[geometry]
+
+    def _read(self, geometry: Element) -> Iterator[Part]:
+        for primitive in geometry.iterfind("{*}mesh/*"):
+            read = (
+                _PRIMITIVES.get(etree.QName(primitive).localname) if isinstance(primitive.tag, str) else None
+            )
+            if read is None:
+                continue
+            self._allowance.take_piece()
+            offset, stride, points = self._inputs(primitive)
+            faces = read(primitive, offset, stride, self._allowance)
+            if not len(faces):
+                continue
+            if not 0 <= faces.min() <= faces.max() < len(points):
+                raise ValueError(f"has triangles between points 0 to {faces.max()}, of {len(points)}")
+            used, faces = np.unique(faces, return_inverse=True)
+            yield Part(
+                points=points[used], faces=faces.reshape(-1, 3), material=primitive.get("material", "")
+            )
+
+    def _inputs(self, primitive: Element) -> tuple[int, int, Array]:
+        """Return where in a tuple of indices the point's stands, how long the tuple is, and the points."""
+        offset, stride, points = None, 1, np.zeros((0, 3))
+        for entry in primitive.iterfind("{*}input"):
+            place = int(entry.get("offset", "0"))
+            if not 0 <= place < 64:
+                raise ValueError(f"has an input at offset {place}")
+            stride = max(stride, place + 1)
+            if entry.get("semantic") == "VERTEX":
+                offset, points = place, self._vertices(_referred(entry, self._by_id))
+        if offset is None:
+            raise ValueError("has triangles without an input VERTEX")
+        return offset, stride, points
+
+    def _vertices(self, vertices: Element) -> Array:
+        if vertices not in self._positions:
+            position = next(
+                (entry for entry in vertices.iterfind("{*}input") if entry.get("semantic") == "POSITION"),
+                None,
+            )
+            if position is None:
+                raise ValueError("has vertices without an input POSITION")
+            source = _referred(position, self._by_id)
+            if source not in self._sources:
+                self._sources[source] = self._source(source)
+            self._positions[vertices] = self._sources[source]
+        return self._positions[vertices]
+
+    def _source(self, source: Element) -> Array:
+        accessor = source.find("{*}technique_common/{*}accessor")
+        if accessor is None:
+            raise ValueError("has points without an accessor")
+        values = self._allowance.numbers(_referred(accessor, self._by_id).text, np.float64)
+        stride, offset = int(accessor.get("stride", "1")), int(accessor.get("offset", "0"))
+        # A parameter without a name is skipped.
+        named = [i for i, parameter in enumerate(accessor.iterfind("{*}param")) if parameter.get("name")]
+        columns = named[:3] if len(named) >= 3 else [0, 1, 2]
+        if stride <= max(columns) or offset < 0:
+            raise ValueError(f"has points of {stride} coordinates")
+        count = min(int(accessor.get("count", "0")), max(0, len(values) - offset) // stride)
+        if count <= 0:
+            return np.zeros((0, 3))
+        return values[offset : offset + count * stride].reshape(-1, stride)[:, columns]
 
 
 def _referred(element: Element, by_id: dict[str, Element]) -> Element:
@@ -66,76 +117,61 @@ def _referred(element: Element, by_id: dict[str, Element]) -> Element:
     return target
 
 
-def _positions(vertices: Element, by_id: dict[str, Element]) -> Array:
-    for entry in vertices.iterfind("{*}input"):
-        if entry.get("semantic") == "POSITION":
-            return _source(_referred(entry, by_id), by_id)
-    raise ValueError("has vertices without an input POSITION")
-
-
-def _source(source: Element, by_id: dict[str, Element]) -> Array:
-    accessor = source.find("{*}technique_common/{*}accessor")
-    if accessor is None:
-        raise ValueError("has points without an accessor")
-    values = np.array((_referred(accessor, by_id).text or "").split(), dtype=np.float64)
-    stride, offset = int(accessor.get("stride", "1")), int(accessor.get("offset", "0"))
-    # A parameter without a name is skipped.
-    named = [i for i, parameter in enumerate(accessor.iterfind("{*}param")) if parameter.get("name")]
-    columns = named[:3] if len(named) >= 3 else [0, 1, 2]
-    if stride <= max(columns) or offset < 0:
-        raise ValueError(f"has points of {stride} coordinates")
-    count = min(int(accessor.get("count", "0")), max(0, len(values) - offset) // stride)
-    return values[offset : offset + max(0, count) * stride].reshape(-1, stride)[:, columns]
-
-
-def _indices(element: Element | None, offset: int, stride: int) -> Faces:
-    text = "" if element is None else element.text or ""
-    values = np.array(text.split(), dtype=np.int64)
+def _indices(element: Element | None, offset: int, stride: int, allowance: Allowance) -> Faces:
+    values = allowance.numbers(None if element is None else element.text, np.int64)
     if len(values) % stride:
         raise ValueError(f"has {len(values)} indices, no multiple of {stride}")
     return values[offset::stride]
+
+
+def _loops(primitive: Element, offset: int, stride: int, allowance: Allowance) -> tuple[Faces, Faces]:
+    """Return the corners of all `<p>` one after the other, and how many each has."""
+    loops = [
+        np.zeros(0, np.int64),
+        *(_indices(loop, offset, stride, allowance) for loop in primitive.iter("{*}p")),
+    ]
+    return np.concatenate(loops), np.array([len(loop) for loop in loops])
+
+
+def _runs(counts: Faces) -> tuple[Faces, Faces]:
+    """Return for each triangle of polygons or strips, one after the other, start and its number there."""
+    triangles = np.maximum(counts - 2, 0)
+    if len(counts) > MOST_FACES or triangles.sum() > MOST_FACES:
+        raise too_many()
+    first = np.repeat(np.cumsum(counts) - counts, triangles)
+    return first, np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
 
 
 def _fans(corners: Faces, counts: Faces) -> Faces:
     """Return polygons as fans of triangles; those of less than three corners have none."""
     if np.any(counts < 0) or np.any(counts > len(corners)) or counts.sum() != len(corners):
         raise ValueError(f"has polygons of {counts.sum()} corners in all, and indices for {len(corners)}")
-    starts = np.cumsum(counts) - counts
-    triangles = np.maximum(counts - 2, 0)
-    first = np.repeat(starts, triangles)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    first, step = _runs(counts)
     return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
-def _triangles(primitive: Element, offset: int, stride: int) -> Faces:
-    corners = _indices(primitive.find("{*}p"), offset, stride)
+def _triangles(primitive: Element, offset: int, stride: int, allowance: Allowance) -> Faces:
+    corners = _indices(primitive.find("{*}p"), offset, stride, allowance)
     if len(corners) % 3:
         raise ValueError(f"has triangles of {len(corners)} corners in all")
     return corners.reshape(-1, 3)
 
 
-def _polylist(primitive: Element, offset: int, stride: int) -> Faces:
-    counts = np.array((primitive.findtext("{*}vcount") or "").split(), dtype=np.int64)
-    return _fans(_indices(primitive.find("{*}p"), offset, stride), counts)
+def _polylist(primitive: Element, offset: int, stride: int, allowance: Allowance) -> Faces:
+    counts = allowance.numbers(primitive.findtext("{*}vcount"), np.int64)
+    return _fans(_indices(primitive.find("{*}p"), offset, stride, allowance), counts)
 
 
-def _each(primitive: Element, offset: int, stride: int) -> list[Faces]:
-    return [_indices(loop, offset, stride) for loop in primitive.iter("{*}p")]
+def _polygons(primitive: Element, offset: int, stride: int, allowance: Allowance) -> Faces:
+    return _fans(*_loops(primitive, offset, stride, allowance))
 
 
-def _polygons(primitive: Element, offset: int, stride: int) -> Faces:
-    loops = [np.zeros(0, dtype=np.int64), *_each(primitive, offset, stride)]
-    return _fans(np.concatenate(loops), np.array([len(loop) for loop in loops]))
-
-
-def _strips(primitive: Element, offset: int, stride: int) -> Faces:
-    faces = [np.zeros((0, 3), dtype=np.int64)]
-    for strip in _each(primitive, offset, stride):
-        if len(strip) >= 3:
-            triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
-            triangles[1::2] = triangles[1::2, ::-1]  # every other one is wound the other way
-            faces.append(triangles)
-    return np.concatenate(faces)
+def _strips(primitive: Element, offset: int, stride: int, allowance: Allowance) -> Faces:
+    corners, counts = _loops(primitive, offset, stride, allowance)
+    first, step = _runs(counts)
+    faces = corners[np.stack([first + step, first + step + 1, first + step + 2], axis=1)]
+    faces[step % 2 == 1] = faces[step % 2 == 1, ::-1]  # every other one is wound the other way
+    return faces
 
 
 _PRIMITIVES = {

@@ -6,7 +6,8 @@ Formats: STL as of 3D Systems (1989), Wavefront OBJ, MSH as in MuJoCo's XML refe
 from __future__ import annotations
 
 import re
-from itertools import pairwise
+from array import array
+from itertools import islice, pairwise
 from typing import Literal
 
 import numpy as np
@@ -21,7 +22,10 @@ READABLE = "STL, OBJ and COLLADA (.dae)"
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 STL_HEADER = 84
 MOST_FACES = 500_000
+MOST_POINTS = 3 * MOST_FACES
 _SNIFFED = 4096
+_BATCH = 10_000
+_SHOWN = 60
 _OTHERS = {
     b"glTF": "glTF, of which RViz and Gazebo disagree which axis is up",
     b"ply": "PLY",
@@ -30,7 +34,11 @@ _OTHERS = {
     b"version https://git-lfs": "a Git LFS pointer: the mesh itself was not fetched",
 }
 _OTHER_SUFFIXES = {".mesh": "an Ogre mesh", ".gltf": _OTHERS[b"glTF"]}
-_VERTEX = re.compile(rb"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", re.IGNORECASE | re.MULTILINE)
+# Blanks before a word may not reach over lines: every line would then be tried from every blank one above.
+_VERTEX = re.compile(rb"^[ \t\r\f\v]*+vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", re.IGNORECASE | re.MULTILINE)
+_ENDFACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+_OBJ_POINT = re.compile(rb"^[ \t\r\f\v]*+v\s", re.MULTILINE)
+_OBJ_LINE = re.compile(rb"^[ \t\f\v]*+([vf])(?!\S)([^\n]*)", re.MULTILINE)
 
 
 def format_of(data: bytes, suffix: str) -> Format:
@@ -59,7 +67,7 @@ def format_of(data: bytes, suffix: str) -> Format:
         return "msh"
     if suffix in _OTHER_SUFFIXES:
         raise ValueError(f"is {_OTHER_SUFFIXES[suffix]}; {READABLE} are read")
-    if b"\0" not in start and re.search(rb"^\s*v\s", data, re.MULTILINE):
+    if b"\0" not in start and _OBJ_POINT.search(data):
         return "obj"
     if suffix == ".stl":
         return "stl"
@@ -92,12 +100,22 @@ def read_ascii_stl(data: bytes) -> tuple[Array, Faces]:
     Raises:
         ValueError: The file ends early or holds no numbers.
     """
-    corners = np.array(_VERTEX.findall(data)).astype(np.float64)
-    facets = len(re.findall(rb"\bendfacet\b", data, re.IGNORECASE))
+    matches = _VERTEX.finditer(data)
+    values = array("d")
+    while batch := [float(word) for match in islice(matches, _BATCH) for word in match.groups()]:
+        values.extend(batch)
+        if len(values) > 3 * MOST_POINTS:
+            raise too_many()
+    facets = sum(1 for _ in islice(_ENDFACET.finditer(data), MOST_FACES + 1))
     whole = re.search(rb"\bendsolid\b", data[-_SNIFFED:], re.IGNORECASE)
-    if not len(corners) or len(corners) != 3 * facets or not whole:
-        raise ValueError(f"is no whole STL file: {facets} complete triangles, {len(corners)} corners")
-    return _loose(corners)
+    if not values or len(values) != 9 * facets or not whole:
+        raise ValueError(f"is no whole STL file: {facets} complete triangles, {len(values) // 3} corners")
+    return _loose(np.array(values))
+
+
+def too_many() -> ValueError:
+    """Return the fault of a file with more than is read."""
+    return ValueError(f"has more than {MOST_FACES} triangles, or corners for more")
 
 
 def _loose(corners: Array) -> tuple[Array, Faces]:
@@ -111,34 +129,36 @@ def read_obj(data: bytes) -> tuple[Array, Faces]:
     Raises:
         ValueError: A line is broken.
     """
-    points: list[list[bytes]] = []
-    faces: list[tuple[int, int, int]] = []
-    for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), 1):
-        words = line.split()
-        if not words:
-            continue
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b"\\\n" in data:
+        data = data.replace(b"\\\n", b" ")
+    points, faces, polygons = array("d"), array("q"), 0
+    for match in _OBJ_LINE.finditer(data):
+        kind, rest = match.groups()
+        words = rest.split(None, 3 if kind == b"v" else MOST_FACES + 2)
         try:
-            if words[0] == b"v":
-                x, y, z = words[1:4]
-                points.append([x, y, z])
-            elif words[0] == b"f":
-                first, *others = [_obj_index(word, len(points)) for word in words[1:]]
-                faces += [(first, *pair) for pair in pairwise(others)]
+            if kind == b"v":
+                x, y, z = words[:3]
+                points.extend((float(x), float(y), float(z)))
+            else:
+                polygons += 1
+                first, *others = [_obj_index(word, len(points) // 3) for word in words[: MOST_FACES + 2]]
+                for pair in pairwise(others):
+                    faces.extend((first, *pair))
         except ValueError:
-            shown = line.decode(errors="replace").strip()[:60]
-            raise ValueError(f"has a broken line {number}: '{shown}'") from None
-        if len(faces) > MOST_FACES or len(points) > 3 * MOST_FACES:
-            raise ValueError(f"has more than {MOST_FACES} triangles, or corners for more")
-    return (
-        np.array(points).astype(np.float64).reshape(-1, 3),
-        np.array(faces, dtype=np.int64).reshape(-1, 3),
-    )
+            line = data.count(b"\n", 0, match.start()) + 1
+            shown = match[0][: 4 * _SHOWN].decode(errors="replace").strip()[:_SHOWN]
+            raise ValueError(f"has a broken line {line}: '{shown}'") from None
+        if max(polygons, len(words) - 2, len(faces) // 3) > MOST_FACES or len(points) > 3 * MOST_POINTS:
+            raise too_many()
+    return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 
 
 def _obj_index(word: bytes, count: int) -> int:
     """Return the index from 0 of a corner as `3`, `3/1`, `3//2` or, counted from the end, `-1`."""
     index = int(word.partition(b"/")[0])
-    if abs(index) > 3 * MOST_FACES:
+    if abs(index) > MOST_POINTS:
         raise ValueError(f"{index} is out of range")
     return index - 1 if index > 0 else count + index
 

@@ -23,8 +23,13 @@ from twin.models.mesh.mesh_formats import (
     read_stl,
 )
 from twin.models.shapes import Collision, Mesh, Visual
+from twin.models.urdf.xml_text import as_utf8
+from twin.regular_file import read_bytes
 
-MOST_BYTES = 256 * 1024 * 1024
+MOST_BYTES = 64 * 1024 * 1024
+"""500 000 triangles as binary STL have 25 MB."""
+LONGEST_FAULT = 200
+"""Characters of what is wrong with a file: it may quote the file."""
 FARTHEST = 1e6
 """Largest coordinate [m], in the file and scaled; MuJoCo keeps meshes in single precision."""
 FLAT = 1e-6
@@ -64,8 +69,6 @@ def read_mesh(path: Path, *, apply_up_axis: bool = True) -> TriangleMesh:
         status = path.stat()
     except OSError as error:
         raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
-    if not path.is_file():
-        raise _fault(path, "is no file", code="mesh-format")
     if status.st_size > MOST_BYTES:
         raise _fault(path, f"has {status.st_size} bytes; at most {MOST_BYTES} are read", code="bad-mesh")
     return _read(path, apply_up_axis, status.st_mtime_ns, status.st_size)
@@ -78,14 +81,16 @@ def _fault(path: Path, message: str, *, code: str) -> ModelError:
 @lru_cache(maxsize=128)
 def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> TriangleMesh:
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, MOST_BYTES)
         kind = format_of(data, path.suffix.lower())
         with np.errstate(over="ignore", invalid="ignore"):
-            read = _parse(data, kind, apply_up_axis)
+            read = _parse(as_utf8(data, path) if kind == "dae" else data, kind, apply_up_axis)
     except OSError as error:
         raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
     except (ValueError, OverflowError, RecursionError, MemoryError) as error:
-        raise _fault(path, " ".join(str(error).split()) or "is too complex", code="mesh-format") from None
+        said = " ".join(str(error)[: 2 * LONGEST_FAULT].split()) or "is too complex"
+        shown = said if len(said) <= LONGEST_FAULT else f"{said[:LONGEST_FAULT]}…"
+        raise _fault(path, shown, code="mesh-format") from None
     flaw = _flaw(read.points, read.faces)
     if flaw:
         raise _fault(path, flaw, code="bad-mesh")
@@ -97,7 +102,7 @@ def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> Tria
 
 def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> TriangleMesh:
     if kind == "dae":
-        collada = read_dae(data, apply_up_axis=apply_up_axis, most_faces=MOST_FACES)
+        collada = read_dae(data, apply_up_axis=apply_up_axis)
         return TriangleMesh(format=kind, **vars(collada))
     readers = {"stl": read_stl, "ascii-stl": read_ascii_stl, "obj": read_obj, "msh": read_msh}
     points, faces = readers[kind](data)
@@ -117,10 +122,16 @@ def _flaw(points: Array, faces: Faces) -> str | None:
     largest = float(np.max(np.abs(used)))
     if largest > FARTHEST:
         return f"reaches {largest:.3g} m far; at most {FARTHEST:g} m are read"
-    # Four different points are mostly among the first ones; sorting all takes long.
-    if not any(len(np.unique(some.astype(np.float32), axis=0)) >= 4 for some in (used[:64], used)):
+    if _are_few(used[:64]) and _are_few(used):  # four different points are mostly among the first ones
         return "has less than four different points"
     return None
+
+
+def _are_few(points: Array) -> bool:
+    others = points.astype(np.float32)
+    for _ in range(3):
+        others = others[np.any(others != others[:1], axis=1)]
+    return not len(others)
 
 
 def mesh_faults(description: RobotDescription, *, visuals: bool = True) -> tuple[Problem, ...]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from twin.errors import ModelError, Problem
+from twin.regular_file import read_bytes
 
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ELEMENTS = 200_000
@@ -48,7 +49,7 @@ def read_utf8(source: Path) -> bytes:
                 source,
                 code="too-large",
             )
-        raw = source.read_bytes()
+        raw = read_bytes(source, MAX_BYTES)
     except OSError as error:
         raise _fault(f"cannot be read: {error.strerror}; give a file", source, code="no-file") from None
     return as_utf8(raw, source)
@@ -61,6 +62,8 @@ def as_utf8(raw: bytes, source: Path) -> bytes:
         ModelError: It is not text in the encoding that it declares.
     """
     encoding, body = _encoding(raw, source)
+    if encoding == "utf-8" and body.isascii() and b"\0" not in body:
+        return body
     try:
         text = body.decode(encoding)
     except UnicodeDecodeError as error:

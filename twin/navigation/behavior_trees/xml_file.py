@@ -8,6 +8,7 @@ from pathlib import Path
 from lxml import etree
 
 from twin.errors import Problem
+from twin.regular_file import read_bytes
 
 _EXPLICIT = ("Action", "Condition", "Control", "Decorator", "SubTree", "SubTreePlus")
 
@@ -57,7 +58,7 @@ def read_file(path: Path) -> TreeFile:
 def _read(path: Path, found: TreeFile, around: tuple[Path, ...], included_at: Problem | None = None) -> None:
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
     try:
-        root = etree.fromstring(path.read_bytes(), parser)
+        root = etree.fromstring(read_bytes(path), parser)
     except OSError as error:
         said = f"cannot be read: {error.strerror or error}"
         if included_at is not None:

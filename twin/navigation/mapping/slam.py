@@ -25,6 +25,7 @@ from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
 from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.regular_file import read_bytes
 
 __all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
 
@@ -154,7 +155,7 @@ class Slam:
             MapError: the file cannot be read, or is not a saved pose graph.
         """
         try:
-            data = Path(path).read_bytes()
+            data = read_bytes(Path(path))
         except OSError as fault:
             raise MapError(
                 f"{path}: {fault.strerror or fault}; valid is a file that SLAM has saved"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError, Problem
+from twin.regular_file import read_bytes
 
 
 def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
@@ -16,7 +18,7 @@ def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
     Raises:
         MapError: the file is no image, or its format needs pillow and pillow is missing.
     """
-    content = path.read_bytes()
+    content = read_bytes(path)
     if content[:2] in (b"P5", b"P2"):
         return _read_pgm(path, content), None
     try:
@@ -25,7 +27,7 @@ def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
         message = f"{path.suffix or 'this'} images need pillow; valid is `pip install pillow` or a PGM image"
         raise MapError(Problem(message, path)) from error
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(content)) as image:
             has_alpha = "A" in image.getbands() or "transparency" in image.info
             if image.mode.startswith(("I", "F")):  # 16 bits per pixel, which pillow does not scale by itself
                 return np.rint(np.clip(np.asarray(image, dtype=np.float64), 0, 65535) / 257.0).astype(

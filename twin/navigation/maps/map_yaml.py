@@ -13,6 +13,7 @@ import yaml
 
 from twin.errors import MapError, Problem
 from twin.geometry import Pose2
+from twin.regular_file import read_text
 
 Mode = Literal["trinary", "scale", "raw"]
 
@@ -82,7 +83,7 @@ class _MetadataReader:
 
     def _parse(self) -> None:
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_text(self.path)
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise MapError(f"map file {self.path} cannot be read ({reason}); valid is a YAML file") from error

@@ -1,0 +1,67 @@
+"""Reading files that users name: nothing that never ends, and nothing that waits for somebody to write."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+MOST_BYTES = 1 << 30
+
+
+def refusal(path: str | Path) -> str | None:
+    """Return why something is not to be opened: `it is a pipe, not a regular file`."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return None  # whoever opens it says what is wrong
+    return None if stat.S_ISREG(mode) else f"it is {_KINDS.get(stat.S_IFMT(mode), 'odd')}, not a regular file"
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a file for reading.
+
+    Raises:
+        OSError: It cannot be read, or is a folder, pipe, socket or device, which is told at once.
+    """
+    why = refusal(path)
+    if why is not None:
+        raise OSError(errno.EINVAL, why, str(path))
+    return path.open("rb")
+
+
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """Return the content of a file.
+
+    Args:
+        path: The file.
+        most: The largest size [bytes].
+
+    Raises:
+        OSError: As by `open_file`, or it is larger.
+    """
+    with open_file(path) as stream:
+        content = stream.read(most + 1)
+    if len(content) > most:
+        raise OSError(errno.EFBIG, f"it has more than {most} bytes", str(path))
+    return content
+
+
+def read_text(path: Path, most: int = MOST_BYTES, *, errors: str = "strict") -> str:
+    """Return the content of a UTF-8 file, with line feeds as ends of lines; see `read_bytes`.
+
+    Raises:
+        OSError: As by `read_bytes`.
+        UnicodeDecodeError: It is not UTF-8.
+    """
+    text = read_bytes(path, most).decode("utf-8", errors)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
