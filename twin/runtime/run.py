@@ -17,6 +17,7 @@ from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError, ScenarioError
 from twin.recording.digest import RunDigest
+from twin.runtime import derive
 from twin.runtime.build import Parts, build
 from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
@@ -216,7 +217,8 @@ def run(
         if simulation.lockstep is not None:
             ending.callback(simulation.lockstep.close)
         if sink is not None:
-            sink.declare(parts.world)
+            wheels = {name: derive.wheels(stack.handle.description) for name, stack in parts.stacks.items()}
+            sink.declare(parts.world, wheels)
         wall, cpu = _loop(simulation, pace, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, outside.clock(parts.bus.networked))
         if out is not None:
