@@ -381,6 +381,9 @@ class FakeRun:
         self.publish(
             "/particle_cloud", msg("geometry_msgs/PoseArray", header=header(time_ns, "map"), poses=particles)
         )
+        if tick >= 75:  # a topic that begins late, in a frame of the robot
+            seen = msg("geometry_msgs/PoseArray", header=header(time_ns, "base_link"), poses=particles[:1])
+            self.publish("/tote_poses", seen)
         states = ("drive to pick", "align", "grasp", "drive to place")
         self.publish("/mission/state", msg("std_msgs/String", data=states[tick // 75 % 4]))
         self.publish(
@@ -429,6 +432,21 @@ def make_world() -> type[FakeWorld]:
 
 
 @pytest.fixture
+def make_message() -> Any:
+    return msg
+
+
+@pytest.fixture
+def make_shape() -> type[FakeShape]:
+    return FakeShape
+
+
+@pytest.fixture
+def make_box() -> Any:
+    return box
+
+
+@pytest.fixture
 def verdict() -> dict[str, Any]:
     return VERDICT
 
@@ -450,7 +468,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     path = tmp_path_factory.mktemp("recording") / "demo.rrd"
     run = FakeRun(duration_s=3.0)
     sink = RerunSink(path, config=RecordingConfig(), recording_id="demo")
-    sink.declare(run.world)
+    sink.declare(run.world, {"robot": {"wheel_left_joint", "gripper_joint"}})
     samples: list[FakeSample] = []
     for tick in run.ticks():
         for sample in tick:

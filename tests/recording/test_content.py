@@ -54,7 +54,37 @@ def test_scan_points_are_in_the_lidars_frame(content: Recording, recorded: Any) 
     assert 0 < hit.sum() < len(hit)
     expected = np.stack((np.cos(angles), np.sin(angles)), axis=1)[hit] * scan.ranges[hit, None]
     np.testing.assert_allclose(np.array(column.values[7])[:, :2], expected, atol=1e-5)
-    assert content.column("/ros/scan", "CoordinateFrame:frame").values == [["robot/base_scan"]]
+
+
+@pytest.mark.parametrize(("topic", "body"), [("/scan", "base_scan"), ("/tote_poses", "base_link")])
+def test_what_a_body_sees_stays_where_it_was_seen(
+    content: Recording, recorded: Any, make_world: Any, topic: str, body: str
+) -> None:
+    """Its frame moves only with its messages, and at their times, not at those of the poses."""
+    frame = f"origin of {topic}"
+    assert content.column(f"/ros{topic}", "CoordinateFrame:frame").values == [["world"], [frame]]
+    entity = f"/tf_topics{topic}"
+    column = content.column(entity, "Transform3D:translation")
+    assert column.times_ns.tolist() == [sample.time_ns for sample in recorded.of(topic)]
+    assert {row[0] for row in content.column(entity, "Transform3D:child_frame").values} == {frame}
+    world = make_world()
+    rotation = content.column(entity, "Transform3D:quaternion").numpy()[:, 0]
+    for i in (0, -1):
+        world.time_ns = int(column.times_ns[i])
+        truth = world.pose(f"robot/{body}")
+        np.testing.assert_allclose(column.numpy()[i, 0], truth.xyz, atol=1e-6)
+        np.testing.assert_allclose(rotation[i], xyzw_from_wxyz(truth.quat_wxyz), atol=1e-6)
+
+
+def test_everything_has_a_place_from_the_start(content: Recording) -> None:
+    """Without a frame an entity is an error in every view, if it is only styled or shown later."""
+    styled = ("Points3D:", "LineStrips3D:", "Arrows3D:", "GridMap:", "Boxes3D:", "Mesh3D:", "Cylinders3D:")
+    drawn = [e for e in content.entities if any(c.startswith(styled) for c in content.columns[e])]
+    assert {"/ros/tote_poses", "/ros/scan", "/ros/plan", "/estimate/robot"} <= set(drawn)
+    for entity in drawn:
+        frame = content.column(entity, "CoordinateFrame:frame")
+        if len(frame.times_ns):  # else it is static
+            assert (frame.times_ns[0], frame.values[0]) == (0, ["world"]), entity
 
 
 @pytest.mark.parametrize("kind", ["commanded", "measured"])
@@ -69,9 +99,16 @@ def test_velocities(content: Recording, recorded: Any, kind: str) -> None:
 
 
 def test_joints_without_wheels(content: Recording, recorded: Any) -> None:
+    """The run says which joints are wheels, not their names."""
     _, lift = content.scalars("/joints/robot/lift_joint")
     assert lift.tolist() == [sample.message.position[2] for sample in recorded.of("/joint_states")]
-    assert not any("wheel" in entity for entity in content.entities if entity.startswith("/joints"))
+    plotted = {entity for entity in content.entities if entity.startswith("/joints")}
+    assert plotted == {"/joints/robot/lift_joint", "/joints/robot/wheel_right_joint"}
+
+
+def test_joints_have_colours_of_their_own(content: Recording) -> None:
+    looks = [content.columns[entity] for entity in content.entities if entity.startswith("/joints")]
+    assert len({str(look["SeriesLines:colors"].values) for look in looks}) == len(looks) == 2
 
 
 def test_mission_states_are_changes(content: Recording) -> None:
@@ -140,7 +177,19 @@ def test_belief_and_its_error(content: Recording, recorded: Any) -> None:
     np.testing.assert_allclose(yaw[fresh], 0.03, atol=1e-6)
     frames = {row[0] for row in content.column("/tf_belief/robot", "Transform3D:child_frame").values}
     assert frames == {"odom", "base_footprint"}  # links are drawn where they truly are
-    assert content.column("/estimate/robot", "CoordinateFrame:frame").values == [["base_footprint"]]
+    frames = content.column("/estimate/robot", "CoordinateFrame:frame").values
+    assert frames == [["world"], ["base_footprint"]]
+
+
+def test_the_truth_is_seen_beneath_the_estimate(content: Recording) -> None:
+    def look(trail: str) -> tuple[float, float]:
+        radius = content.column(f"/trails/robot/{trail}", "LineStrips3D:radii").values[0][0]
+        strips = content.column(f"/trails/robot/{trail}", "LineStrips3D:strips").values
+        return -radius, strips[0][0][0][2]  # points of the screen are negative
+
+    for trail in ("odometry", "estimate"):
+        assert look("truth")[0] > 2 * look(trail)[0]
+        assert look("truth")[1] < look(trail)[1]
 
 
 def test_odometry_starts_at_the_truth(content: Recording) -> None:
@@ -162,7 +211,7 @@ def test_shapes_hang_on_their_bodies(content: Recording) -> None:
 
 def test_verdict(content: Recording, verdict: dict[str, Any]) -> None:
     text = content.column("/verdict", "TextDocument:text").values[0][0]
-    assert text.startswith("# PASS: demo")
+    assert text.startswith("**PASS: demo**, seed 7\n")
     assert "localisation_error | **FAIL** | 0.31 m | 0.25 m | 2.4 s" in text
     assert "wall_time_s" not in text
     stored = content.column("/__properties/verdict", "json").values[0][0]

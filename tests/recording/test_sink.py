@@ -110,7 +110,11 @@ def test_two_robots_keep_apart(make_run: Any, make_world: Any, tmp_path: Path) -
     run = make_run(duration_s=1.0, namespace="r2", world=Pair())
     run.play(RerunSink(tmp_path / "pair.rrd"))
     content = read(tmp_path / "pair.rrd")
-    assert content.column("/ros/r2/scan", "CoordinateFrame:frame").values == [["r2/base_scan"]]
+    assert content.column("/ros/r2/scan", "CoordinateFrame:frame").values[-1] == ["origin of /r2/scan"]
+    children = [row[0] for row in content.column("/tf", "Transform3D:child_frame").values]
+    first = content.column("/tf", "Transform3D:translation").numpy()[children.index("r2/base_scan"), 0]
+    seen_from = content.column("/tf_topics/r2/scan", "Transform3D:translation").numpy()[0, 0]
+    np.testing.assert_allclose(seen_from, first, atol=1e-6)
     belief = {row[0] for row in content.column("/tf_belief/r2", "Transform3D:child_frame").values}
     assert belief == {"/r2/odom", "/r2/base_footprint"}
     assert content.column("/tf_static/r2/map", "Transform3D:child_frame").values == [["/r2/map"]]

@@ -126,6 +126,18 @@ def test_the_recording_tells_the_missions_story(recording: read_back.Recording) 
     assert states[-1] == "done"
 
 
+def test_the_recorded_scans_lie_within_the_walls(recording: read_back.Recording) -> None:
+    """Drawn from where the lidar was at their stamp they do, however fast the robot turns."""
+    names = ("translation", "quaternion")
+    xyz, quat = (recording.column("/tf_topics/scan", f"Transform3D:{name}").numpy()[:, 0] for name in names)
+    scans = recording.column("/ros/scan", "Points3D:positions").values
+    farthest = [
+        np.abs(Pose3(p, wxyz_from_xyzw(q)).apply(np.array(scan))).max(axis=0)
+        for p, q, scan in zip(xyz, quat, scans, strict=True)
+    ]
+    assert (np.max(farthest, axis=0)[:2] < np.array((10.0, 7.0)) + 0.1).all()
+
+
 def test_the_recording_shows_robot_and_tote_where_they_went(recording: read_back.Recording) -> None:
     column = recording.column("/tf", "Transform3D:translation")
     children = [row[0] for row in recording.column("/tf", "Transform3D:child_frame").values]

@@ -16,16 +16,21 @@ import rerun as rr
 
 from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
 from twin.periods import Period, next_due
-from twin.recording.columns import TIMELINE, ScalarColumns, TrailColumns, TransformColumns
-from twin.recording.frames import Frames
+from twin.recording.columns import ScalarColumns, TrailColumns, TransformColumns
+from twin.recording.frames import WORLD, Frames
+from twin.recording.placing import Placed
 
 TRUTH_COLOUR = (90, 200, 120, 255)
 ESTIMATE_COLOUR = (255, 150, 40, 255)
 ODOMETRY_COLOUR = (160, 120, 220, 255)
-GHOST_RADIUS = 0.35
-"""Of the ring around the estimated pose [m]."""
-TRAIL_HEIGHT = 0.03
-"""Above the floor, so that trails lie on the map [m]; each has its own level, so that they do not flicker."""
+TRAILS = {
+    "truth": (TRUTH_COLOUR, 2.0),
+    "odometry": (ODOMETRY_COLOUR, 0.8),
+    "estimate": (ESTIMATE_COLOUR, 0.8),
+}
+"""Colour, and radius in points of the screen: the truth shows on both sides of what covers it."""
+FLOOR_HEIGHT = 0.03
+"""Above the floor, so that what is drawn there lies on the map [m]; each trail has its own level."""
 
 Numbers = tuple[float, ...]
 TruePose = Callable[[str], Pose3]
@@ -42,8 +47,10 @@ class Belief:
         namespace: str,
         true_pose: TruePose,
         *,
+        start_ns: int,
         period: Period,
         trail_step_m: float,
+        radius: float,
     ) -> None:
         """Start without knowing anything.
 
@@ -52,8 +59,10 @@ class Belief:
             frames: Names of the run's frames.
             namespace: Of the robot's topics.
             true_pose: Reads the simulator.
+            start_ns: When the recording begins [ns].
             period: Trails and errors are sampled in the first transform at or after its multiples [ns].
             trail_step_m: Length of a segment of a trail [m].
+            radius: Of the ring around the estimated pose [m].
         """
         self._recording = recording
         self._frames = frames
@@ -65,18 +74,17 @@ class Belief:
         self._names: dict[tuple[str, str], tuple[str, str]] = {}
         self._anchor: Pose2 | None = None
         self._T_map_odom: Pose2 | None = None
+        self._radius = radius
         robot = frames.robot(namespace)
+        self._ghost = f"/estimate/{robot}"
+        self._placed = Placed(recording, self._ghost, start_ns)
         self._transforms = TransformColumns(f"/tf_belief/{robot}")
-        self._trails = {
-            name: TrailColumns(f"/trails/{robot}/{name}", trail_step_m)
-            for name in ("truth", "odometry", "estimate")
-        }
-        colours = (TRUTH_COLOUR, ODOMETRY_COLOUR, ESTIMATE_COLOUR)
-        for trail, colour in zip(self._trails.values(), colours, strict=True):
+        self._trails = {name: TrailColumns(f"/trails/{robot}/{name}", trail_step_m) for name in TRAILS}
+        for name, (colour, width) in TRAILS.items():
             recording.log(
-                trail.entity,
-                rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.0)),
-                rr.CoordinateFrame("world"),
+                self._trails[name].entity,
+                rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width)),
+                rr.CoordinateFrame(WORLD),
                 static=True,
             )
         self._error_xy = ScalarColumns(f"/localisation/{robot}/position_error")
@@ -107,7 +115,7 @@ class Belief:
             if time_ns < self._next_ns:
                 return
             self._next_ns = next_due(self._period, time_ns)
-            self._on_odometry(time_ns, parent, child, _pose2(transform))
+            self._on_odometry(time_ns, parent, child, transform)
         t, q = transform.translation, transform.rotation
         self._add(time_ns, parent, child, (t.x, t.y, t.z), (q.x, q.y, q.z, q.w))
 
@@ -124,17 +132,19 @@ class Belief:
             self._names[parent, child] = names
         self._transforms.append(time_ns, names[0], [names[1]], [xyz], [quat_xyzw])
 
-    def _on_odometry(self, time_ns: int, odom: str, child: str, T_odom_base: Pose2) -> None:
+    def _on_odometry(self, time_ns: int, odom: str, child: str, transform: Any) -> None:
+        T_odom_base = _pose2(transform)
         if self._anchor is None:
             self._anchor = self._start(time_ns, odom, child, T_odom_base)
+            self._draw_ghost(time_ns, self._frames.belief(self._namespace, child), transform.translation.z)
         odometry = self._anchor @ T_odom_base
-        self._trails["odometry"].append(time_ns, odometry.x, odometry.y, TRAIL_HEIGHT - 0.01)
+        self._trails["odometry"].append(time_ns, odometry.x, odometry.y, FLOOR_HEIGHT)
         estimate = None if self._T_map_odom is None else self._T_map_odom @ T_odom_base
         if estimate is not None:
-            self._trails["estimate"].append(time_ns, estimate.x, estimate.y, TRAIL_HEIGHT + 0.01)
+            self._trails["estimate"].append(time_ns, estimate.x, estimate.y, FLOOR_HEIGHT + 0.01)
         if self._base is not None:
             truth = self._true_pose(self._base).to_pose2()
-            self._trails["truth"].append(time_ns, truth.x, truth.y, TRAIL_HEIGHT)
+            self._trails["truth"].append(time_ns, truth.x, truth.y, FLOOR_HEIGHT - 0.01)
             if estimate is not None:
                 error = truth.inverse() @ estimate
                 self._error_xy.append(time_ns, math.hypot(error.x, error.y))
@@ -151,23 +161,22 @@ class Belief:
             self._add(
                 time_ns, "map", odom, (anchor.x, anchor.y, 0.0), (0.0, 0.0, math.sin(half), math.cos(half))
             )
-        self._recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
-        self._draw_ghost(self._frames.belief(self._namespace, child))
         return anchor
 
-    def _draw_ghost(self, frame: str) -> None:
+    def _draw_ghost(self, time_ns: int, frame: str, height: float) -> None:
+        """Draw the ring and its arrow on the floor, `height` [m] below the frame."""
         angles = np.linspace(0.0, 2.0 * math.pi, 33)
-        ring = np.stack(
-            (GHOST_RADIUS * np.cos(angles), GHOST_RADIUS * np.sin(angles), np.full(33, TRAIL_HEIGHT)), axis=1
-        )
-        nose = (1.6 * GHOST_RADIUS, 0.0, 0.0)
-        # Not static: before this time the frame has no pose and a static shape would be an error in the view.
+        ring = self._radius * np.stack((np.cos(angles), np.sin(angles), np.zeros(33)), axis=1)
+        floor = (0.0, 0.0, FLOOR_HEIGHT - height)
+        self._placed.attach(frame, time_ns)
         self._recording.log(
-            f"/estimate/{self._frames.robot(self._namespace)}",
-            rr.CoordinateFrame(frame),
-            rr.LineStrips3D([ring], colors=[ESTIMATE_COLOUR], radii=[0.01]),
+            self._ghost,
+            rr.LineStrips3D([ring + floor], colors=[ESTIMATE_COLOUR], radii=[0.03 * self._radius]),
             rr.Arrows3D(
-                vectors=[nose], origins=[(0.0, 0.0, TRAIL_HEIGHT)], colors=[ESTIMATE_COLOUR], radii=[0.03]
+                vectors=[(1.6 * self._radius, 0.0, 0.0)],
+                origins=[floor],
+                colors=[ESTIMATE_COLOUR],
+                radii=[0.08 * self._radius],
             ),
         )
 

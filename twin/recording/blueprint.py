@@ -9,39 +9,52 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.shapes import Box, Geometry, Mesh, Sphere
 from twin.recording.columns import TIMELINE
-from twin.recording.frames import WORLD, Frames
-from twin.recording.sources import BodyShape, World
+from twin.recording.extents import RobotBox, Stage
+from twin.recording.frames import WORLD
+from twin.recording.map_eye import MAP_EYE, MAP_IMAGE
 
 _RASTERS = ("map", "global_costmap/costmap", "local_costmap/costmap")
-_FIELD_OF_VIEW = 1.2
-"""Vertical angle of Rerun's eye [rad], a bit less than it is."""
+_DARK = rrb.Background(kind="SolidColor", color=(38, 42, 48))
+_LEAST_STAGE = 2.5
+"""Size of the floor that the camera looks at [m], at least."""
+_CLOSE_UP = np.array((-0.62, 0.62, 0.48))
+"""Where the close-up is seen from: behind, on the left, above."""
+_CLOSE_UP_DISTANCE = 1.3
+"""Of the camera, relative to the robot's size."""
+_LEGEND_ROOM = 1.35
+"""How much longer than the run the time axis of a plot is, so that the legend covers no curve."""
 
 
-def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
-    """Return the layout for a world: 3-D, map from above, plots, states, log, verdict."""
-    low, high = extent(world, shapes)
-    robots = Frames(world.body_names).robots or ("robot",)
+def layout(stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None) -> rrb.Blueprint:
+    """Return the screen: 3-D, mission, plots on the left; close-up, map, verdict and log on the right.
+
+    Args:
+        stage: The floor to show.
+        robots: Each has a close-up.
+        end_ns: Simulated time at which the recording ends [ns]; None: it goes on.
+    """
+    names = [box.robot for box in robots]
     left = rrb.Vertical(
-        _simulation(robots, low, high),
+        _simulation(stage, names),
+        _mission(names, end_ns),
         rrb.Horizontal(
-            _plot("Forward velocity [m/s]", [f"/velocity/{robot}/linear/**" for robot in robots]),
-            _plot("Turning velocity [rad/s]", [f"/velocity/{robot}/angular/**" for robot in robots]),
             rrb.Tabs(
-                _plot("Joints [m, rad]", [f"/joints/{robot}/**" for robot in robots]),
-                _plot("Localisation error [m, rad]", [f"/localisation/{robot}/**" for robot in robots]),
+                _plot("Forward velocity [m/s]", [f"/velocity/{name}/linear/**" for name in names], end_ns),
+                _plot("Turning velocity [rad/s]", [f"/velocity/{name}/angular/**" for name in names], end_ns),
+            ),
+            rrb.Tabs(
+                _plot("Joints [m, rad]", [f"/joints/{name}/**" for name in names], end_ns),
+                _plot("Localisation error [m, rad]", [f"/localisation/{name}/**" for name in names], end_ns),
             ),
         ),
-        row_shares=[5, 2],
+        row_shares=[5, 1.8, 2.6],
     )
+    close_ups = [rrb.Tabs(*(_close_up(box) for box in robots))] if robots else []
     right = rrb.Vertical(
-        rrb.Tabs(*(_close_up(robot, _base(world, robot)) for robot in robots)),
-        _from_above(robots, low, high),
-        rrb.StateTimelineView(name="Mission", origin="/", contents=_mission(robots)),
-        rrb.Horizontal(_log(), rrb.TextDocumentView(name="Verdict", origin="/verdict"), column_shares=[3, 2]),
-        row_shares=[5, 4.2, 1.6, 2.6],
+        *close_ups,
+        _from_above(names),
+        rrb.Tabs(rrb.TextDocumentView(name="Verdict", origin="/verdict"), _log()),
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[5, 3]),
@@ -53,55 +66,33 @@ def layout(world: World, shapes: Sequence[BodyShape]) -> rrb.Blueprint:
     )
 
 
-def extent(world: World, shapes: Sequence[BodyShape]) -> tuple[Array, Array]:
-    """Return the corners (x, y) [m] of a rectangle that holds all shapes (of meshes: their origins)."""
-    lows, highs = [np.array((-1.0, -1.0))], [np.array((1.0, 1.0))]
-    for shape in shapes:
-        pose = world.pose(shape.body) @ shape.T_body_geometry
-        reach = (np.abs(matrix_from_quat_wxyz(pose.quat_wxyz)) @ _half_size(shape.geometry))[:2]
-        lows.append(pose.xyz[:2] - reach)
-        highs.append(pose.xyz[:2] + reach)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
-
-
-def _half_size(geometry: Geometry) -> Array:
-    """Return half the edges [m] of a box around a shape, in the shape's frame."""
-    if isinstance(geometry, Box):
-        return np.array(geometry.size) / 2.0
-    if isinstance(geometry, Mesh):
-        return np.zeros(3)
-    length = 0.0 if isinstance(geometry, Sphere) else geometry.length
-    return np.array((geometry.radius, geometry.radius, geometry.radius + length / 2.0))
-
-
-def _simulation(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3DView:
+def _simulation(stage: Stage, robots: Sequence[str]) -> rrb.Spatial3DView:
     """Return the view of what truly happens, seen from the south side, above."""
-    centre = (low + high) / 2.0
-    size = float(max(np.max(high - low), 4.0))
+    centre = (stage.low + stage.high) / 2.0
+    width, length = stage.high - stage.low
+    size = float(max(0.85 * width, 1.1 * length, _LEAST_STAGE))  # the view is wider than high
     return rrb.Spatial3DView(
         name="Simulation",
         origin="/",
         contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters(robots, "-")],
         overrides=_whole_trails(robots),
-        background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
+        background=_DARK,
         line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110)),
         spatial_information=rrb.SpatialInformation(target_frame=WORLD),
         eye_controls=rrb.EyeControls3D(
             kind="Orbital",
-            position=(centre[0] - 0.1 * size, centre[1] - 0.68 * size, 0.5 * size),
-            look_target=(centre[0], centre[1], 0.0),
+            position=(centre[0] - 0.1 * size, centre[1] - 0.7 * size, 0.52 * size),
+            look_target=(*centre, 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),
     )
 
 
-def _from_above(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3DView:
+def _from_above(robots: Sequence[str]) -> rrb.Spatial2DView:
     """Return the view of what the robot knows: map, costmaps, plan, particles, scan, with north up."""
-    centre = (low + high) / 2.0
-    height = float(max(np.max(high - low), 4.0)) / (2.0 * np.tan(_FIELD_OF_VIEW / 2.0))
-    return rrb.Spatial3DView(
+    return rrb.Spatial2DView(
         name="Map",
-        origin="/",
+        origin=MAP_EYE,
         contents=[
             "+ /ros/**",
             "+ /estimate/**",
@@ -110,35 +101,25 @@ def _from_above(robots: Sequence[str], low: Array, high: Array) -> rrb.Spatial3D
         ],
         overrides=_whole_trails(robots),
         background=rrb.Background(kind="SolidColor", color=(60, 66, 70)),
-        line_grid=rrb.LineGrid3D(visible=False),
-        spatial_information=rrb.SpatialInformation(target_frame=WORLD),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital",
-            position=(centre[0], centre[1] - 0.001, height),
-            look_target=(centre[0], centre[1], 0.0),
-            eye_up=(0.0, 1.0, 0.0),
-        ),
+        spatial_information=rrb.SpatialInformation(target_frame=MAP_IMAGE),
     )
 
 
-def _base(world: World, robot: str) -> str:
-    """Return the body that a robot's close-up view travels with."""
-    links = [name for name in world.body_names if name.startswith(f"{robot}/")]
-    return f"{robot}/base_link" if f"{robot}/base_link" in links or not links else links[0]
-
-
-def _close_up(robot: str, base: str) -> rrb.Spatial3DView:
-    """Return a view that travels with a robot, in the frame of its base."""
+def _close_up(box: RobotBox) -> rrb.Spatial3DView:
+    """Return a view that travels with a robot, in the frame of its base, from as far as its size asks for."""
     return rrb.Spatial3DView(
-        name=robot,
+        name=box.robot,
         origin="/",
-        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters([robot], "-")],
-        overrides=_whole_trails([robot]),
-        background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
+        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters([box.robot], "-")],
+        overrides=_whole_trails([box.robot]),
+        background=_DARK,
         line_grid=rrb.LineGrid3D(visible=False),
-        spatial_information=rrb.SpatialInformation(target_frame=base),
+        spatial_information=rrb.SpatialInformation(target_frame=box.base),
         eye_controls=rrb.EyeControls3D(
-            kind="Orbital", position=(-1.3, 1.7, 1.5), look_target=(0.25, 0.0, 0.5), eye_up=(0.0, 0.0, 1.0)
+            kind="Orbital",
+            position=box.centre + _CLOSE_UP_DISTANCE * box.size * _CLOSE_UP,
+            look_target=box.centre,
+            eye_up=(0.0, 0.0, 1.0),
         ),
     )
 
@@ -149,17 +130,32 @@ def _log() -> rrb.TextLogView:
     )
 
 
-def _plot(name: str, contents: list[str]) -> rrb.TimeSeriesView:
+def _plot(name: str, contents: list[str], end_ns: int | None) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         name=name,
         origin="/",
         contents=[f"+ {content}" for content in contents],
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        axis_x=_time_axis(end_ns, _LEGEND_ROOM),
     )
 
 
-def _mission(robots: Sequence[str]) -> list[str]:
-    return ["+ /mission/state", *(f"+ /{robot}/mission/state" for robot in robots)]
+def _mission(robots: Sequence[str], end_ns: int | None) -> rrb.StateTimelineView:
+    spaces = ("", *(f"/{robot}" for robot in robots))
+    return rrb.StateTimelineView(
+        name="Mission",
+        origin="/",
+        contents=[f"+ {space}/mission/**" for space in spaces],
+        time_view=_time_axis(end_ns, 1.0),
+    )
+
+
+def _time_axis(end_ns: int | None, room: float) -> rrb.TimeAxis | None:
+    """Return an axis from the start to `room` times the end."""
+    if not end_ns:
+        return None
+    start, end = (rr.TimeRangeBoundary.absolute(nanos=t) for t in (0, round(room * end_ns)))
+    return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
 
 
 def _rasters(robots: Sequence[str], sign: str) -> list[str]:

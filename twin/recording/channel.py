@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
 import rerun as rr
 
+from twin.geometry import Pose3
 from twin.recording.belief import Belief
-from twin.recording.columns import TIMELINE
 from twin.recording.frames import Frames
 from twin.recording.sources import Sample
 
@@ -33,10 +32,10 @@ class Context:
     frames: Frames
     belief: Callable[[str], Belief]
     """Returns the belief of a namespace's robot."""
+    true_pose: Callable[[str], Pose3]
+    """Returns the pose of a body in `world`, now."""
+    start_ns: int
+    """Simulated time at which the recording begins [ns]."""
     max_particles: int
-    joints: tuple[str, ...] | None
-
-
-def set_time(recording: rr.RecordingStream, time_ns: int) -> None:
-    """Set the simulated time of the rows logged next."""
-    recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
+    wheels: Mapping[str, Collection[str]]
+    """By robot: joints that are not worth a plot, as they turn without end."""

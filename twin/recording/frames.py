@@ -53,10 +53,6 @@ class Frames:
         link = self._link(namespace, frame_id)
         return f"/{namespace}/{link}" if namespace else link
 
-    def of_message(self, namespace: str, frame_id: str) -> str:
-        """Return the frame to draw a message in: the true body if there is one, else the believed frame."""
-        return self.body(namespace, frame_id) or self.belief(namespace, frame_id)
-
     @staticmethod
     def _link(namespace: str, frame_id: str) -> str:
         link = frame_id.lstrip("/")

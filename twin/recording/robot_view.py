@@ -13,8 +13,8 @@ import rerun.blueprint as rrb
 from twin.geometry import Array, matrix_from_quat_wxyz, xyzw_from_wxyz
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_motion, link_poses
-from twin.models.shapes import Geometry, Mesh
-from twin.models.solids import Shape, reach
+from twin.models.solids import Shape
+from twin.recording.extents import span
 from twin.recording.posture import Posture
 from twin.recording.robot_layers import LAYERS, Canvas
 from twin.recording.stream import FLUSH_TIMEOUT_S, end_recording, open_recording, whole_recording
@@ -135,26 +135,17 @@ def robot_layout(
 
 
 def extent(description: RobotDescription, posture: Posture) -> tuple[Array, Array]:
-    """Return the corners of a box around the robot [m], shapes (3,), in the root frame.
-
-    Of meshes, only the place counts.
-    """
+    """Return the corners of a box around the robot [m], shapes (3,), in the root frame."""
     poses = link_poses(description, posture.positions)
     corners: list[Array] = [pose.xyz for pose in poses.values()]
     for name, link in description.links.items():
         shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)
         for shape in shapes:
             pose = poses[name] @ shape.T_link_geometry
-            half = _half_size(shape.geometry, matrix_from_quat_wxyz(pose.quat_wxyz))
-            corners += [pose.xyz - half, pose.xyz + half]
+            near, far = span(shape.geometry, matrix_from_quat_wxyz(pose.quat_wxyz))
+            corners += [pose.xyz + near, pose.xyz + far]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     return low - LEAST_SIZE_M / 2.0, high + LEAST_SIZE_M / 2.0
-
-
-def _half_size(geometry: Geometry, R: Array) -> Array:
-    if isinstance(geometry, Mesh):
-        return np.zeros(3)
-    return np.array([reach(geometry, row) for row in R])
 
 
 def _grid_spacing(size: float, steps: Sequence[float] = (0.01, 0.1, 1.0)) -> float:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from itertools import takewhile
+
 import rerun as rr
 
 from twin.recording.channel import Context
 from twin.recording.columns import LogColumns, ScalarColumns, StateColumns
 from twin.recording.frames import BELIEF_FRAMES
+from twin.recording.palette import Palette
+from twin.recording.solids import Rgba8
 from twin.recording.sources import Sample
 
 COMMANDED_COLOUR = (255, 150, 40, 255)
@@ -55,19 +60,21 @@ class JointChannel:
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         del topic
         self._recording = context.recording
-        self._entity = f"/joints/{context.frames.robot(namespace)}"
-        self._wanted = context.joints
+        robot = context.frames.robot(namespace)
+        self._entity = f"/joints/{robot}"
+        self._wheels = context.wheels.get(robot, ())
+        self._palette = Palette()
         self._columns: dict[str, ScalarColumns] = {}
         self._plans: dict[tuple[str, ...], list[tuple[int, ScalarColumns]]] = {}
 
     def take(self, sample: Sample) -> None:
-        """Keep positions [m] or [rad]; a driving wheel's angle grows without end and is left out."""
+        """Keep positions [m] or [rad], not of wheels."""
         state = sample.message
         names = tuple(state.name)
         plan = self._plans.get(names)
         if plan is None:
             plan = self._plans[names] = [
-                (i, self._column(name)) for i, name in enumerate(names) if self._shown(name)
+                (i, self._column(name)) for i, name in enumerate(names) if name not in self._wheels
             ]
         for i, column in plan:
             column.append(sample.time_ns, state.position[i])
@@ -77,15 +84,11 @@ class JointChannel:
         for column in self._columns.values():
             column.send(recording)
 
-    def _shown(self, name: str) -> bool:
-        if self._wanted is not None:
-            return name in self._wanted
-        return "wheel" not in name and "caster" not in name
-
     def _column(self, name: str) -> ScalarColumns:
         if name not in self._columns:
             self._columns[name] = ScalarColumns(f"{self._entity}/{name}")
-            self._recording.log(self._columns[name].entity, rr.SeriesLines(names=[name]), static=True)
+            look = rr.SeriesLines(names=[name.removesuffix("_joint")], colors=[self._palette.colour(name)])
+            self._recording.log(self._columns[name].entity, look, static=True)
         return self._columns[name]
 
 
@@ -109,23 +112,58 @@ class TransformChannel:
 
 
 class StateChannel:
-    """std_msgs/String as a state on a time line; repeated states are left out."""
+    """std_msgs/String as a state on a time line; repeated states are left out.
+
+    A state such as `tote_a: dock at rack_a` is labelled with what comes after the colon. What comes before is
+    a state of its own, on a second line: `task`. Each action has its colour, its objects two shades in turn.
+    """
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         del context, namespace
         self._states = StateColumns(topic)
+        self._tasks = StateColumns(f"{topic.rsplit('/', 1)[0]}/task")
         self._last: str | None = None
+        self._task = ""
+        self._palette = Palette()
+        self._looks: dict[str, tuple[str, Rgba8]] = {}
+        self._actions: Counter[str] = Counter()
+        self._sent = 0
 
     def take(self, sample: Sample) -> None:
         """Keep a change of state."""
         state = sample.message.data
-        if state != self._last:
-            self._last = state
-            self._states.append(sample.time_ns, state)
+        if state == self._last:
+            return
+        self._last = state
+        self._states.append(sample.time_ns, state)
+        task, _, label = state.rpartition(": ")
+        if state not in self._looks:
+            action = _action(label)
+            self._looks[state] = (label, self._palette.colour(action, self._actions[action]))
+            self._actions[action] += 1
+        if task != self._task:
+            self._task = task
+            self._tasks.append(sample.time_ns, task)  # an empty one is a gap
 
     def send(self, recording: rr.RecordingStream) -> None:
-        """Send the block."""
+        """Send the block, and how its new states look."""
+        if len(self._looks) > self._sent:
+            self._sent = len(self._looks)
+            labels, colours = zip(*self._looks.values(), strict=True)
+            look = rr.StateConfiguration(values=list(self._looks), labels=labels, colors=colours)
+            recording.log(self._states.entity, look, static=True)
         self._states.send(recording)
+        self._tasks.send(recording)
+
+
+def _action(label: str) -> str:
+    """Return the words that a label begins with, before names and numbers.
+
+    >>> _action("drive to rack_a/1/7")
+    'drive to'
+    """
+    words = list(takewhile(str.isalpha, label.split()))
+    return " ".join(words) or label
 
 
 class LogChannel:

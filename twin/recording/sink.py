@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +22,12 @@ if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays f
     from twin.recording.belief import Belief
     from twin.recording.channel import Channel, Context
     from twin.recording.columns import TransformColumns
+    from twin.recording.extents import RobotBox, Stage
 
 _NS = 1_000_000_000
+_RING_RADIUS = 0.3
+"""Around the estimated pose of a robot that has no body [m]."""
+NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +44,6 @@ class RecordingConfig:
     """Length of a segment of a trail [m]."""
     max_particles: int = 500
     """Of a particle cloud."""
-    joints: tuple[str, ...] | None = None
-    """Joints to plot; None: all but wheels and casters."""
 
     def __post_init__(self) -> None:
         problems = [
@@ -69,8 +73,8 @@ class _Kept:
 class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
-    The simulator's truth is drawn in `world`; a lidar's points hang on its true body; what the robot believes
-    is a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order:
+    The simulator's truth is drawn in `world`; a lidar's points lie where it truly saw them; what the robot
+    believes is a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order:
     construct, `bus.tap(sink.on_sample)`, `declare(world)`, then `on_tick(world)` after every tick and
     `close(verdict)`.
     """
@@ -102,16 +106,21 @@ class RerunSink:
         self._block_ns = round(_NS * self._config.block_s)
         self._closed = False
 
-    def declare(self, world: World) -> None:
+    def declare(self, world: World, wheels: Mapping[str, Collection[str]] = NO_WHEELS) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
+
+        Args:
+            world: At the start.
+            wheels: By robot: joints that turn without end, which are not plotted.
 
         Raises:
             RecordingError: The file cannot be written.
         """
-        from twin.recording.blueprint import extent, layout
+        from twin.recording.blueprint import layout
         from twin.recording.channel import Context
         from twin.recording.columns import TransformColumns
-        from twin.recording.shapes import declare_floor, declare_shapes
+        from twin.recording.extents import Stage, robot_box
+        from twin.recording.shapes import declare_shapes
         from twin.recording.stream import declare_frames, open_recording
 
         self._world = world
@@ -119,17 +128,24 @@ class RerunSink:
         shapes = world.shapes()
         xyz, _ = world.body_poses()
         self._frames = Frames(world.body_names)
-        self._recording: rr.RecordingStream = open_recording(self._path, *self._ids, layout(world, shapes))
+        robots = [robot_box(world, shapes, name) for name in self._frames.robots]
+        self._robots: dict[str, RobotBox] = {box.robot: box for box in robots}
+        self._bases = [world.body_names.index(box.base) for box in robots]
+        self._stage: Stage = Stage(world, shapes, robots)
+        blueprint = layout(self._stage, robots)
+        self._recording: rr.RecordingStream = open_recording(self._path, *self._ids, blueprint)
         self._poses: TransformColumns = TransformColumns("/tf")
         self._context: Context = Context(
             recording=self._recording,
             frames=self._frames,
             belief=self._belief,
+            true_pose=world.pose,
+            start_ns=world.time_ns,
             max_particles=self._config.max_particles,
-            joints=self._config.joints,
+            wheels=wheels,
         )
         declare_frames(self._recording, self._frames)
-        declare_floor(self._recording, *extent(world, shapes))
+        self._set_stage()
         declare_shapes(self._recording, shapes, world.pose)
         self._last_xyz = np.full_like(xyz, np.inf)
         self._last_quat = np.zeros((len(xyz), 4))
@@ -164,6 +180,8 @@ class RerunSink:
         if time_ns >= self._next_block_ns:
             self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
             self._send()
+            if self._stage.grow():
+                self._set_stage()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
         """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored.
@@ -173,6 +191,7 @@ class RerunSink:
         """
         if self._world is None or self._closed:
             return
+        from twin.recording.blueprint import layout
         from twin.recording.stream import end_recording, log_verdict
 
         self._closed = True
@@ -180,6 +199,10 @@ class RerunSink:
         try:
             if verdict is not None:
                 log_verdict(self._recording, verdict)
+            self._stage.fit()
+            self._set_stage()
+            # A viewer takes the last screen of a file; that of the start is for runs that are killed.
+            self._recording.send_blueprint(layout(self._stage, [*self._robots.values()], self._world.time_ns))
             self._send()
         finally:
             end_recording(self._recording, self._path)
@@ -190,6 +213,7 @@ class RerunSink:
         moved = (np.abs(xyz - self._last_xyz) > tolerance).any(axis=1)
         moved |= (np.abs(quat - self._last_quat) > tolerance).any(axis=1)
         rows = np.flatnonzero(moved)
+        self._stage.visit(xyz[self._bases])
         if len(rows):
             self._last_xyz[rows] = xyz[rows]
             self._last_quat[rows] = quat[rows]
@@ -205,17 +229,28 @@ class RerunSink:
                 channel.send(self._recording)
         flush(self._recording, self._path)
 
+    def _set_stage(self) -> None:
+        """Log what depends on how much floor there is to see; it takes the place of what was."""
+        from twin.recording.map_eye import declare_map_eye
+        from twin.recording.shapes import declare_floor
+
+        declare_floor(self._recording, self._stage.low, self._stage.high)
+        declare_map_eye(self._recording, self._stage.low, self._stage.high)
+
     def _belief(self, namespace: str) -> Belief:
         assert self._world is not None
         if namespace not in self._beliefs:
             from twin.recording.belief import Belief
 
+            box = self._robots.get(self._frames.robot(namespace))
             self._beliefs[namespace] = Belief(
                 self._recording,
                 self._frames,
                 namespace,
                 self._world.pose,
+                start_ns=self._context.start_ns,
                 period=self._period,
                 trail_step_m=self._config.trail_step_m,
+                radius=box.radius if box else _RING_RADIUS,
             )
         return self._beliefs[namespace]

@@ -9,8 +9,11 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from twin.recording.channel import Context, set_time
-from twin.recording.columns import ArrowColumns, PointColumns, StripColumns
+from twin.geometry import xyzw_from_wxyz
+from twin.recording.channel import Context
+from twin.recording.columns import ArrowColumns, PointColumns, StripColumns, TransformColumns
+from twin.recording.frames import WORLD
+from twin.recording.placing import Placed, set_time
 from twin.recording.sources import Sample
 
 SCAN_COLOUR = (255, 70, 70, 255)
@@ -23,22 +26,36 @@ PARTICLE_LENGTH = 0.12
 """Of the arrow of a particle [m]."""
 
 
-class _Framed:
-    """Attaches an entity to the frame of its messages, once, and again when the frame changes."""
+class _Placing:
+    """Keeps the place of each message of a topic."""
 
-    def __init__(self, context: Context, namespace: str, entity: str) -> None:
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
         self._context = context
         self._namespace = namespace
-        self._entity = entity
-        self._frame_id: str | None = None
+        self._placed = Placed(context.recording, f"/ros{topic}", context.start_ns)
+        self._origin = f"origin of {topic}"
+        self._transforms = TransformColumns(f"/tf_topics{topic}")
 
-    def attach(self, frame_id: str, time_ns: int) -> None:
-        """Say that what follows is in this frame."""
-        if frame_id != self._frame_id:
-            self._frame_id = frame_id
-            set_time(self._context.recording, time_ns)
-            frame = self._context.frames.of_message(self._namespace, frame_id)
-            self._context.recording.log(self._entity, rr.CoordinateFrame(frame))
+    def take(self, frame_id: str, time_ns: int) -> None:
+        """Put what is published now, in a frame, into its place.
+
+        What is in the frame of a body, such as a scan, stays where that body truly was when it was published:
+        hung on the moving body, it would turn with the robot until the next message. The rest is in a frame
+        of the robot's belief.
+        """
+        frames = self._context.frames
+        body = frames.body(self._namespace, frame_id)
+        if body is None:
+            self._placed.attach(frames.belief(self._namespace, frame_id), time_ns)
+            return
+        self._placed.attach(self._origin, time_ns)
+        pose = self._context.true_pose(body)
+        quat_xyzw = xyzw_from_wxyz(pose.quat_wxyz)
+        self._transforms.append(time_ns, WORLD, [self._origin], [pose.xyz], [quat_xyzw])
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the block."""
+        self._transforms.send(recording)
 
 
 class ScanChannel:
@@ -46,7 +63,7 @@ class ScanChannel:
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         self._points = PointColumns(f"/ros{topic}")
-        self._framed = _Framed(context, namespace, self._points.entity)
+        self._placing = _Placing(context, namespace, topic)
         self._key: tuple[float, float, int] | None = None
         self._directions: NDArray[np.float32] = np.zeros((0, 3), dtype=np.float32)
         context.recording.log(
@@ -58,7 +75,7 @@ class ScanChannel:
     def take(self, sample: Sample) -> None:
         """Keep the returns between range_min and range_max."""
         scan = sample.message
-        self._framed.attach(scan.header.frame_id, sample.time_ns)
+        self._placing.take(scan.header.frame_id, sample.time_ns)
         ranges = np.asarray(scan.ranges, dtype=np.float32)
         key = (scan.angle_min, scan.angle_increment, len(ranges))
         if key != self._key:
@@ -72,6 +89,7 @@ class ScanChannel:
     def send(self, recording: rr.RecordingStream) -> None:
         """Send the block."""
         self._points.send(recording)
+        self._placing.send(recording)
 
 
 class GridChannel:
@@ -80,7 +98,7 @@ class GridChannel:
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         self._context = context
         self._entity = f"/ros{topic}"
-        self._framed = _Framed(context, namespace, self._entity)
+        self._placing = _Placing(context, namespace, topic)
         name = context.frames.split(topic)[1]
         self._height = LAYER_HEIGHTS.get(name, -0.01)
         self._is_map = not name.endswith("costmap")
@@ -94,11 +112,11 @@ class GridChannel:
         data = np.asarray(grid.data, dtype=np.int8)
         cells = data.reshape(info.height, info.width)[::-1].tobytes()
         origin = info.origin.position
+        self._placing.take(grid.header.frame_id, sample.time_ns)
         key = (info.width, info.height, info.resolution, origin.x, origin.y, grid.header.frame_id, cells)
         if key == self._last or not cells:
             return
         self._last = key
-        self._framed.attach(grid.header.frame_id, sample.time_ns)
         set_time(self._context.recording, sample.time_ns)
         q = info.origin.orientation
         self._context.recording.log(
@@ -117,7 +135,8 @@ class GridChannel:
         )
 
     def send(self, recording: rr.RecordingStream) -> None:
-        """Nothing waits: rasters are few and large."""
+        """Send the block; the rasters themselves do not wait, as they are few and large."""
+        self._placing.send(recording)
 
 
 class PathChannel:
@@ -125,7 +144,7 @@ class PathChannel:
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         self._strips = StripColumns(f"/ros{topic}")
-        self._framed = _Framed(context, namespace, self._strips.entity)
+        self._placing = _Placing(context, namespace, topic)
         self._last: NDArray[np.float32] | None = None
         context.recording.log(
             self._strips.entity,
@@ -138,15 +157,16 @@ class PathChannel:
         path = sample.message
         positions = [pose.pose.position for pose in path.poses]
         points = np.array([(p.x, p.y, p.z + 0.02) for p in positions], dtype=np.float32).reshape(-1, 3)
+        self._placing.take(path.header.frame_id, sample.time_ns)
         if self._last is not None and np.array_equal(points, self._last):
             return
         self._last = points
-        self._framed.attach(path.header.frame_id, sample.time_ns)
         self._strips.append(sample.time_ns, points)
 
     def send(self, recording: rr.RecordingStream) -> None:
         """Send the block."""
         self._strips.send(recording)
+        self._placing.send(recording)
 
 
 class PoseArrayChannel:
@@ -154,7 +174,7 @@ class PoseArrayChannel:
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         self._arrows = ArrowColumns(f"/ros{topic}")
-        self._framed = _Framed(context, namespace, self._arrows.entity)
+        self._placing = _Placing(context, namespace, topic)
         self._max = context.max_particles
         context.recording.log(
             self._arrows.entity, rr.Arrows3D.from_fields(colors=[PARTICLE_COLOUR], radii=[0.008]), static=True
@@ -167,7 +187,7 @@ class PoseArrayChannel:
         little-endian doubles each (OMG DDS-XTypes 1.3, 7.4.3).
         """
         cloud = sample.message
-        self._framed.attach(cloud.header.frame_id, sample.time_ns)
+        self._placing.take(cloud.header.frame_id, sample.time_ns)
         n = len(cloud.poses)
         values = np.frombuffer(sample.payload, "<f8", 7 * n, len(sample.payload) - 56 * n).reshape(n, 7)
         values = values[:: max(1, math.ceil(n / self._max))]
@@ -182,3 +202,4 @@ class PoseArrayChannel:
     def send(self, recording: rr.RecordingStream) -> None:
         """Send the block."""
         self._arrows.send(recording)
+        self._placing.send(recording)

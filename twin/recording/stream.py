@@ -121,8 +121,8 @@ def log_verdict(recording: rr.RecordingStream, verdict: Mapping[str, Any]) -> No
 
 def verdict_text(verdict: Mapping[str, Any]) -> str:
     """Return a verdict as Markdown."""
-    head = f"# {str(verdict.get('verdict', 'no verdict')).upper()}: {verdict.get('scenario', '')}"
-    lines = [head, "", f"Seed {verdict.get('seed', '–')}", ""]
+    word = str(verdict.get("verdict", "no verdict")).upper()
+    lines = [f"**{word}: {verdict.get('scenario', '')}**, seed {verdict.get('seed', '–')}", ""]
     checks = verdict.get("checks", ())
     if checks:
         lines += ["| check | | value | limit | at |", "|---|---|---|---|---|"]

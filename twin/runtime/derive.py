@@ -1,4 +1,4 @@
-"""What nodes need to know of a robot, read off its description: footprint and arm."""
+"""What nodes need to know of a robot, read off its description: footprint, wheels and arm."""
 
 from __future__ import annotations
 
@@ -44,6 +44,22 @@ def footprint(description: RobotDescription, *, padding: float = 0.01) -> Array:
     points = np.concatenate(corners)
     (x0, y0), (x1, y1) = points[:, :2].min(axis=0) - padding, points[:, :2].max(axis=0) + padding
     return np.array([[x1, y1], [x0, y1], [x0, y0], [x1, y0]])
+
+
+def wheels(description: RobotDescription) -> frozenset[str]:
+    """Return the joints on which a robot rolls: those of its drive, and those that turn freely with it.
+
+    The latter are continuous joints that nobody commands, such as a caster's two.
+    """
+    drive = description.drive
+    if drive is None:
+        return frozenset()
+    free = (
+        joint.name
+        for joint in description.joints.values()
+        if joint.type == "continuous" and joint.name not in description.commands and joint.mimic is None
+    )
+    return frozenset((*drive.left_joints, *drive.right_joints, *free))
 
 
 def _corners(geometry: object) -> Array:

@@ -16,6 +16,7 @@ from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
 from twin.recording.digest import RunDigest
+from twin.runtime import derive
 from twin.runtime.build import Parts, build
 from twin.runtime.faults import FaultSchedule
 from twin.runtime.observe import Observer
@@ -213,7 +214,8 @@ def run(
         if simulation.lockstep is not None:
             ending.callback(simulation.lockstep.close)
         if sink is not None:
-            sink.declare(parts.world)
+            wheels = {name: derive.wheels(stack.handle.description) for name, stack in parts.stacks.items()}
+            sink.declare(parts.world, wheels)
         keeper = None if pace is None else Pace(pace)
         wall, cpu = _loop(simulation, keeper, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, keeper, outside.clock(parts.bus.networked))
