@@ -18,6 +18,7 @@ STATES = (
     "tote_a: grasp",
     "tote_b: drive to rack_b/0/2",
     "tote_b: drive to rack_b/0/3",
+    "tote_b: grasp",
     "done",
 )
 
@@ -52,17 +53,19 @@ def test_labels_tell_what_is_done_and_a_second_line_for_what(mission: Recording)
         "grasp",
         "drive to rack_b/0/2",
         "drive to rack_b/0/3",
+        "grasp",
         "done",
     ]
     task = mission.column("/mission/task", "StateChange:state")
     assert task.values == [["tote_a"], ["tote_b"], [""]]
-    assert task.times_ns.tolist() == [0, 1_000_000_000, 2_000_000_000]
+    assert task.times_ns.tolist() == [0, 1_000_000_000, 2_500_000_000]
 
 
 def test_each_action_has_a_colour_and_neighbours_differ(mission: Recording) -> None:
     colours = mission.column("/mission/state", "StateConfiguration:colors").values[0]
     assert len(set(colours)) == 4  # the third drive looks like the first
     assert colours[0] == colours[3]
+    assert colours[1] == colours[4]  # the same words
     assert all(one != next_one for one, next_one in pairwise(colours))
 
 

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from twin.geometry import Pose3, wxyz_from_xyzw
 from twin.recording import read_back
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import takewhile
 
 import rerun as rr
@@ -126,7 +125,7 @@ class StateChannel:
         self._task = ""
         self._palette = Palette()
         self._looks: dict[str, tuple[str, Rgba8]] = {}
-        self._actions: Counter[str] = Counter()
+        self._objects: dict[str, list[str]] = {}
         self._sent = 0
 
     def take(self, sample: Sample) -> None:
@@ -138,9 +137,10 @@ class StateChannel:
         self._states.append(sample.time_ns, state)
         task, _, label = state.rpartition(": ")
         if state not in self._looks:
-            action = _action(label)
-            self._looks[state] = (label, self._palette.colour(action, self._actions[action]))
-            self._actions[action] += 1
+            objects = self._objects.setdefault(_action(label), [])
+            if label not in objects:
+                objects.append(label)
+            self._looks[state] = (label, self._palette.colour(_action(label), objects.index(label)))
         if task != self._task:
             self._task = task
             self._tasks.append(sample.time_ns, task)  # an empty one is a gap
