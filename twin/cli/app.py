@@ -10,7 +10,7 @@ import typer
 
 from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.bench import app as bench_app
-from twin.cli.console import print_error
+from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
@@ -82,6 +82,7 @@ def run_app() -> None:
     """Run the command line and exit: 0 pass, 1 a check failed, 2 a mistake or a bug, 130 interrupted."""
     if sys.stdout is None:  # started with `>&-`
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
+    guard_terminal()
     try:
         app()
     except TwinError as fault:

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Any
 
 from twin.errors import Problem, TwinError
+from twin.plain_text import escaped
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
+
+
+def guard_terminal() -> None:
+    """Let nothing that is printed steer the terminal: files and other nodes choose names and texts."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            _guard(stream)
+
+
+def _guard(stream: Any) -> None:
+    plain_write, keeps_styles = stream.write, stream.isatty()
+
+    def write(text: str) -> int:
+        plain_write(escaped(text, keeps_styles=keeps_styles))
+        return len(text)
+
+    stream.write = write
 
 
 def stdout() -> Console:
@@ -41,4 +60,4 @@ def _sentence(problem: Problem) -> Text:
 
     text = str(problem)
     place = text[: len(text) - len(problem.message)]
-    return Text(place, style="bold") + Text(problem.message)
+    return Text(escaped(place), style="bold") + Text(escaped(problem.message))
