@@ -16,6 +16,7 @@ _KINDS = {
     stat.S_IFBLK: "a device",
 }
 MOST_BYTES = 1 << 30
+_CHUNK = 1 << 20
 
 
 def refusal(path: str | Path) -> str | None:
@@ -50,7 +51,10 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         OSError: As by `open_file`, or it is larger.
     """
     with open_file(path) as stream:
-        content = stream.read(most + 1)
+        # As much as the file says to have and no more, as a buffer is made for all that is asked for.
+        content = stream.read(min(most, os.fstat(stream.fileno()).st_size) + 1)
+        while len(content) <= most and (more := stream.read(_CHUNK)):
+            content += more  # it grows, or is one of /proc, which say that they have nothing
     if len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most} bytes", str(path))
     return content

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import os
 import sys
 from typing import Annotated, TextIO
@@ -12,7 +11,7 @@ import typer
 
 from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
 from twin.cli.bench import app as bench_app
-from twin.cli.console import print_error
+from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
@@ -96,9 +95,7 @@ def run_app() -> None:
     """Run the command line and exit: 0 pass, 1 a check failed, 2 a mistake or a bug, 130 interrupted."""
     if sys.stdout is None:  # started with `>&-`
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - used until the process ends
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # what a terminal cannot show must not end the command
-            stream.reconfigure(errors="replace")
+    guard_terminal()
     try:
         app()
     except TwinError as fault:

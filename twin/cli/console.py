@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import io
+import sys
+from typing import TYPE_CHECKING, Any
 
 from twin.errors import Problem, TwinError
+from twin.plain_text import escaped
 
 WIDE = 100_000
 """Columns where no terminal says how many: what is read by a program, or copied, is not cut."""
@@ -12,6 +15,28 @@ WIDE = 100_000
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
+
+
+def guard_terminal() -> None:
+    """Let nothing that is printed steer the terminal, nor end the command if it cannot be shown.
+
+    Files and other nodes choose names and texts.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            _guard(stream)
+
+
+def _guard(stream: Any) -> None:
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors="replace")
+    plain_write, keeps_styles = stream.write, stream.isatty()
+
+    def write(text: str) -> int:
+        plain_write(escaped(text, keeps_styles=keeps_styles))
+        return len(text)
+
+    stream.write = write
 
 
 def stdout() -> Console:
@@ -47,4 +72,4 @@ def _sentence(problem: Problem) -> Text:
 
     text = str(problem)
     place = text[: len(text) - len(problem.message)]
-    return Text(place, style="bold") + Text(problem.message)
+    return Text(escaped(place), style="bold") + Text(escaped(problem.message))

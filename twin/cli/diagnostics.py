@@ -9,6 +9,7 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from twin.plain_text import escaped
 from twin.regular_file import read_text
 
 if TYPE_CHECKING:
@@ -41,10 +42,10 @@ def inspection_text(found: Inspection, *, every: bool = False) -> Text:
         text.append(f"{where}: ", "bold")
         text.append(f"{diagnostic.severity}[{diagnostic.code}]: ", STYLES[diagnostic.severity])
         subject = "" if diagnostic.element in diagnostic.message else f"{diagnostic.element}: "
-        text.append(f"{subject}{diagnostic.message}\n")
+        text.append(escaped(f"{subject}{diagnostic.message}\n"))
         excerpt = sources.line(diagnostic)
         if excerpt:
-            text.append(f"    {excerpt}\n", "dim")
+            text.append(escaped(f"    {excerpt}\n"), "dim")
         text.append("    fix: ", "green")
         text.append(f"{diagnostic.fix}\n")
     for code, alike in others.items():

@@ -14,7 +14,7 @@ from twin.regular_file import read_bytes
 MOST_STL_FACES = 200_000
 """MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""
 MOST_FACE_BYTES = 1000
-"""Of a triangle, on average, in a file that stays as it is; an OBJ file may hold anything beside triangles."""
+"""Of a triangle, on average, in a file that stays as it is; an OBJ file may hold anything beside them."""
 _KEPT = {"stl": ".stl", "obj": ".obj", "msh": ".msh"}
 
 

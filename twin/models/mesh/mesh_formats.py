@@ -133,24 +133,30 @@ def read_obj(data: bytes) -> tuple[Array, Faces]:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\\\n" in data:
         data = data.replace(b"\\\n", b" ")
-    points, faces, polygons = array("d"), array("q"), 0
+    points, faces, polygons, largest = array("d"), array("q"), 0, 0
     for match in _OBJ_LINE.finditer(data):
         kind, rest = match.groups()
-        words = rest.split(None, 3 if kind == b"v" else MOST_FACES + 2)
         try:
             if kind == b"v":
-                x, y, z = words[:3]
+                x, y, z = rest.split(None, 3)[:3]
                 points.extend((float(x), float(y), float(z)))
             else:
                 polygons += 1
+                words = rest.split(None, MOST_FACES + 2)
+                largest = max(largest, len(words) - 2)
                 first, *others = [_obj_index(word, len(points) // 3) for word in words[: MOST_FACES + 2]]
-                for pair in pairwise(others):
-                    faces.extend((first, *pair))
+                for second, third in pairwise(others):
+                    faces.extend((first, second, third))
         except ValueError:
             line = data.count(b"\n", 0, match.start()) + 1
             shown = match[0][: 4 * _SHOWN].decode(errors="replace").strip()[:_SHOWN]
             raise ValueError(f"has a broken line {line}: '{shown}'") from None
-        if max(polygons, len(words) - 2, len(faces) // 3) > MOST_FACES or len(points) > 3 * MOST_POINTS:
+        if (
+            len(points) > 3 * MOST_POINTS
+            or len(faces) > 3 * MOST_FACES
+            or polygons > MOST_FACES
+            or largest > MOST_FACES
+        ):
             raise too_many()
     return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 

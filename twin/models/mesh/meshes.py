@@ -71,7 +71,10 @@ def read_mesh(path: Path, *, apply_up_axis: bool = True) -> TriangleMesh:
         raise _fault(path, f"cannot be read: {error.strerror}", code="mesh-format") from None
     if status.st_size > MOST_BYTES:
         raise _fault(path, f"has {status.st_size} bytes; at most {MOST_BYTES} are read", code="bad-mesh")
-    return _read(path, apply_up_axis, status.st_mtime_ns, status.st_size)
+    found = _read(path, apply_up_axis, status.st_mtime_ns, status.st_size)
+    if isinstance(found, ModelError):
+        raise ModelError(found.problems)
+    return found
 
 
 def _fault(path: Path, message: str, *, code: str) -> ModelError:
@@ -79,7 +82,15 @@ def _fault(path: Path, message: str, *, code: str) -> ModelError:
 
 
 @lru_cache(maxsize=128)
-def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> TriangleMesh:
+def _read(path: Path, apply_up_axis: bool, _changed_ns: int, _size: int) -> TriangleMesh | ModelError:
+    """Return the mesh, or what is wrong with it: a cache keeps no exceptions, and a robot asks often."""
+    try:
+        return _read_now(path, apply_up_axis)
+    except ModelError as fault:
+        return ModelError(fault.problems)
+
+
+def _read_now(path: Path, apply_up_axis: bool) -> TriangleMesh:
     try:
         data = read_bytes(path, MOST_BYTES)
         kind = format_of(data, path.suffix.lower())

@@ -16,6 +16,7 @@ from twin.models.shapes import SkippedMesh
 from twin.models.urdf.line_table import LineTable
 from twin.models.urdf.plain_numbers import plain_number, plain_numbers
 from twin.models.urdf.xml_text import scan
+from twin.plain_text import UNSEEN
 
 Element = Any
 """An lxml element; the library ships no types."""
@@ -27,7 +28,7 @@ FARTHEST = 1e8
 NAMES = ("name", "link", "joint", "reference")
 """Attributes with the name of a thing."""
 NAMED = ("link", "joint", "parent", "child", "mimic")
-_BREAKS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+_BREAKS = re.compile(f"[\x00-\x1f{UNSEEN}]")
 PLACES = ("link", "joint", "gazebo", "sensor")
 """Elements that a user knows by name."""
 
@@ -239,7 +240,7 @@ def _drop_default_namespace(root: Element) -> None:
 
 
 def _check_names(root: Element, report: Report) -> None:
-    """Note links and joints whose names have spaces at their ends or line breaks, and mend such names."""
+    """Note links and joints whose names have spaces at their ends or what is not seen, and mend them."""
     for element in root.iter():
         for attribute in NAMES:
             name = element.get(attribute)
@@ -250,7 +251,8 @@ def _check_names(root: Element, report: Report) -> None:
             if plain and element.tag in NAMED:
                 report.add(
                     element,
-                    f"{describe(element)}: {attribute}= has spaces at its ends or line breaks; remove them",
+                    f"{describe(element)}: {attribute}= has spaces at its ends or line breaks, "
+                    "or characters that are not seen; remove them",
                     code="bad-name",
                 )
 
