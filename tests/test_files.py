@@ -70,17 +70,19 @@ def test_what_cannot_be_written_is_known_before_the_work(tmp_path: Path) -> None
     file.touch()
     for good in (file, tmp_path / "new", tmp_path / "new" / "deep" / "file", Path(os.devnull)):
         check_file(good)
-    long = tmp_path / ("a" * 300)
+    long, loop = tmp_path / ("a" * 300), file.with_name("loop")
+    loop.symlink_to(loop)
     for path, why in (
         (tmp_path, "it is a folder; name a file"),
         (file / "in", f"{file} is not a folder; name another place"),
         (file / "in" / "deep", f"{file} is not a folder; name another place"),
         (long, "File name too long"),
+        (loop, "Too many levels of symbolic links"),
     ):
         with pytest.raises(RecordingError) as fault:
             check_file(path, "--junit")
         assert str(fault.value) == f"--junit {path}: cannot be written: {why}"
-    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["file", "loop"]
 
 
 @pytest.mark.parametrize("denied", ["file", "folder"])

@@ -175,6 +175,10 @@ def test_aliases_that_multiply_end_soon(tmp_path: Path) -> None:
     assert any("grows without end" in fault for fault in faults(tmp_path, "\n".join(["a0: &a0 [x]", *rows])))
 
 
+def test_a_file_without_a_bottom_is_refused(tmp_path: Path) -> None:
+    assert "nested too deeply" in faults(tmp_path, "[" * 3000)[0]
+
+
 def test_missing_file_and_wrong_encoding(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"no\.yaml: no such file$"):
         load(tmp_path / "no.yaml", File, error=MapError)

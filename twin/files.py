@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from twin.errors import RecordingError
@@ -27,12 +27,14 @@ def check_file(path: Path, option: str = "--output") -> None:
 
 def _fault(path: Path) -> str:
     try:
+        with suppress(FileNotFoundError, NotADirectoryError):
+            path.stat()  # a loop of links or a name that is too long
         if path.is_dir():
             return "it is a folder; name a file"
         if path.exists():
             return "" if os.access(path, os.W_OK) else "it is read-only; name another file"
         folder = next(each for each in path.absolute().parents if os.path.lexists(each))
-    except OSError as error:  # such as a name that is too long
+    except OSError as error:
         return error.strerror or str(error)
     if not folder.is_dir():
         return f"{folder} is not a folder; name another place"
@@ -80,7 +82,7 @@ def replaced(path: Path) -> Iterator[Path]:
         OSError: It cannot be made or put there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    target = path.resolve()
+    target = Path(os.path.realpath(path))
     descriptor, name = tempfile.mkstemp(f"{target.suffix[:20]}", f".{target.stem[:100]}.", target.parent)
     os.close(descriptor)
     new = Path(name)

@@ -28,6 +28,7 @@ from twin.cli.options import RunOptions, parse_overrides, parse_pace
 from twin.cli.play import find_recording
 from twin.errors import RecordingError, ScenarioError, SimulationError
 from twin.files import written_alone
+from twin.models import catalogue
 from twin.scenario.checks import CheckResult
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -145,6 +146,20 @@ def test_no_help_text_is_taken_for_markup() -> None:
 
     look(get_command(app_module.app))
     assert len(seen) > 40
+
+
+def test_what_to_put_in_is_named_in_one_way() -> None:
+    """Typer shows `{scenario}` for an argument of which nobody says what it is."""
+    wrong = []
+
+    def look(command: Any, name: str) -> None:
+        arguments = [each for each in command.params if not each.opts[0].startswith("-")]
+        wrong.extend(f"{name} {each.name}" for each in arguments if each.metavar is None)
+        for child, inner in getattr(command, "commands", {}).items():
+            look(inner, f"{name} {child}")
+
+    look(get_command(app_module.app), "twin")
+    assert wrong == []
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["robots"], ["interface", "list"]])
@@ -541,6 +556,7 @@ def test_schema_and_robots(demo: Path, invoke: Invoke) -> None:
     code, out, _ = invoke("robots")
     assert code == 0
     assert {"diff_bot", "warehouse_bot", "r2d2", "sp1s"} <= set(out.split())
+    assert {str(path) for path in catalogue().values()} <= set(out.split())  # whole, to be copied
 
 
 @pytest.mark.parametrize(

@@ -16,13 +16,16 @@ from twin.files import absence
 def run_batch(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(help="Scenario files, or folders of them.", show_default="scenarios"),
+        typer.Argument(
+            metavar="[SCENARIO]...", help="Scenario files, or folders of them.", show_default="scenarios"
+        ),
     ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write one JUnit file over all runs.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the results.", show_default="runs/test/<time>")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the results.", show_default="runs/test/<time>"),
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write Rerun recordings too.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,

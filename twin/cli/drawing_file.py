@@ -14,7 +14,9 @@ from twin.files import check_file, write_whole
 
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", help="File to write: .gv or .svg.", show_default=".gv on stdout"),
+    typer.Option(
+        "-o", "--output", metavar="FILE", help="File to write: .gv or .svg.", show_default=".gv on stdout"
+    ),
 ]
 
 

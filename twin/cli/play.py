@@ -12,7 +12,10 @@ from twin.errors import RecordingError
 
 def play(
     recording: Annotated[
-        Path, typer.Argument(help="A recording (*.rrd), or the folder of a run.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="RECORDING", help="A recording (*.rrd), or the folder of a run.", show_default=False
+        ),
     ],
     web: Annotated[
         bool, typer.Option("--web", help="Serve the viewer to a browser on this computer.")

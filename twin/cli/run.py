@@ -14,7 +14,9 @@ _OTHERS = "Other processes"
 
 
 def run(
-    scenario: Annotated[Path, typer.Argument(help="The scenario file.", show_default=False)],
+    scenario: Annotated[
+        Path, typer.Argument(metavar="SCENARIO", help="The scenario file.", show_default=False)
+    ],
     sets: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
@@ -102,7 +104,8 @@ def run(
         ),
     ] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the results.", show_default="runs/<scenario>/<time>")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the results.", show_default="runs/<scenario>/<time>"),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no Rerun recording.")] = False,
     bag: Annotated[

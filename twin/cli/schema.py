@@ -10,7 +10,8 @@ import typer
 
 def schema(
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write.", show_default="standard output")
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default="standard output"),
     ] = None,
 ) -> None:
     """Print the JSON schema of scenario files, for completion and checks in an editor."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,8 +21,8 @@ WALL_CLOCK_METRICS = frozenset(
     {"wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s"}
 )
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
-FLUSH_TIMEOUT_S = 600.0
-"""A flush without any limit waits for ever for a writer that a full disk has ended."""
+FLUSH_TIMEOUT_S = 60
+"""Longest wait for a disk that is slow."""
 _FOOTER = b"RRF2FOOT"
 """Begins the last twelve bytes of a file that was closed."""
 
@@ -59,13 +60,28 @@ def open_recording(
 def flush(recording: rr.RecordingStream, path: Path) -> None:
     """Wait until everything so far is in the file.
 
+    A full disk ends Rerun's writer, for which its flush then may wait for ever.
+
     Raises:
         RecordingError: It could not be written.
     """
+    for _ in range(FLUSH_TIMEOUT_S):
+        try:
+            recording.flush(timeout_sec=1.0)
+            return
+        except RuntimeError as fault:
+            if "timed out" not in str(fault) or not _has_room(path.parent):
+                raise _not_whole(path) from fault
+    raise _not_whole(path)
+
+
+def _has_room(folder: Path) -> bool:
     try:
-        recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-    except RuntimeError as fault:
-        raise _not_whole(path) from fault
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(bytes(1 << 16))
+    except OSError:
+        return False
+    return True
 
 
 def end_recording(recording: rr.RecordingStream, path: Path) -> None:

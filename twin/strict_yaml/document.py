@@ -145,6 +145,8 @@ def read(path: Path, error: type[TwinError]) -> Document:
     except OSError as fault:
         hint = absence(path) or f"cannot read the file: {fault.strerror}"
         raise error(Problem(hint, path)) from None
+    except RecursionError:
+        raise error(Problem("nested too deeply; no file of ours has a hundred levels", path)) from None
     except UnicodeDecodeError as fault:
         raise error(
             Problem(f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}", path)

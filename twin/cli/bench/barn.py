@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 
 def barn(
-    file: Annotated[Path, typer.Argument(help="Worlds in the format twin-barn/1.", show_default=False)],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Worlds in the format twin-barn/1.", show_default=False)
+    ],
     worlds: Annotated[
         str | None, typer.Option(metavar="IDS", help="Only these: 3,9,60-90.", show_default="all")
     ] = None,
@@ -41,7 +43,8 @@ def barn(
         typer.Option("--set", metavar="KEY=VALUE", help="Change the scenarios; may be repeated."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the results.", show_default="runs/barn/<time>")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the results.", show_default="runs/barn/<time>"),
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write Rerun recordings too.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,

@@ -29,7 +29,7 @@ def slam(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write map, picture and pose graph of each log.")
+        Path | None, typer.Option(metavar="DIR", help="Write map, picture and pose graph of each log.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:

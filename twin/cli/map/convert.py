@@ -12,7 +12,9 @@ from twin.cli.map.map_files import Format, Map, load, told, yaml_path
 
 def convert(
     name: Map,
-    output: Annotated[Path, typer.Option("-o", "--output", help="YAML file to write.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="YAML file to write.", show_default=False)
+    ],
     mode: Annotated[
         str,
         typer.Option(

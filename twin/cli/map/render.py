@@ -18,7 +18,9 @@ def render(
     name: Annotated[
         str, typer.Argument(metavar="ARENA|SCENARIO", help="A shipped arena, an arena file or a scenario.")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="YAML file to write.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="YAML file to write.", show_default=False)
+    ],
     resolution: Annotated[float, typer.Option(metavar="M", min=0.001, help="Size of a cell.")] = 0.05,
     height: Annotated[float, typer.Option(metavar="M", help="Of the lidar's plane above the floor.")] = 0.18,
     margin: Annotated[float, typer.Option(metavar="M", min=0.0, help="Unknown space around the hall.")] = 0.5,

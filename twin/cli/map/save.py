@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def save(
     topic: Annotated[str, typer.Option("-t", "--topic", help="Where the map is published.")] = "map",
     name: Annotated[
-        Path | None, typer.Option("-f", "--file", help="Path without ending.", show_default="map_<time>")
+        Path | None,
+        typer.Option("-f", "--file", metavar="FILE", help="Path without ending.", show_default="map_<time>"),
     ] = None,
     mode: Mode = "trinary",
     image_format: Format = "",

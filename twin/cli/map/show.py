@@ -17,7 +17,9 @@ def show(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Picture to write: .png or .svg.", show_default="none"),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Picture to write: .png or .svg.", show_default="none"
+        ),
     ] = None,
     size: Annotated[
         int, typer.Option(min=16, max=20000, help="Longer side of the picture, in pixels.")

@@ -34,7 +34,10 @@ def record(
     regex: Regex = "",
     exclude: Exclude = "",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the bag.", show_default="rosbag2_<time>")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="DIR", help="Folder of the bag.", show_default="rosbag2_<time>"
+        ),
     ] = None,
     storage: Annotated[str, typer.Option("--storage", help="mcap or sqlite3.")] = "mcap",
     compression: Compression = "none",
@@ -148,7 +151,13 @@ def convert(
     bag: Bag,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="The new bag: a folder, or a .bag file.", show_default=False),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR|FILE",
+            help="The new bag: a folder, or a .bag file.",
+            show_default=False,
+        ),
     ],
     storage: Annotated[
         str, typer.Option("--storage", "-s", help="mcap, sqlite3 or rosbag1.", show_default="mcap, or by -o")

@@ -91,6 +91,7 @@ def graph_(
         typer.Option(
             "-o",
             "--output",
+            metavar="FILE",
             help="File to write: .gv or .svg; - is .gv on stdout.",
             show_default="text on stdout",
         ),

@@ -58,9 +58,11 @@ def frames(
 @joins
 @endless
 def echo(
-    source_frame: Annotated[str, typer.Argument(help="Frame in which the other one is shown.")],
-    target_frame: Annotated[str, typer.Argument(help="Frame whose pose is shown.")],
-    rate: Annotated[float, typer.Argument(min=1e-3, help="How often, in Hz.")] = 1.0,
+    source_frame: Annotated[
+        str, typer.Argument(metavar="SOURCE_FRAME", help="Frame in which the other one is shown.")
+    ],
+    target_frame: Annotated[str, typer.Argument(metavar="TARGET_FRAME", help="Frame whose pose is shown.")],
+    rate: Annotated[float, typer.Argument(metavar="[RATE]", min=1e-3, help="How often, in Hz.")] = 1.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first.")] = False,
     timeout: Annotated[
         float | None,
@@ -89,8 +91,12 @@ def echo(
 @joins
 @endless
 def monitor(
-    source_frame: Annotated[str | None, typer.Argument(help="First frame of a chain.")] = None,
-    target_frame: Annotated[str | None, typer.Argument(help="Last frame of a chain.")] = None,
+    source_frame: Annotated[
+        str | None, typer.Argument(metavar="[SOURCE_FRAME]", help="First frame of a chain.")
+    ] = None,
+    target_frame: Annotated[
+        str | None, typer.Argument(metavar="[TARGET_FRAME]", help="Last frame of a chain.")
+    ] = None,
     duration: Annotated[float, typer.Option(min=0.01, help="Seconds between two reports.")] = 10.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first report.")] = False,
     *,
@@ -134,8 +140,10 @@ def monitor(
 @joins
 @endless
 def throttle(
-    target_frame: Annotated[str, typer.Argument(help="The parent in what is published.")],
-    source_frames: Annotated[list[str], typer.Argument(help="The children.")],
+    target_frame: Annotated[
+        str, typer.Argument(metavar="TARGET_FRAME", help="The parent in what is published.")
+    ],
+    source_frames: Annotated[list[str], typer.Argument(metavar="SOURCE_FRAME...", help="The children.")],
     rate: Annotated[float, typer.Option(help="At most so often, in Hz.")] = 10.0,
     trans_thres: Annotated[float, typer.Option(help="Only after moving farther, in m; 0: always.")] = 0.0,
     angular_thres: Annotated[

@@ -1,0 +1,38 @@
+"""A recording on a disk that is full: told, by its name, and never waited for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+_FULL = """
+import pathlib, resource, sys
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from twin.errors import RecordingError
+from twin.recording.stream import end_recording, flush, open_recording
+
+path = pathlib.Path(sys.argv[1])
+recording = open_recording(path, "twin", "run", rrb.Blueprint())
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+for action in (flush,) * 4 + (end_recording,):
+    recording.log("/x", rr.Tensor(np.random.rand(3000)))
+    try:
+        action(recording, path)
+    except RecordingError as fault:
+        print(fault)
+"""
+
+
+def test_a_full_disk_is_told_and_not_waited_for(tmp_path: Path) -> None:
+    """Rerun's writer ends with its first failure, and its words are coloured in a pipe, too."""
+    path = tmp_path / "a.rrd"
+    done = subprocess.run(
+        [sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True, check=False, timeout=60
+    )
+    said = done.stdout.splitlines()
+    assert set(said) == {f"{path}: the recording could not be written to its end; is the disk full?"}
+    assert len(said) >= 2  # a flush after the failure, and the end
+    assert (done.returncode, done.stderr) == (0, "")
