@@ -16,6 +16,7 @@ from twin.bridge.node_options import NodeOptions
 from twin.bridge.qos import QoS
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
+from twin.periods import period_of
 
 SECOND = 1_000_000_000
 
@@ -66,6 +67,28 @@ def test_a_rate_sleeps_to_the_next_multiple(bus: Bus, clock: Clock) -> None:
     assert task.done
     with pytest.raises(BridgeError, match="rate of 0 Hz"):
         node.create_rate(0)
+
+
+def test_a_timer_of_30_hz_keeps_its_mean_rate(bus: Bus, clock: Clock) -> None:
+    node = bus.create_node("a")
+    fired: list[int] = []
+    awake: list[int] = []
+    rate = node.create_rate(30.0)
+
+    def work() -> Generator[None, None, None]:
+        while True:
+            yield from rate.sleep()
+            awake.append(clock.now_ns)
+
+    node.create_timer(period_of(30.0), lambda: fired.append(clock.now_ns))
+    node.create_task(work())
+    ticks = [k * SECOND // 50 for k in range(50 * 100 + 1)]
+    for clock.now_ns in ticks:
+        bus.spin()
+    due = [-(-k * SECOND // 30) for k in range(1, 3001)]
+    assert len(fired) == 3000
+    assert all(0 <= time - at < SECOND // 50 for time, at in zip(fired, due, strict=True)), "the first tick"
+    assert awake == fired
 
 
 def test_an_exception_in_a_task_is_not_swallowed(bus: Bus) -> None:

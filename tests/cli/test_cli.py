@@ -51,6 +51,7 @@ class FakeRuntime:
         self.calls: list[dict[str, Any]] = []
         self.passed = True
         self.fault: Exception | None = None
+        self.metrics = {"sim_time_s": 1.0, "wall_time_s": 0.1, "real_time_factor": 10.0}
 
     def run(self, scenario: Scenario, **options: Any) -> Verdict:
         self.calls.append({"scenario": scenario, **options})
@@ -60,9 +61,12 @@ class FakeRuntime:
         check = CheckResult(
             name="energy", passed=self.passed, value=0.25, limit=1.0, unit="J", at_s=1.0, reason=reason
         )
-        metrics = {"sim_time_s": 1.0, "wall_time_s": 0.1, "real_time_factor": 10.0}
         return Verdict(
-            scenario=scenario.name, seed=scenario.seed, checks=(check,), metrics=metrics, digest="ab" * 32
+            scenario=scenario.name,
+            seed=scenario.seed,
+            checks=(check,),
+            metrics=self.metrics,
+            digest="ab" * 32,
         )
 
 
@@ -177,6 +181,18 @@ def test_pass_is_0_and_writes_the_files(demo: Path, runtime: FakeRuntime, invoke
     (call,) = runtime.calls
     assert call["scenario"].checks[0].energy.max == 2.0
     assert (call["record"], call["pace"], call["network"]) == (False, None, None)
+
+
+@pytest.mark.parametrize(
+    ("losses", "lost_s", "told"),
+    [(0, 0.0, ""), (1, 7.96, "lost once, 8.0 s in all"), (12, 3.14, "lost 12 times, 3.1 s in all")],
+)
+def test_a_pace_that_was_lost_is_told(
+    demo: Path, runtime: FakeRuntime, invoke: Invoke, losses: float, lost_s: float, told: str
+) -> None:
+    runtime.metrics |= {"pace_losses": losses, "pace_lost_s": lost_s}
+    _, out, _ = invoke("run", str(demo), "--pace", "1", "--no-record")
+    assert re.findall(r"the pace was (.*\S)", out) == ([told] if told else [])
 
 
 def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from twin.bridge.msgs import Float64MultiArray, JointState, MultiArrayLayout, Od
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
+from twin.nodes.mission_nodes import VelocityProfileNode
 from twin.nodes.navigation.twist_mux import TwistMuxNode
 from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
 from twin.nodes.position_controller import PositionControllerNode
@@ -162,3 +164,21 @@ def test_position_controller_takes_one_value_per_joint(bench: Bench) -> None:
     bench.run(0.1)
     assert joints.target.tolist() == [0.1, 0.2]
     assert any("1 commands for the 2 joints tilt, swivel" in line for line in logs)
+
+
+def test_a_velocity_profile_keeps_its_durations_to_the_control_period(bench: Bench) -> None:
+    sent: list[tuple[float, float]] = []
+    bench.node.create_subscription(
+        Twist, "cmd_vel", lambda twist: sent.append((round(bench.now_s, 3), twist.linear.x)), 10
+    )
+    mission = VelocityProfileNode(bench.bus, [(0.13, 1.0, 0.0), (1.005, 2.0, 0.0), (0.1, 3.0, 0.0)])
+    bench.until(lambda: mission.done)
+    begins: dict[float, float] = {}
+    for time_s, speed in sent:
+        begins.setdefault(speed, time_s)
+    start = begins[1.0]
+    due = {1.0: 0.0, 2.0: 0.13, 3.0: 1.135, 0.0: 1.235}
+    assert list(begins) == list(due)
+    for speed, at in due.items():
+        assert -1e-9 <= begins[speed] - start - at < 0.02, "at the first control period at or after"
+    assert all(later - earlier <= 0.1 + 1e-9 for (earlier, _), (later, _) in pairwise(sent)), "10 Hz or more"

@@ -45,6 +45,29 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.parametrize("poses_hz", [25.0, 30.0, 33.3])
+def test_poses_come_at_their_rate(tmp_path: Path, make_world: Any, poses_hz: float) -> None:
+    sampled: list[int] = []
+
+    class Watched(make_world):  # type: ignore[misc, valid-type]
+        def body_poses(self) -> tuple[Any, Any]:
+            sampled.append(self.time_ns)
+            xyz, quat = super().body_poses()
+            return xyz, quat
+
+    world = Watched()
+    sink = RerunSink(tmp_path / "poses.rrd", config=RecordingConfig(poses_hz=poses_hz))
+    sink.declare(world)
+    sampled.clear()
+    for tick in range(1, 501):
+        world.time_ns = tick * 20_000_000
+        sink.on_tick(world)
+    due = [k * 1e9 / poses_hz for k in range(1, int(10.0 * poses_hz) + 1)]
+    assert len(sampled) == len(due)
+    assert all(-1.0 <= time - at < 20e6 for time, at in zip(sampled, due, strict=True))
+    sink.close()
+
+
 def test_killed_run_keeps_all_but_its_last_block(killed: Path) -> None:
     content = read(killed)
     times, _ = content.scalars("/velocity/robot/linear/measured")
@@ -65,7 +88,9 @@ def test_equal_runs_are_equal_whatever_their_blocks(make_run: Any, verdict: Any,
     digests = []
     for i, block_s in enumerate((1.0, 1.0, 0.3)):
         sink = RerunSink(tmp_path / f"{i}.rrd", config=RecordingConfig(block_s=block_s))
-        make_run(duration_s=1.5).play(sink, {**verdict, "metrics": {"wall_time_s": i}})
+        make_run(duration_s=1.5).play(
+            sink, {**verdict, "metrics": {"wall_time_s": i, "pace_losses": i, "pace_lost_s": i}}
+        )
         digests.append(content_digest(tmp_path / f"{i}.rrd"))
     assert digests[0] == digests[1] == digests[2]
     make_run(duration_s=1.46).play(RerunSink(tmp_path / "other.rrd"))

@@ -8,22 +8,29 @@ from pathlib import Path
 
 from twin import runtime
 from twin.scenario.schema import load
+from twin.scenario.verdict import Verdict
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
-def digest(tmp_path: Path, *, seed: int = 1, **options: object) -> str:
+def outcome(*, seed: int = 1, **options: object) -> Verdict:
     scenario = load(SCENARIOS / "diff_bot_figure8.yaml", {"seed": str(seed), "duration": "4 s"})
-    verdict = runtime.run(scenario, **options)  # type: ignore[arg-type]
-    assert verdict.digest is not None
-    return verdict.digest
+    return runtime.run(scenario, **options)  # type: ignore[arg-type]
+
+
+def digest(tmp_path: Path, *, seed: int = 1, **options: object) -> str:
+    found = outcome(seed=seed, **options).digest
+    assert found is not None
+    return found
 
 
 def test_seed_decides_and_nothing_else(tmp_path: Path) -> None:
-    plain = digest(tmp_path, record=False)
+    unpaced, paced = outcome(record=False), outcome(record=False, pace=4.0)
+    plain = unpaced.digest
     assert plain == digest(tmp_path, record=False)
     assert plain == digest(tmp_path, out=tmp_path / "recorded"), "recording changes nothing"
-    assert plain == digest(tmp_path, record=False, pace=4.0), "pacing changes nothing"
+    assert plain == paced.digest, "pacing changes nothing"
+    assert paced.metrics.keys() - unpaced.metrics.keys() == {"pace_losses", "pace_lost_s"}
     assert plain != digest(tmp_path, seed=2, record=False)
 
 

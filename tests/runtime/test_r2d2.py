@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from twin.runtime.run import Run
 from twin.scenario.schema import load
@@ -16,7 +20,17 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 def test_r2d2_is_on_its_circle_and_sweeps_its_joints_through_their_ranges(
     make_run: Callable[..., Run],
 ) -> None:
-    run = make_run(load(SCENARIOS / "r2d2_circle.yaml"))
+    times: list[int] = []
+
+    def tap(sample: Any) -> None:
+        if sample.topic == "/position_controller/commands":
+            times.append(sample.time_ns)
+
+    def due_since(time_ns: int, tick_ns: int) -> bool:
+        """Whether a 30th of a second ended in the tick that ended at a time."""
+        return any(time_ns - tick_ns < k * Fraction(10**9, 30) <= time_ns for k in range(1, 241))
+
+    run = make_run(load(SCENARIOS / "r2d2_circle.yaml"), taps=[tap])
     (stack,) = run.parts.stacks.values()
     hardware = stack.handle.hardware
     positions, radii = [], []
@@ -29,4 +43,5 @@ def test_r2d2_is_on_its_circle_and_sweeps_its_joints_through_their_ranges(
         values = [position[joint] for position in positions]
         assert min(values) < low + 0.03, joint
         assert max(values) > high - 0.03, joint
-    assert positions[-1]["swivel"] > 3.0, "one degree a cycle, 25 cycles a second"
+    assert math.degrees(positions[-1]["swivel"]) == pytest.approx(240.0, abs=4.0), "30 degrees a second"
+    assert times == [t for t in range(0, 8_000_000_000, 20_000_000) if due_since(t, 20_000_000)]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.sim.conftest import BUMPER, IMU, LIDAR, SONAR, box, placed
+from twin.errors import ModelError
 from twin.geometry import Pose2, Pose3, rotate_wxyz
 from twin.models.shapes import Box
 from twin.models.specs import SensorSpec
@@ -194,11 +195,11 @@ def test_bumper_feels_a_wall_but_not_the_floor(room: Scene) -> None:
     assert reading.force_N > 1.0
 
 
-def test_periods_are_those_of_the_rates(room: Scene) -> None:
-    world = World.compose(room, [placed()])
-    assert [s.period_ns for s in world.robots["cart"].sensors] == [
-        100_000_000,
-        10_000_000,
-        50_000_000,
-        20_000_000,
-    ]
+def test_no_sensor_is_faster_than_the_physics(room: Scene) -> None:
+    World.compose(room, [placed(sensors=(replace(IMU, rate_hz=500.0), replace(BUMPER, rate_hz=499.0)))])
+    with pytest.raises(ModelError) as caught:
+        World.compose(room, [placed(sensors=(replace(IMU, rate_hz=1000.0, line=7),))])
+    assert str(caught.value).endswith(
+        ":7: sensor 'imu' of robot 'cart' samples at 1000 Hz, faster than the physics steps; "
+        "valid is at most 500 Hz, or a physics.timestep of at most 1 ms instead of 2 ms"
+    )

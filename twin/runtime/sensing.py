@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from twin.nodes.sensor_publishers import SensorPublisher
-from twin.periods import latest, next_due
+from twin.periods import Period, latest, next_due
 
 
 class SensorSchedule:
@@ -19,12 +19,12 @@ class SensorSchedule:
         """Take in sensors at time 0, and tell of each how late it can be; `timestep_ns` of the physics."""
         self._sensors = tuple(sensors)
         self._timestep_ns = timestep_ns
-        self._steps = [self._step_after(sensor, 0) for sensor in self._sensors]
+        self._periods = [sensor.sensor.spec.period for sensor in self._sensors]
+        self._steps = [self._step_after(period, 0) for period in self._periods]
         self.next_step = min(self._steps, default=sys.maxsize)
         """The physics step at which a sensor fires next."""
-        for sensor in self._sensors:
-            spec = sensor.sensor.spec
-            late_ns = latest(spec.period, timestep_ns)
+        for sensor, period in zip(self._sensors, self._periods, strict=True):
+            spec, late_ns = sensor.sensor.spec, latest(period, timestep_ns)
             if late_ns > 0:
                 sensor.node.get_logger().warn(
                     f"sensor '{spec.name}' samples up to {late_ns / 1e6:.3g} ms late, at {spec.rate_hz:g} Hz "
@@ -39,8 +39,8 @@ class SensorSchedule:
         for i, sensor in enumerate(self._sensors):
             if step >= self._steps[i]:
                 sensor.publish(time_ns)
-                self._steps[i] = self._step_after(sensor, time_ns)
+                self._steps[i] = self._step_after(self._periods[i], time_ns)
         self.next_step = min(self._steps)
 
-    def _step_after(self, sensor: SensorPublisher, time_ns: int) -> int:
-        return -(-next_due(sensor.sensor.spec.period, time_ns) // self._timestep_ns)
+    def _step_after(self, period: Period, time_ns: int) -> int:
+        return -(-next_due(period, time_ns) // self._timestep_ns)
