@@ -182,8 +182,6 @@ def test_amcl_finds_itself_from_anywhere_when_asked(bench: Bench) -> None:
 class Device:
     """A sensor with one reading."""
 
-    period_ns = 100_000_000
-
     def __init__(self, spec: Any, **reading: Any) -> None:
         self.spec = spec
         self._reading = type("Reading", (), reading)()
@@ -218,6 +216,16 @@ def test_a_laser_scan_follows_rep_117(bench: Bench) -> None:
     assert message.ranges.dtype == np.float32
     assert np.array_equal(np.isposinf(message.ranges), [False, True, False, True, False]), "no return is inf"
     assert len(message.intensities) == 0
+
+
+def test_a_laser_of_one_ray_is_a_scan_too(bench: Bench) -> None:
+    spec = LidarSpec(
+        name="cliff", link="cliff", topic="cliff", rate_hz=62.0, samples=1,
+        angle_min=0.2, angle_max=0.2, range_min=0.01, range_max=0.2,
+    )  # fmt: skip
+    message = publish(bench, LaserScan, Device(spec, ranges=np.array([0.1])))
+    assert (len(message.ranges), message.angle_increment) == (1, 0.0)
+    assert message.scan_time == pytest.approx(1.0 / 62.0)
 
 
 def test_an_imu_says_that_it_knows_no_orientation(bench: Bench) -> None:

@@ -32,7 +32,7 @@ def _laser_scan(spec: LidarSpec, header: Header, reading: Any) -> LaserScan:
         header=header,
         angle_min=spec.angle_min,
         angle_max=spec.angle_max,
-        angle_increment=(spec.angle_max - spec.angle_min) / (spec.samples - 1),
+        angle_increment=(spec.angle_max - spec.angle_min) / max(1, spec.samples - 1),
         time_increment=0.0,
         scan_time=1.0 / spec.rate_hz,
         range_min=spec.range_min,

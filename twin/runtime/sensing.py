@@ -23,13 +23,7 @@ class SensorSchedule:
         self._steps = [self._step_after(period, 0) for period in self._periods]
         self.next_step = min(self._steps, default=sys.maxsize)
         """The physics step at which a sensor fires next."""
-        for sensor, period in zip(self._sensors, self._periods, strict=True):
-            spec, late_ns = sensor.sensor.spec, latest(period, timestep_ns)
-            if late_ns > 0:
-                sensor.node.get_logger().warn(
-                    f"sensor '{spec.name}' samples up to {late_ns / 1e6:.3g} ms late, at {spec.rate_hz:g} Hz "
-                    f"on average: its period is no whole number of physics steps of {timestep_ns / 1e6:g} ms"
-                )
+        self._tell_lateness()
 
     def fire(self, step: int) -> None:
         """Let the sensors due at a physics step publish, in their order, stamped with its time."""
@@ -44,3 +38,17 @@ class SensorSchedule:
 
     def _step_after(self, period: Period, time_ns: int) -> int:
         return -(-next_due(period, time_ns) // self._timestep_ns)
+
+    def _tell_lateness(self) -> None:
+        """Warn, in one sentence per robot and rate, of sensors that cannot be sampled when they are due."""
+        alike: dict[tuple[str, float], list[int]] = {}
+        for i, sensor in enumerate(self._sensors):
+            if latest(self._periods[i], self._timestep_ns) > 0:
+                alike.setdefault((sensor.node.namespace, sensor.sensor.spec.rate_hz), []).append(i)
+        for (_, rate_hz), group in alike.items():
+            names = ", ".join(self._sensors[i].sensor.spec.name for i in group)
+            late_ns = latest(self._periods[group[0]], self._timestep_ns)
+            self._sensors[group[0]].node.get_logger().warn(
+                f"sampled at {rate_hz:g} Hz on average, but up to {late_ns / 1e6:.3g} ms late, as the "
+                f"period is no whole number of physics steps ({self._timestep_ns / 1e6:g} ms): {names}"
+            )
