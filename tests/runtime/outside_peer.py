@@ -1,6 +1,6 @@
 """A process of its own, made of Zenoh and struct alone: drives by /cmd_vel, and decodes /odom and /clock.
 
-Arguments: endpoint, seconds to take part. Prints one line of JSON.
+Arguments: endpoint, seconds to take part from the first `/clock` on. Prints one line of JSON.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def main() -> None:
     session = connected(config)
     poses: list[dict[str, object]] = []
     clocks: list[float] = []
-    done = threading.Event()
+    begun, done = threading.Event(), threading.Event()
 
     def on_odom(sample: zenoh.Sample) -> None:
         if not done.is_set():
@@ -65,10 +65,12 @@ def main() -> None:
         if not done.is_set():
             sec, nanosec = struct.unpack_from("<iI", sample.payload.to_bytes(), 4)
             clocks.append(sec + nanosec * 1e-9)
+            begun.set()
 
     with session:
         session.declare_subscriber(ODOM, on_odom)
         session.declare_subscriber(CLOCK, on_clock)
+        begun.wait(30.0)  # the run listens before it is built
         end = time.monotonic() + float(sys.argv[2])
         sequence = 0
         while time.monotonic() < end:
