@@ -31,7 +31,8 @@ HEAVY = (
 
 WALL_CLOCK = {
     "twin/benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
-    "twin/runtime/run.py": {"perf_counter", "process_time", "sleep"},  # pacing, and how long the run took
+    "twin/runtime/pacing.py": {"perf_counter", "sleep"},  # how a paced run waits
+    "twin/runtime/run.py": {"perf_counter", "process_time"},  # how long the run took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
     "twin/bridge/wire/session.py": {"monotonic", "sleep"},  # who is asked for may start later

@@ -18,6 +18,7 @@ import numpy as np
 
 from twin import runtime
 from twin.models.specs import LidarSpec
+from twin.periods import next_due
 from twin.runtime.build import build
 from twin.scenario.schema import Scenario, load
 
@@ -43,15 +44,17 @@ def raw_limit(scenario: Scenario, simulated_s: float) -> float:
         for lidar in robot.sensors
         if isinstance(lidar.spec, LidarSpec)
     ]
-    periods = [lidar.period_ns for lidar in lidars]
+    periods = [lidar.spec.period for lidar in lidars]
+    due = [next_due(period, 0) for period in periods]
     ticks = round(simulated_s * 1e9 / parts.control_period_ns)
     start = time.process_time()
     for tick in range(1, ticks + 1):
         mujoco.mj_step(model, data, substeps)
         now = tick * parts.control_period_ns
-        for period, cast in zip(periods, casts, strict=True):
-            if now % period == 0:
+        for i, cast in enumerate(casts):
+            if now >= due[i]:
                 cast()
+                due[i] = next_due(periods[i], now)
     return time.process_time() - start
 
 

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from tests.sim.conftest import box, placed, tote
-from twin.errors import ModelError, ScenarioError, SimulationError
+from twin.errors import ScenarioError, SimulationError
 from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box
-from twin.models.specs import ImuSpec
 from twin.sim.physics import Physics
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
 from twin.sim.world import World
@@ -170,14 +169,6 @@ def test_divergence_stops_the_run_and_leaves_evidence(room: Scene, tmp_path: Pat
     assert len(saved["states"]) >= 50
     assert np.isfinite(saved["states"][0]).all()
     assert np.all(np.diff(saved["times"]) > 0)
-
-
-def test_a_sensor_period_must_be_whole_physics_steps(room: Scene) -> None:
-    odd = ImuSpec(name="imu", link="imu", topic="imu", rate_hz=30.0, line=7)
-    with pytest.raises(
-        ModelError, match=r"cart.urdf:7: sensor 'imu'.*33.3333 ms.*step of 2 ms.*29.4118 Hz or 31.25"
-    ):
-        World.compose(room, [placed(sensors=(odd,))])
 
 
 def test_saved_model_moves_as_the_world_does(room: Scene, tmp_path: Path) -> None:

@@ -55,7 +55,10 @@ def _names(scenario: Scenario) -> Iterator[Fault]:
 
 def _periods(scenario: Scenario) -> Iterator[Fault]:
     timestep, control = scenario.physics.timestep, scenario.physics.control_period
-    if nanoseconds(control) % max(1, nanoseconds(timestep)):
+    if not nanoseconds(timestep):
+        yield Fault(("physics", "timestep"), f"the physics step ({timestep:g} s) must be at least 1 ns")
+        return
+    if not nanoseconds(control) or nanoseconds(control) % nanoseconds(timestep):
         text = f"the control period {_whole(control, 'physics steps', timestep)}"
         yield Fault(("physics", "control_period"), text)
         return
@@ -71,7 +74,7 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
             most = f"at most {1.0 / control:.6g} Hz, one per control period ({control * 1e3:g} ms)"
             yield Fault(loc, f"{what} ({rate:g} Hz) must be {most}")
     for i, robot in enumerate(scenario.robots):
-        if nanoseconds(robot.command_latency) % max(1, nanoseconds(control)):
+        if nanoseconds(robot.command_latency) % nanoseconds(control):
             whole = _whole(robot.command_latency, "control periods", control)
             yield Fault(("robots", i, "command_latency"), f"the latency of commands {whole}")
 
