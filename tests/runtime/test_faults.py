@@ -141,6 +141,14 @@ def test_odometry_that_jumps_does_not_lead_astray(drive: Drive, odometry: str) -
 
 
 @pytest.mark.slow
+def test_an_encoder_that_counts_the_wrong_way_ends_the_mission_with_that_reason(drive: Drive) -> None:
+    run = drive("encoder: {joint: wheel_right_joint, factor: -1, at: 2 s}")
+    assert run.parts.mission.succeeded is False
+    assert "wheels and lidar contradict each other: in " in run.parts.mission.reason
+    assert run.world.time_ns < 45e9
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "by"),
     [("rack", "{x: 0.46, y: -0.2}"), ("machine", "{x: -0.35, y: 0.35}"), ("machine", "{y: 0.5}")],
@@ -193,6 +201,10 @@ def test_faults_act_on_the_hardware_and_are_told(
     ("fault", "message"),
     [
         ("lidar: {sensor: skan, kind: stop, at: 1}", "no lidar 'skan'; did you mean 'scan'"),
+        (
+            "encoder: {joint: wheel_rihgt_joint, factor: 0, at: 1}",
+            "no encoder at joint 'wheel_rihgt_joint'; did you",
+        ),
         ("displacement: {name: rak, by: {x: 1}}", "no part 'rak'; did you mean 'rack'"),
     ],
 )

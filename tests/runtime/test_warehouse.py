@@ -80,7 +80,7 @@ def test_it_delivers_and_says_so(warehouse: Outcome) -> None:
 
 def test_its_numbers_are_those_of_a_real_drive(warehouse: Outcome) -> None:
     """A grasp by friction creeps a little, a particle filter is off a little; zero would be a cheat."""
-    assert 1e-5 < warehouse.check("tote_slip")["value"] < 5e-3
+    assert 1e-5 < warehouse.check("tote_slip")["value"] < 2e-3
     assert 1e-3 < warehouse.check("localisation_error")["value"] < 0.05
     assert 18.0 < warehouse.check("driven_distance")["value"] < 30.0
     assert 100.0 < warehouse.check("energy")["value"] < 1000.0

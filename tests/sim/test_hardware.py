@@ -66,6 +66,25 @@ def test_encoders_count_whole_ticks_and_differentiate_them(world: World) -> None
     assert reading.velocity[0] == pytest.approx(3.0, abs=TICK / 0.02 + 0.05)
 
 
+@pytest.mark.parametrize("factor", [-1.0, 0.0, 1.5])
+def test_an_encoder_that_misreads_goes_on_from_where_it_was(world: World, factor: float) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("left_wheel_joint", 3.0)
+    hardware.command("right_wheel_joint", 3.0)
+    hardware.apply()
+    world.step(500)
+    before, true = hardware.read().position, world.data.joint("cart/left_wheel_joint").qpos[0]
+    hardware.misread("left_wheel_joint", factor)
+    world.step(1)
+    assert hardware.read().position[0] == pytest.approx(before[0], abs=0.02), "it does not jump"
+    world.step(500)
+    after, turned = hardware.read().position, world.data.joint("cart/left_wheel_joint").qpos[0] - true
+    assert after[0] - before[0] == pytest.approx(factor * turned, rel=0.01, abs=2.0 * TICK)
+    assert after[1] - before[1] == pytest.approx(turned, rel=0.01), "the other wheel's counts rightly"
+    with pytest.raises(SimulationError, match="no encoder measures joint 'mast_joint'"):
+        hardware.misread("mast_joint", factor)
+
+
 def test_other_joints_have_a_little_noise_and_reach_their_command(world: World) -> None:
     hardware = world.robots["cart"].hardware
     hardware.command("mast_joint", 0.2)

@@ -27,6 +27,7 @@ from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.localisation.particles import clusters, regularised, tempered_weights
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.odometry_watch import OdometryWatch
 from twin.navigation.planning.planner import Planner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
@@ -38,6 +39,16 @@ _START, _GOAL = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
 def warm_up_costmap() -> None:
     """Let a scan into a costmap."""
     _costmap().update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
+
+
+@cache
+def warm_up_odometry_watch() -> None:
+    """Let scans of a corner contradict odometry, so that their motion is looked for."""
+    along = np.linspace(0.0, 1.0, 30)
+    corner = np.column_stack([np.minimum(2.0 * along, 1.0), np.minimum(2.0 - 2.0 * along, 1.0)])
+    watch = OdometryWatch()
+    watch.take(corner, Pose2(0.0, 0.0, 0.0), 0)
+    watch.take(corner, Pose2(0.0, 0.0, 1.0), 500_000_000)
 
 
 @cache

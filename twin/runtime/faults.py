@@ -11,7 +11,7 @@ from twin.errors import ScenarioError, nearest
 from twin.geometry import Pose3
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.runtime.robot_stack import RobotStack
-from twin.scenario.faults import Displacement, FaultEntry, Kidnapping, LidarFault, OdometryJump
+from twin.scenario.faults import Displacement, EncoderFault, FaultEntry, Kidnapping, LidarFault, OdometryJump
 from twin.sim.sensors.failing import FailingLidar
 from twin.sim.sensors.lidar import Lidar
 from twin.sim.world import World
@@ -55,7 +55,7 @@ def _events(entry: FaultEntry, stacks: Mapping[str, RobotStack]) -> Iterator[_Ev
     fault = entry.config
     if isinstance(fault, Displacement):
         return  # the world is built so
-    assert isinstance(fault, LidarFault | Kidnapping | OdometryJump)
+    assert isinstance(fault, LidarFault | Kidnapping | OdometryJump | EncoderFault)
     stack = stacks[fault.robot] if fault.robot is not None else next(iter(stacks.values()))
     start_ns = round(fault.at * 1e9)
     match fault:
@@ -74,6 +74,13 @@ def _events(entry: FaultEntry, stacks: Mapping[str, RobotStack]) -> Iterator[_Ev
             yield _Event(start_ns, text, partial(stack.handle.carry, to))
         case OdometryJump():
             yield _Event(start_ns, f"odometry of {stack.name} jumps", _miscount(stack, fault))
+        case EncoderFault():
+            hardware = stack.handle.hardware
+            if fault.joint not in hardware.encoders:
+                known = nearest(fault.joint, hardware.encoders)
+                raise ScenarioError(f"robot '{stack.name}' has no encoder at joint '{fault.joint}'; {known}")
+            text = f"the encoder of {stack.name}'s {fault.joint} counts {fault.factor:g} times what it should"
+            yield _Event(start_ns, text, partial(hardware.misread, fault.joint, fault.factor))
 
 
 def _failing_lidar(stack: RobotStack, topic: str) -> FailingLidar:

@@ -45,6 +45,15 @@ class OdometryJump(RobotFault):
     """... while it turned by so much [rad]."""
 
 
+class EncoderFault(RobotFault):
+    """The encoder of a wheel counts wrongly from then on."""
+
+    joint: str
+    """The wheel's joint."""
+    factor: float
+    """Of what it should count: -1 the wrong way, 0 nothing, 1.02 two percent too much."""
+
+
 class Displacement(StrictModel):
     """A part of the arena stands elsewhere than on its map, from the start; its goods stand on it."""
 
@@ -63,5 +72,7 @@ class FaultEntry(OneOf):
     """The robot is carried away."""
     odometry_jump: OdometryJump | None = None
     """Odometry is suddenly wrong."""
+    encoder: EncoderFault | None = None
+    """Odometry is wrong all the time."""
     displacement: Displacement | None = None
     """The map is wrong."""

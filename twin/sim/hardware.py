@@ -197,12 +197,31 @@ class Hardware:
         Raises:
             SimulationError: No encoder measures this joint.
         """
-        encoders = [
-            name for name, is_encoder in zip(self.joint_names, self._encoder, strict=True) if is_encoder
-        ]
-        if joint not in encoders:
-            raise SimulationError(f"no encoder measures joint '{joint}'; {nearest(joint, encoders)}")
-        self._miscounted[self.joint_names.index(joint)] += round(angle / self._tick)
+        self._miscounted[self._index_of_encoder(joint)] += round(angle / self._tick)
+
+    def misread(self, joint: str, factor: float) -> None:
+        """Let the encoder of a joint count `factor` times what it did: -1 the wrong way, 0 nothing.
+
+        Args:
+            joint: One of `joint_names` that has an encoder.
+            factor: Of what it counts from now on.
+
+        Raises:
+            SimulationError: No encoder measures this joint.
+        """
+        before = self._count()
+        self._scale[self._index_of_encoder(joint)] *= factor
+        self._miscounted += before - self._count()
+
+    @property
+    def encoders(self) -> tuple[str, ...]:
+        """Joints that an encoder measures."""
+        return tuple(name for name, has in zip(self.joint_names, self._encoder, strict=True) if has)
+
+    def _index_of_encoder(self, joint: str) -> int:
+        if joint not in self.encoders:
+            raise SimulationError(f"no encoder measures joint '{joint}'; {nearest(joint, self.encoders)}")
+        return self.joint_names.index(joint)
 
     def _drive(self, joint: str) -> int:
         index = self._index.get(joint)

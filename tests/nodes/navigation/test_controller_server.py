@@ -13,7 +13,17 @@ from tests.nodes.conftest import Bench, Robot, open_room
 from tests.nodes.navigation.servers import FOOTPRINT, HALF, Stack
 from twin.bridge.action_types import FollowPath
 from twin.bridge.actions import ActionClient
-from twin.bridge.msgs import GoalStatus, MarkerArray, Path, SpeedLimit, new
+from twin.bridge.conversions import twist_from_planar
+from twin.bridge.msgs import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    GoalStatus,
+    MarkerArray,
+    Path,
+    SpeedLimit,
+    Twist,
+    new,
+)
 from twin.bridge.parameters.values import Parameter
 from twin.geometry import Pose2
 from twin.navigation.control.maneuver import ManeuverConfig
@@ -58,6 +68,31 @@ def test_a_stuck_robot_is_no_progress(bench: Bench) -> None:
     assert "progress" in goal.result.error_msg
     assert bench.now_s - began == pytest.approx(2.0, abs=0.3)
     assert stack.robot.commands[-1] == (0.0, 0.0)
+
+
+def test_wheels_and_a_lidar_that_contradict_each_other_end_the_drive(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The robot turns the other way than its odometry says."""
+    monkeypatch.setattr(Robot, "pose", property(lambda robot: Pose2(0, 0, -robot.drive.odometry.pose.yaw)))
+    stack = Stack(bench, costmap_update_timeout_ns=500_000_000)
+    diagnostics = bench.listen(DiagnosticArray, "/diagnostics")
+    turn = bench.node.create_publisher(Twist, "cmd_vel_nav", 1)
+    bench.each_tick.append(lambda: turn.publish(twist_from_planar(0.0, 0.5)))
+    bench.run(5.0)
+    assert stack.local_costmap.fault == ""
+    bench.run(6.0)
+    bench.each_tick.pop()
+    goal = stack.drive(np.array([[0, 0, 0], [2, 0, 0]], dtype=float))
+    bench.until(lambda: goal.done)
+    assert goal.result.error_code == 107
+    said = "wheels and lidar contradict each other: in 10 s odometry drove 0.0 m and turned 28"
+    assert said in goal.result.error_msg
+    assert "deg left, the scans drove 0.0 m and turned 2" in goal.result.error_msg
+    assert goal.result.error_msg.endswith("deg right")
+    status = diagnostics[-1].status[0]
+    assert (status.name, status.level) == ("/local_costmap/local_costmap: odometry", DiagnosticStatus.ERROR)
+    assert status.message.startswith("wheels and lidar contradict each other")
 
 
 def test_a_cancel_stops_the_robot(bench: Bench, stack: Stack) -> None:

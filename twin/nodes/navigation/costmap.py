@@ -9,14 +9,24 @@ import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Costmap as CostmapMessage
-from twin.bridge.msgs import LaserScan, OccupancyGrid, PolygonStamped, Range, ns
+from twin.bridge.msgs import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    LaserScan,
+    OccupancyGrid,
+    PolygonStamped,
+    Range,
+    header,
+    ns,
+)
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.maps.occupancy_map import OCCUPIED
-from twin.navigation.warm_up import warm_up_costmap, warm_up_ranges
+from twin.navigation.odometry_watch import OdometryWatch
+from twin.navigation.warm_up import warm_up_costmap, warm_up_odometry_watch, warm_up_ranges
 from twin.nodes.navigation.costmap_filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmap_messages import costmap_msg, occupancy_grid, polygon_msg
 from twin.nodes.navigation.costmap_services import CostmapServices
@@ -71,6 +81,8 @@ class _ScanSource:
         """One that has come since the last update."""
         self.last: LaserScan | None = None
         """The one taken last."""
+        self.odometry = OdometryWatch()
+        """What they say of odometry, in which a rolling window lives."""
 
 
 class CostmapNode:
@@ -84,6 +96,9 @@ class CostmapNode:
         warm_up_costmap()
         if config.range_topics:
             warm_up_ranges()
+        if config.layers.rolling_window:
+            warm_up_odometry_watch()
+            self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
         self._scans = {topic: _ScanSource(robot_pose, node.now_ns) for topic in config.scan_topics}
@@ -132,9 +147,14 @@ class CostmapNode:
         """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
         tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
         if not tolerance_ns:
-            return ""
+            return self._contradiction
         faults = (source.watch.fault(self.node.now_ns, tolerance_ns) for source in self._scans.values())
-        return next(filter(None, faults), "")
+        return next(filter(None, faults), "") or self._contradiction
+
+    @property
+    def _contradiction(self) -> str:
+        """Why odometry, in whose frame a rolling window lives, cannot be believed; empty if it can."""
+        return next(filter(None, (source.odometry.fault for source in self._scans.values())), "")
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
@@ -177,8 +197,20 @@ class CostmapNode:
                 self._take_scan(layers, scan)
 
     def _on_scan(self, source: _ScanSource, message: LaserScan) -> None:
-        if source.watch.accept(message, self.node.now_ns):
-            source.fresh = message
+        if not source.watch.accept(message, self.node.now_ns):
+            return
+        source.fresh = message
+        if self.config.layers.rolling_window:
+            self._compare_with_odometry(source.odometry, message)
+
+    def _compare_with_odometry(self, watch: OdometryWatch, scan: LaserScan) -> None:
+        frames, stamp_ns = self._robot_pose.frames, ns(scan.header.stamp)
+        odom = self._robot_pose.relative(frames.odom, frames.base, stamp_ns)
+        T_base_lidar = self._robot_pose.at_stamp(frames.base, scan.header)
+        if odom is None or T_base_lidar is None:
+            return
+        ends = scan_points(scan, 0.0, inf_is_valid=False)
+        watch.take(T_base_lidar.apply(ends[np.isfinite(ends[:, 0])]), odom, stamp_ns)
 
     def _update(self) -> None:
         layers = self._layers
@@ -228,3 +260,9 @@ class CostmapNode:
             frame, now = self.config.frame, self.node.now_ns
             self._publisher.publish(occupancy_grid(grid, frame, now))
             self._raw_publisher.publish(costmap_msg(grid, frame, now))
+        if contradiction := self._contradiction:
+            name = f"{self.node.fully_qualified_name}: odometry"
+            error = DiagnosticStatus(
+                level=DiagnosticStatus.ERROR, name=name, message=contradiction, hardware_id="", values=[]
+            )
+            self._diagnostics.publish(DiagnosticArray(header=header(self.node.now_ns, ""), status=[error]))

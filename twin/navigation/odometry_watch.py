@@ -1,0 +1,145 @@
+"""Whether odometry can be believed: an encoder that counts the wrong way, or not at all, still sends some."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.mapping.correlation import CorrelationGrid, Window
+
+_RAYS = 120
+"""Of a scan that are compared."""
+_CELL, _SMEAR, _LEVELS = 0.1, 0.15, 3
+"""Of the grid on which a motion is looked for [m]."""
+_FARTHEST, _WIDEST = 1.0, 1.2
+"""So far robots come between two scans that are compared [m], and turn [rad]."""
+_NEAR, _NEAR_PER_METRE = 0.1, 0.02
+"""Where a ray ends so near to the scan before, it is explained by it [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometryWatchConfig:
+    """When odometry and scans contradict each other. A turn of 1 rad counts like a way of 1 m."""
+
+    period_ns: int = 500_000_000
+    """Time between two scans that are compared [ns]."""
+    least_motion: float = 0.1
+    """Comparisons count in which either tells of so much motion [m] or [rad]."""
+    comparisons: int = 20
+    """Of the last so many ..."""
+    contradictions: int = 15
+    """... so many must contradict: 7.5 s of motion."""
+    difference: float = 0.5
+    """The motions differ by more than this part of the larger one; Nav2's alphas are for wheels that are
+    wrong by 45 %."""
+    fit: float = 0.7
+    """Least share of a scan that its motion must explain by the scan before ..."""
+    gain: float = 0.15
+    """... and by how much more than odometry's."""
+
+
+class _Comparison(NamedTuple):
+    """Motions of the base between two scans; turns may be more than half a turn."""
+
+    odometry: Pose2
+    scans: Pose2
+    contradicts: bool
+
+
+class OdometryWatch:
+    """Compares how the robot moved by odometry with how it moved by its scans.
+
+    Two scans that are half a second apart show the same surfaces: the motion that lays one on the other is
+    the robot's own, whatever its wheels and a map say. Odometry is asked first: where it explains the scan,
+    as along a corridor, it is believed. People who walk about explain no scan as a whole.
+    """
+
+    def __init__(self, config: OdometryWatchConfig | None = None) -> None:
+        """Begin without a scan."""
+        self._config = config or OdometryWatchConfig()
+        self._before: tuple[int, Pose2, Array] | None = None
+        self._odom: Pose2 | None = None
+        self._turned = 0.0
+        self._comparisons: deque[_Comparison] = deque(maxlen=self._config.comparisons)
+
+    def take(self, points: Array, odom: Pose2, time_ns: int) -> None:
+        """Take a scan.
+
+        Args:
+            points: Where its rays end, in the frame of the base, shape (n, 2) [m].
+            odom: The base's pose in odom when it was taken.
+            time_ns: When it was taken.
+        """
+        config = self._config
+        if self._odom is not None:
+            self._turned += wrap_angle(odom.yaw - self._odom.yaw)
+        self._odom = odom
+        if self._before is not None and time_ns - self._before[0] < config.period_ns:
+            return
+        before, self._before = self._before, (time_ns, odom, points)
+        turned, self._turned = self._turned, 0.0
+        if (
+            before is None
+            or time_ns - before[0] > 2 * config.period_ns
+            or not (len(points) and len(before[2]))
+        ):
+            return
+        moved = before[1].inverse() @ odom
+        compared = self._compare(before[2], points, Pose2(moved.x, moved.y, turned))
+        if max(_extent(compared.odometry), _extent(compared.scans)) >= config.least_motion:
+            self._comparisons.append(compared)
+
+    @property
+    def fault(self) -> str:
+        """Why odometry cannot be believed, in words; empty if it can."""
+        if sum(compared.contradicts for compared in self._comparisons) < self._config.contradictions:
+            return ""
+        seconds = len(self._comparisons) * self._config.period_ns * 1e-9
+        wheels = _told(compared.odometry for compared in self._comparisons)
+        scans = _told(compared.scans for compared in self._comparisons)
+        return (
+            f"wheels and lidar contradict each other: in {seconds:g} s odometry {wheels}, the scans {scans}"
+        )
+
+    def _compare(self, before: Array, points: Array, odometry: Pose2) -> _Comparison:
+        config = self._config
+        points = points[:: max(1, len(points) // _RAYS)]
+        tree = cKDTree(before)
+        explained = _share(tree, points, odometry)
+        agreed = _Comparison(odometry, odometry, contradicts=False)
+        needed = max(config.fit, explained + config.gain)
+        if needed > 1.0:
+            return agreed
+        grid = CorrelationGrid(before, _CELL, _SMEAR, _LEVELS)
+        window = Window(half_width=_FARTHEST, half_angle=_WIDEST)
+        match = grid.search(points, Pose2(0.0, 0.0, 0.0), window)
+        if match is None or _share(tree, points, match.pose) < needed:
+            return agreed
+        scans = match.pose
+        apart = Pose2(odometry.x - scans.x, odometry.y - scans.y, odometry.yaw - scans.yaw)
+        allowed = max(config.least_motion, config.difference * max(_extent(odometry), _extent(scans)))
+        return _Comparison(odometry, scans, contradicts=_extent(apart) > allowed)
+
+
+def _share(before: cKDTree, points: Array, moved: Pose2) -> float:
+    """Return the share of a scan that the scan before explains if the robot moved so in between."""
+    near = _NEAR + _NEAR_PER_METRE * np.hypot(*points.T)
+    return float((before.query(moved.apply(points))[0] < near).mean())
+
+
+def _extent(motion: Pose2) -> float:
+    return max(math.hypot(motion.x, motion.y), abs(motion.yaw))
+
+
+def _told(motions: Iterable[Pose2]) -> str:
+    """Return motions, one after the other, in words."""
+    driven, _, turned = np.sum([tuple(motion) for motion in motions], axis=0)
+    side = "left" if turned > 0.0 else "right"
+    return f"drove {driven:.1f} m and turned {math.degrees(abs(turned)):.0f} deg {side}"
