@@ -18,6 +18,7 @@ name: idle
 duration: 1 s
 robots: [{model: diff_bot}]
 mission: {type: idle}
+checks: [no_collision: ]
 """
 
 

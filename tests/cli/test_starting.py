@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.processes import wait_for
 from twin.bridge.action_types import Fibonacci
-from twin.bridge.actions import ActionServer
+from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.srvs import AddTwoInts
+
+
+def execute(goal: GoalHandle) -> Generator[None, None, Any]:
+    yield
+    return Fibonacci.Result(np.array([0, 1], np.int32))
 
 
 @pytest.mark.parametrize(
@@ -35,7 +42,7 @@ def test_a_call_that_comes_before_its_server_is_answered(
                 bus.starting()
                 node = bus.create_node("late")
                 node.create_service(AddTwoInts, "add", lambda r: AddTwoInts.Response(r.a + r.b))
-                ActionServer(node, Fibonacci, "count", lambda goal: Fibonacci.Result())
+                ActionServer(node, Fibonacci, "count", execute)
                 bus.started()
 
                 def answered() -> bool:
