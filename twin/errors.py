@@ -103,6 +103,10 @@ class BridgeError(TwinError):
     """The bus cannot do what was asked: a port in use, an unknown type, an invalid name."""
 
 
+class NobodyAnswersError(BridgeError):
+    """Nobody listens at the endpoints of a client."""
+
+
 class RecordingError(TwinError):
     """A recording cannot be written or read."""
 

@@ -14,6 +14,7 @@ import zenoh
 from twin.bridge import names
 from twin.bridge.clock import Clock
 from twin.bridge.exchange import Exchange
+from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
 from twin.bridge.node_options import NodeOptions
 from twin.bridge.node_services import StandardServices
@@ -60,6 +61,7 @@ class Bus:
         self._ids = 0
         self._thread = threading.get_ident()
         self._closed = False
+        self._starting: Any = None
         self._process = os.getpid()
         if networked and naming.wire == "ros2dds":
             self._bridge = session.liveliness().declare_token(bridge_token(self.session_id))
@@ -159,6 +161,18 @@ class Bus:
     def trailing(self) -> int:
         """How many messages had bytes after their end, which were ignored."""
         return self.external.trailing
+
+    def starting(self) -> None:
+        """Tell others that nodes are being made, until `started`: who lists the graph waits for it."""
+        if self.networked and self._starting is None:
+            key = starting_key(self.domain_id, self.session_id)
+            self._starting = self.zenoh.liveliness().declare_token(key)
+
+    def started(self) -> None:
+        """Tell others that all nodes are made. Harmless when repeated."""
+        if self._starting is not None:
+            self._starting.undeclare()
+            self._starting = None
 
     def admit(self) -> int:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""

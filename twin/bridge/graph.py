@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
@@ -19,7 +20,10 @@ from twin.bridge.wire.session import direct
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
 
-_TIMEOUT_S = 2.0
+_TIMEOUT_S = 10.0
+_WHOLE_S = 30.0
+_EMPTY_S = 1.0
+_LOOK_AGAIN_S = 0.1
 _ACTION = "/_action/"
 _LONGEST_TOKEN = 4096
 """More is no ROS name, but an attempt to fill the memory."""
@@ -134,18 +138,25 @@ def _announced_parts(announced: wire_ros2dds.Announced) -> list[tuple[EndpointKi
 
 def alive(bus: Bus, key: str) -> list[str]:
     """Return the liveliness tokens that match a key expression now, this process's included."""
+    return _look(bus, key)[0]
+
+
+def _look(bus: Bus, key: str) -> tuple[list[str], bool]:
+    """Return the tokens that match a key expression now, and whether these are all."""
     found: list[str] = []
+    late: list[bool] = []
     done = threading.Event()
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None:
             found.append(str(reply.ok.key_expr))
+        else:
+            late.append(True)
 
     # Zenoh's default handler is a queue of 256: with more tokens of its own a process would wait for itself.
     # A function of our own: what Zenoh calls is marked, and `Event.set` is everybody's.
     bus.zenoh.liveliness().get(key, direct(on_reply, lambda: done.set()), timeout=_TIMEOUT_S)
-    done.wait(_TIMEOUT_S + 1.0)
-    return found
+    return found, done.wait(_TIMEOUT_S + 1.0) and not late
 
 
 class Graph:
@@ -157,13 +168,41 @@ class Graph:
         self._subscribers: list[Any] = []
         self.changes = 0
         """How often something came or went."""
+        self.lacks = ""
+        """What a snapshot may lack, and why; empty if it is whole."""
         for token in tokens:
             self._add(token)
 
     @classmethod
     def snapshot(cls, bus: Bus) -> Self:
         """Return the graph as it is now, the bus's own nodes included."""
-        return cls(token for key in _tokens(bus) for token in alive(bus, key))
+        found = [_look(bus, key) for key in _tokens(bus)]
+        graph = cls(token for tokens, _ in found for token in tokens)
+        if not all(whole for _, whole in found):
+            graph.lacks = f"not everybody has told in {_TIMEOUT_S:g} s who is there"
+        return graph
+
+    @classmethod
+    def whole(cls, bus: Bus, timeout_s: float = _WHOLE_S) -> Self:
+        """Return the graph once nobody is making nodes (`Bus.starting`), or after so much wall time [s].
+
+        A graph without any node is looked at again for a moment: who has just begun to listen may not have
+        told yet that it is making nodes.
+        """
+        start = time.monotonic()
+        while True:
+            making = [
+                token for token in alive(bus, starting_key(bus.domain_id)) if bus.session_id not in token
+            ]
+            graph = None if making else cls.snapshot(bus)
+            waited_s = time.monotonic() - start
+            if graph is not None and (graph.nodes or waited_s > _EMPTY_S or graph.lacks):
+                return graph
+            if waited_s > timeout_s:
+                graph = cls.snapshot(bus)
+                graph.lacks = f"somebody has been making nodes for more than {timeout_s:g} s"
+                return graph
+            time.sleep(_LOOK_AGAIN_S)
 
     @classmethod
     def watch(cls, bus: Bus) -> Self:
@@ -264,6 +303,11 @@ class Graph:
     def _remove(self, token: str) -> None:
         with self._lock:
             self.changes += self._known.pop(token, None) is not None
+
+
+def starting_key(domain_id: int, session_id: str = "*") -> str:
+    """Return the token of a process that is making nodes; no token of ROS, so no other tool looks at it."""
+    return f"@twin_starting/{domain_id}/{session_id}"
 
 
 def _tokens(bus: Bus) -> tuple[str, str]:

@@ -157,7 +157,9 @@ def run(make: Callable[..., Any], arguments: Sequence[str] | None = None) -> Non
         joining, own = split(parser.parse_args(ros.rest))
         with join(**joining) as process, noted_signals() as received:
             process.bus.node_options = NodeOptions(arguments=ros)
+            process.bus.starting()
             steps = make(process.bus, **own)
+            process.bus.started()
             if isinstance(steps, Generator):
                 with closing(steps):
                     process.spin(lambda: bool(received) or next(steps, received) is received)

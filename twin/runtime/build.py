@@ -114,6 +114,7 @@ def build(
     clock = Clock()
     name = outside.session if network.networked else "twin"
     bus = Bus.of(replace(network, name=name), clock)
+    bus.starting()
     for tap in taps:
         bus.tap(tap)
     try:

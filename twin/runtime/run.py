@@ -75,6 +75,7 @@ class Run:
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = parts.control_period_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        self.bus.started()
         self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
         self._obstacles = ObstacleSchedule(
             self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]

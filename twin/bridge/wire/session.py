@@ -15,7 +15,7 @@ import zenoh
 
 from twin.bridge.wire import Wire
 from twin.bridge.wire.interrupts import from_zenoh
-from twin.errors import BridgeError
+from twin.errors import BridgeError, NobodyAnswersError
 from twin.regular_file import refusal
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
@@ -69,7 +69,7 @@ def open_session(config: SessionConfig) -> zenoh.Session:
     except zenoh.ZError as error:
         where = ", ".join((*config.listen, *config.connect)) or str(config.file)
         if settings.get_json("mode") == '"client"':
-            raise BridgeError(
+            raise NobodyAnswersError(
                 f"nobody answers at {where}; start `twin run … --listen {where}` or `twin router` first, "
                 "or name another endpoint with --connect"
             ) from error

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
-from twin.cli.ros.joining import Joining
+from twin.cli.ros.joining import PATIENCE_S, Joining
 from twin.cli.ros.service_call import know
 from twin.cli.ros.tool_node import tool_node
 from twin.cli.ros.yaml_values import message_of, text_of
@@ -45,7 +45,7 @@ def send_goal(
     from twin.bridge.wire.interrupts import noted_signals
 
     text = text_of(goal, stdin)
-    with joining.open() as process, noted_signals() as signals:
+    with joining.open(PATIENCE_S if timeout is None else timeout) as process, noted_signals() as signals:
         kind = _action_type(action_type)
         node = tool_node(process.bus, f"send_goal_{kind.name.replace('/', '_')}")
         know(process, node, _used(kind.name, f"{absolute(action)}/_action"))

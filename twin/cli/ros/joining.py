@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,10 +17,24 @@ from twin.cli.ros.endings import quiet_pipe
 from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
     from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
 
 PANEL = "Joining the graph"
+_AT_ONCE_S = 3.0
+PATIENCE_S = 60.0
+"""How long a command that waits for a server waits for somebody to listen [s]: runs take a while to start."""
+
+
+def whole_graph(bus: Bus) -> Graph:
+    """Return who is there, and say what is not known of it."""
+    from twin.bridge.graph import Graph
+
+    graph = Graph.whole(bus)
+    if graph.lacks:
+        typer.echo(f"WARNING: what is shown may be incomplete: {graph.lacks}", err=True)
+    return graph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,25 +48,35 @@ class Joining:
     wire: Wire
 
     @contextmanager
-    def open(self) -> Iterator[LiveBus]:
-        """Join; raises BridgeError if nobody is there."""
+    def open(self, patience_s: float = _AT_ONCE_S) -> Iterator[LiveBus]:
+        """Join; raises BridgeError if nobody is there in this time [s], and says what it waits for."""
         from twin.bridge import live
+        from twin.errors import NobodyAnswersError
 
-        with live.join(
-            self.connect,
-            config=self.config,
-            domain_id=self.domain_id,
-            use_sim_time=self.use_sim_time,
-            wire=self.wire,
-        ) as process:
+        def join(timeout_s: float) -> AbstractContextManager[LiveBus]:
+            return live.join(
+                self.connect,
+                config=self.config,
+                domain_id=self.domain_id,
+                use_sim_time=self.use_sim_time,
+                wire=self.wire,
+                timeout_s=timeout_s,
+            )
+
+        with ExitStack() as ending:
+            try:
+                process = ending.enter_context(join(_AT_ONCE_S))
+            except NobodyAnswersError as fault:
+                if patience_s <= _AT_ONCE_S:
+                    raise
+                typer.echo(f"waiting: {fault}", err=True)
+                process = ending.enter_context(join(patience_s - _AT_ONCE_S))
             yield process
 
     def graph(self) -> Graph:
-        """Return who is in the graph now; raises BridgeError if nobody is there."""
-        from twin.bridge.graph import Graph
-
+        """Return who is in the graph, once it is whole; raises BridgeError if nobody is there."""
         with self.open() as process:
-            return Graph.snapshot(process.bus)
+            return whole_graph(process.bus)
 
 
 def _options(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from twin.cli.ros.graph_names import absolute
+from twin.cli.ros.joining import whole_graph
 from twin.cli.ros.service_call import answer
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError, nearest
@@ -33,9 +34,7 @@ TYPES = (
 
 def node_names(process: LiveBus, hidden: bool) -> list[str]:
     """Return the full names of all nodes, sorted."""
-    from twin.bridge.graph import Graph
-
-    return _names(Graph.snapshot(process.bus), hidden)
+    return _names(whole_graph(process.bus), hidden)
 
 
 def _names(graph: Graph, hidden: bool) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
-from twin.cli.ros.joining import Joining
+from twin.cli.ros.joining import PATIENCE_S, Joining
 from twin.cli.ros.tool_node import tool_node
 from twin.cli.ros.yaml_values import message_of, text_of
 from twin.errors import BridgeError
@@ -44,7 +44,7 @@ def call(
     text = text_of(values, stdin)
     from twin.bridge.messages.as_repr import message_repr
 
-    with joining.open() as process:
+    with joining.open(PATIENCE_S if timeout is None else timeout) as process:
         srv_type = _service_type(service_type)
         package, _, name = srv_type.name.split("/")
         node = tool_node(process.bus, f"requester_{package}_{name}")

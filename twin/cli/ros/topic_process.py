@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from twin.cli.ros.graph_names import instead
-from twin.cli.ros.joining import Joining
+from twin.cli.ros.joining import Joining, whole_graph
 from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError
 
@@ -82,7 +82,7 @@ def open_topics(joining: Joining, *, node_name: str | None = None) -> Iterator[T
 
     with joining.open() as live:
         # Zenoh answers at once from what it has when a watch begins: so look first, then wait for the same.
-        there = set(Graph.snapshot(live.bus).endpoints)
+        there = set(whole_graph(live.bus).endpoints)
         node = tool_node(live.bus, str(os.getpid()), shown_as=node_name)
         graph = Graph.watch(live.bus)
         live.spin(lambda: there <= set(graph.endpoints), _COMPLETE_S)
