@@ -72,7 +72,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("duration: 10 s", "duration: 10 kg", "demo.yaml:2: duration: must have a unit of time (s, ms, us, min, h), not '10 kg'"),
         ("duration: 10 s", "duration: -1", "demo.yaml:2: duration: must be greater than 0, not -1"),
         ("duration: 10 s", "duration: 10\nphysics: {timestep: 3 ms}", "demo.yaml:3: the control period (20 ms) must be a whole number of physics steps (3 ms)"),
-        ("duration: 10 s", "duration: 10\nphysics: {timestep: 1e-10}", "demo.yaml:3: the physics step (1e-10 s) must be at least 1 ns"),
+        ("duration: 10 s", "duration: 10\nphysics: {timestep: 1e-10}", "demo.yaml:3: physics.timestep: must be 0, or from 1e-09 to 1e+09 s in size, not 1e-10"),
         ("duration: 10 s", "duration: 10\nrecording: {poses_hz: 60}", "demo.yaml:3: the rate of the recorded poses (60 Hz) must be at most 50 Hz, one per control period (20 ms)"),
         ("    navigation: {}", "    command_latency: 30 ms", "demo.yaml:9: the latency of commands (30 ms) must be a whole number of control periods (20 ms)"),
         ("pick_and_place\n  robot: bot\n  tasks: [{tote: tote_a, to: unloading}]", "r2d2_state_publisher\n  robot: bot\n  rate: 1 kHz", "demo.yaml:13: the rate of the publisher (1000 Hz) must be at most 50 Hz, one per control period (20 ms)"),

@@ -55,9 +55,6 @@ def _names(scenario: Scenario) -> Iterator[Fault]:
 
 def _periods(scenario: Scenario) -> Iterator[Fault]:
     timestep, control = scenario.physics.timestep, scenario.physics.control_period
-    if not nanoseconds(timestep):
-        yield Fault(("physics", "timestep"), f"the physics step ({timestep:g} s) must be at least 1 ns")
-        return
     if not nanoseconds(control) or nanoseconds(control) % nanoseconds(timestep):
         text = f"the control period {_whole(control, 'physics steps', timestep)}"
         yield Fault(("physics", "control_period"), text)
