@@ -35,6 +35,7 @@ WALL_CLOCK = {
     "twin/runtime/run.py": {"perf_counter", "process_time"},  # how long the run took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
+    "twin/bridge/graph.py": {"monotonic", "sleep"},  # waits for other processes to say who they are
     "twin/bridge/wire/session.py": {"monotonic", "sleep"},  # who is asked for may start later
     "twin/bridge/lockstep/stepper.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/lockstep/topic.py": {"monotonic", "sleep"},  # time-outs of other processes
