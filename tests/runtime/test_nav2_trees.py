@@ -22,7 +22,7 @@ def navigator(tree: str, key: str = "default_nav_to_pose_bt_xml") -> str:
     ("tree", "own"),
     [
         (f"{SHARE}navigate_to_pose_w_replanning_and_recovery.xml", "navigate_to_pose"),
-        ("/usr/share/nav2_bt_navigator/navigate_w_replanning_and_recovery.xml", "navigate_to_pose"),
+        ("/ros/share/nav2_bt_navigator/navigate_w_replanning_and_recovery.xml", "navigate_to_pose"),
         (f"{SHARE}recover.xml", "recover"),
     ],
 )
