@@ -14,7 +14,7 @@ from twin.scenario.schema import Scenario, json_schema, load
 from twin.strict_yaml.document import Document, Loc, apply_override
 from twin.strict_yaml.validate import validate
 
-_EXTREME = ("1e308", "1e-320", "1e400", "-0.0", "-1e15", "1e15", "1e-15", "nan", "9" * 5000)
+_EXTREME = ("1e308", "1e-320", "1e400", "-0.0", "-1e15", "1e15", "1e-15", "1e-100", "nan", "9" * 5000)
 _WITH_UNIT = ("1e308 {}", "1e-320 {}", "-1e400 {}", "1e9 {}", "1e-9 {}", "0 {}", "1e999999999 {}")
 
 _SCHEMA = json_schema()
@@ -135,13 +135,13 @@ def test_the_sentence_names_place_and_valid_sizes(tmp_path: Path) -> None:
     rest = "robots: [{model: diff_bot, command_latency: 1e-320}]\nchecks: [{energy: {max: 1}}]\n"
     path.write_text(f"name: a\nduration: 1e308\nseed: 123456789012345678901\n{rest}", encoding="utf-8")
     with pytest.raises(ScenarioError) as fault:
-        load(path, {"recording.poses_hz": "1e-20"})
-    in_size = "must be 0, or a number from 1e-15 to 1e+15 in size"
+        load(path, {"recording.poses_hz": "1e-120"})
+    in_size = "must be 0, or a number from 1e-100 to 1e+15 in size"
     assert [str(problem) for problem in fault.value.problems] == [
         f"{path}:2: duration: {in_size}, not 1e308",
         f"{path}:3: seed: must be at most 20 digits, not 123456789012345678901",
         f"{path}:4: robots.0.command_latency: {in_size}, not 1e-320",
-        f"override recording.poses_hz=1e-20: recording.poses_hz: {in_size}, not 1e-20",
+        f"override recording.poses_hz=1e-120: recording.poses_hz: {in_size}, not 1e-120",
     ]
     path.write_text(
         "name: a\nduration: 1e10\nrobots: [{model: diff_bot}]\nchecks: [{energy: {max: 1}}]\n", "utf-8"

@@ -21,7 +21,7 @@ _MAX_NODES = 100_000
 """More values than any file we read has; stops a file whose aliases multiply without end."""
 
 
-LARGEST, SMALLEST = 1e15, 1e-15
+LARGEST, SMALLEST = 1e15, 1e-100
 """Of a file's numbers: beyond are none of the physical world, and squares and ratios leave the floats."""
 _DIGITS = 20
 """Of the longest whole number: a seed of 64 bits."""

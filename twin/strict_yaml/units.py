@@ -19,7 +19,7 @@ class Unit:
     quantity: str
     factors: tuple[tuple[str, str | float], ...]
     """Unit and its size in SI (exact text, or a float for irrational ones); the SI unit comes first."""
-    sizes: tuple[float, float] = (1e-12, 1e12)
+    sizes: tuple[float, float] = (1e-100, 1e12)
     """Smallest and largest size in SI of what is not 0."""
 
     def parse(self, value: object) -> float:

@@ -122,7 +122,7 @@ def test_a_map_is_saved_for_a_map_server(bench: Bench, tmp_path: Path) -> None:
     assert mapper.call(SaveSlamMap, "save_map", name=name).result == SaveSlamMap.Response.RESULT_SUCCESS
     loaded = OccupancyMap.load(tmp_path / "room.yaml")
     assert (loaded.data == 100).sum() > 100
-    nowhere = mapper.call(SaveSlamMap, "save_map", name=String(data=str(tmp_path / "none" / "room")))
+    nowhere = mapper.call(SaveSlamMap, "save_map", name=String(data=str(tmp_path / "room.yaml" / "room")))
     assert nowhere.result == SaveSlamMap.Response.RESULT_UNDEFINED_FAILURE
 
 
