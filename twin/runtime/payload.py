@@ -102,9 +102,9 @@ def _parted(touches: Iterable[Touch], belongs: Callable[[Touch], bool]) -> tuple
 
 def _is_held(pushes: Iterable[Touch], weight: float) -> bool:
     """Whether the pushes of a robot squeeze a good or bear it."""
-    forces = np.array([touch.push for touch in pushes]).reshape(-1, 3)
-    if forces[:, 2].sum() >= _BORNE * weight:
-        return True
+    forces = np.array([touch.push for touch in pushes])
+    if not len(forces) or forces[:, 2].sum() >= _BORNE * weight:
+        return len(forces) > 0
     sizes = np.linalg.norm(forces, axis=1)
     directions = forces[sizes > 0.0] / sizes[sizes > 0.0, None]
     return bool((directions @ directions.T < _OPPOSED).any())
