@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -94,7 +95,7 @@ class Handling:
                 *(part for part in more if isinstance(part, StaticBody)),
             ),
             goods=(
-                tote("tote", (0.0, 0.0, 0.49)),
+                replace(tote("tote", (0.0, 0.0, 0.49)), friction=1.6),  # as rough as the fingers
                 *(part for part in more if isinstance(part, FreeBody)),
             ),
         )
@@ -214,6 +215,17 @@ def test_what_stands_on_a_robots_deck_is_carried() -> None:
     assert handling.result().value == 0.0
     handling.go(0.5, x=0.05)
     assert "box, carried by crane, hit fence with" in handling.result().reason
+
+
+@pytest.mark.parametrize("x", [0.13, 0.3])
+def test_what_stands_on_carried_goods_is_carried_with_them(x: float) -> None:
+    pile = [goods(f"box_{i}", (0.0, 1.0, 0.56 + 0.1 * i), (0.2, 0.2, 0.1), mass=1.0) for i in range(3)]
+    fence = box("fence", (x + 0.1, 1.0, 0.76), (0.2, 0.2, 0.1))
+    handling = Handling(*pile, fence, allowed=[{"other": "box_0", "body": "lift"}])
+    handling.go(0.5, x=0.05)
+    result = handling.result()
+    assert result.passed == (x > 0.15), result.reason
+    assert result.passed or "box_2, carried by crane, hit fence with" in result.reason
 
 
 def test_what_a_robot_only_pushes_is_not_carried() -> None:

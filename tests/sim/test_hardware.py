@@ -85,6 +85,18 @@ def test_an_encoder_that_misreads_goes_on_from_where_it_was(world: World, factor
         hardware.misread("mast_joint", factor)
 
 
+def test_an_encoder_can_be_mended(world: World) -> None:
+    hardware = world.robots["cart"].hardware
+    hardware.command("left_wheel_joint", 3.0)
+    hardware.apply()
+    for factor in (-1.0, 0.0, 1.0):
+        hardware.misread("left_wheel_joint", factor)
+    before, true = hardware.read().position[0], world.data.joint("cart/left_wheel_joint").qpos[0]
+    world.step(500)
+    turned = world.data.joint("cart/left_wheel_joint").qpos[0] - true
+    assert hardware.read().position[0] - before == pytest.approx(turned, rel=0.01)
+
+
 def test_other_joints_have_a_little_noise_and_reach_their_command(world: World) -> None:
     hardware = world.robots["cart"].hardware
     hardware.command("mast_joint", 0.2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -27,9 +27,10 @@ _LIFTED = 0.002
 class Payload:
     """Finds what the goods touch that a robot holds; the truth, for checks.
 
-    A robot holds a good that its links squeeze from opposite sides, or that rests on it. While a good is
-    taken hold of, lifted off or set down it may stand on something, unless it is dragged along, or pressed
-    down harder than it is squeezed: a stiff arm that yields by a millimetre already puts its weight on it.
+    A robot holds a good that its links squeeze from opposite sides, or that rests on it or on what it holds:
+    all this is its load, whose parts may touch each other. While a good is taken hold of, lifted off or set
+    down it may stand on something, unless it is dragged along, or pressed down harder than it is squeezed: a
+    stiff arm that yields by a millimetre already puts its weight on it. A smooth good slips before that.
     """
 
     def __init__(self, world: World, goods: Iterable[str]) -> None:
@@ -39,35 +40,49 @@ class Payload:
         """Where held goods that stand on something began to [m]."""
 
     def contacts(self) -> list[ContactObservation]:
-        """Return what held goods touch, other than who holds them and what they stand on.
+        """Return what held goods touch, other than who holds them, what they stand on and each other.
 
         To be called at every control tick.
         """
-        near = {
-            (contact.body2, contact.body1.partition("/")[0])
-            for contact in self._world.contacts()
-            if contact.body2 in self._weights
-        }
+        near: dict[str, list[str]] = {}
+        for contact in self._world.contacts():
+            if contact.body2 in self._weights:
+                near.setdefault(contact.body1.partition("/")[0], []).append(contact.body2)
         stood_at, self._stood_at = self._stood_at, {}
         return [
             ContactObservation(robot=robot, body=good, other=other, force_N=force, carried=True)
-            for good, robot in sorted(near)
-            for other, force in self._hit(good, f"{robot}/", stood_at.get(good)).items()
+            for robot in sorted(near)
+            for good, (own, others) in self._load(robot, near[robot]).items()
+            for other, force in self._hit(good, own, others, stood_at.get(good)).items()
         ]
 
-    def _hit(self, good: str, robot: str, stood_at: Array | None) -> dict[str, float]:
-        """Return the forces [N] of what a good hits if the robot whose links begin with `robot` holds it."""
+    def _load(self, robot: str, goods: Iterable[str]) -> dict[str, tuple[list[Touch], list[Touch]]]:
+        """Return what a robot holds, by touches of its own and of others; `goods` are those that it touches.
+
+        What rests on its load belongs to the load.
+        """
+        load: dict[str, list[Touch]] = {}
+
+        def parted(touches: list[Touch]) -> tuple[list[Touch], list[Touch]]:
+            return _parted(touches, lambda touch: touch.other in load or touch.other.startswith(f"{robot}/"))
+
+        waiting = sorted(goods)
+        while waiting:
+            good = waiting.pop(0)
+            if good in load:
+                continue
+            touches = self._world.touches(good)
+            if _is_held(parted(touches)[0], self._weights[good]):
+                load[good] = touches
+                waiting += sorted({touch.other for touch in touches} & self._weights.keys())
+        return {good: parted(touches) for good, touches in load.items()}
+
+    def _hit(
+        self, good: str, own: list[Touch], others: list[Touch], stood_at: Array | None
+    ) -> dict[str, float]:
+        """Return the forces [N] of what a held good hits."""
         weight, here = self._weights[good], self._world.pose(good).xyz
-        own: list[Touch] = []
-        below: list[Touch] = []
-        hit: list[Touch] = []
-        for touch in self._world.touches(good):
-            if touch.other.startswith(robot):
-                own.append(touch)
-            else:
-                (below if touch.push[2] >= _UPWARDS * _force([touch]) else hit).append(touch)
-        if not _is_held(own, weight):
-            return {}
+        below, hit = _parted(others, lambda touch: touch.push[2] >= _UPWARDS * _force([touch]))
         if below and stood_at is None:
             stood_at = here
         if stood_at is not None and here[2] <= stood_at[2] + _LIFTED:
@@ -78,11 +93,18 @@ class Payload:
         return {other: _force(t for t in hit if t.other == other) for other in sorted({t.other for t in hit})}
 
 
+def _parted(touches: Iterable[Touch], belongs: Callable[[Touch], bool]) -> tuple[list[Touch], list[Touch]]:
+    parts: tuple[list[Touch], list[Touch]] = ([], [])
+    for touch in touches:
+        parts[not belongs(touch)].append(touch)
+    return parts
+
+
 def _is_held(pushes: Iterable[Touch], weight: float) -> bool:
     """Whether the pushes of a robot squeeze a good or bear it."""
-    forces = np.array([touch.push for touch in pushes]).reshape(-1, 3)
-    if forces[:, 2].sum() >= _BORNE * weight:
-        return True
+    forces = np.array([touch.push for touch in pushes])
+    if not len(forces) or forces[:, 2].sum() >= _BORNE * weight:
+        return len(forces) > 0
     sizes = np.linalg.norm(forces, axis=1)
     directions = forces[sizes > 0.0] / sizes[sizes > 0.0, None]
     return bool((directions @ directions.T < _OPPOSED).any())

@@ -91,12 +91,16 @@ class ContactReader:
         if body not in self._geoms_of:
             self._geoms_of[body] = np.array([owner == body for owner in self._owners])
         contact = data.contact
-        mine = self._geoms_of[body][contact.geom]
+        geoms, normals = (
+            contact.geom,
+            contact.frame[:, :3],
+        )  # read once: each look makes arrays of all contacts
+        mine = self._geoms_of[body][geoms]
         touches = []
-        for index in np.flatnonzero((mine[:, 0] != mine[:, 1]) & (contact.efc_address >= 0)):
+        for index in np.flatnonzero((mine[:, 0] != mine[:, 1]) & (contact.efc_address >= 0)).tolist():
             mujoco.mj_contactForce(self._model, data, index, self._force)
             outwards = bool(mine[index, 0])  # normals point from the first geom to the second
-            other = self._owners[contact.geom[index, int(outwards)]]
+            other = self._owners[geoms[index, int(outwards)]]
             force = -self._force[0] if outwards else self._force[0]
-            touches.append(Touch(other, force * contact.frame[index, :3]))
+            touches.append(Touch(other, force * normals[index]))
         return touches

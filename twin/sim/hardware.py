@@ -82,6 +82,7 @@ class Hardware:
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
         wheels = {wheel.joint.name for wheel in commanded_wheels(description)}
         self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
+        self._own_scale = self._scale.copy()
         self._miscounted = np.zeros(len(joints))
         self._counts = self._count()
         self._step = 0
@@ -200,7 +201,7 @@ class Hardware:
         self._miscounted[self._index_of_encoder(joint)] += round(angle / self._tick)
 
     def misread(self, joint: str, factor: float) -> None:
-        """Let the encoder of a joint count `factor` times what it did: -1 the wrong way, 0 nothing.
+        """Let the encoder of a joint count `factor` times what it should: -1 the wrong way, 0 nothing.
 
         Args:
             joint: One of `joint_names` that has an encoder.
@@ -209,8 +210,8 @@ class Hardware:
         Raises:
             SimulationError: No encoder measures this joint.
         """
-        before = self._count()
-        self._scale[self._index_of_encoder(joint)] *= factor
+        index, before = self._index_of_encoder(joint), self._count()
+        self._scale[index] = factor * self._own_scale[index]
         self._miscounted += before - self._count()
 
     @property

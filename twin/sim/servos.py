@@ -87,14 +87,19 @@ class PositionServos:
         if not len(self._actuators):
             return
         here = data.qpos[self._qpos]
-        target = np.clip(data.act[self._target], here - self._ahead, here + self._ahead)
+        target = _bounded(data.act[self._target], here - self._ahead, here + self._ahead)
         # where the joint will be at the end of the tick
-        there = here + elapsed * np.clip(data.qvel[self._dof], -self._fastest, self._fastest)
-        command = np.clip(data.ctrl[self._actuators], there - self._ahead, there + self._ahead)
+        there = here + elapsed * _bounded(data.qvel[self._dof], -self._fastest, self._fastest)
+        command = _bounded(data.ctrl[self._actuators], there - self._ahead, there + self._ahead)
         data.act[self._target], data.ctrl[self._actuators] = target, command
         if elapsed > 0.0:
             speed = np.minimum(abs(command - target) / elapsed, self._fastest)
             self._model.actuator_dynprm[self._actuators, _SLEWMAX] = speed
+
+
+def _bounded(values: Array, least: Array, most: Array) -> Array:
+    """Return what np.clip does, which takes four times as long for a few joints."""
+    return np.minimum(np.maximum(values, least), most)
 
 
 class EffortServos:
