@@ -63,6 +63,7 @@ def test_a_file_that_is_not_there_suggests_the_one_that_is(tmp_path: Path) -> No
     for name in ("warehous.yaml", "warehouse"):
         assert absence(tmp_path / name) == f"no such file; did you mean {file}?"
     assert absence(tmp_path / "other.yaml") == absence(tmp_path / "no" / "warehouse.yaml") == "no such file"
+    assert absence(tmp_path / ("a" * 300)) == ""  # no name of a file at all, which is another fault
 
 
 def test_what_cannot_be_written_is_known_before_the_work(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 from twin.cli import app
 from twin.cli.console import guard_terminal, print_error, stdout
@@ -48,13 +49,28 @@ def test_what_is_printed_has_no_controls_but_colours(
     hostile = f"x{''.join(UNSEEN)}\x1b[2Jy"
     print_error(TwinError(hostile))
     assert "\x1b[2J" not in err.getvalue()
-    print("a\u202eb")  # noqa: T201
+    print("a\u202eb\x1b[2J\x1b]0;title\x1bc")  # noqa: T201
     stdout().print("c\u202ed", style="bold red")
     for text in (out.getvalue(), err.getvalue()):
         assert not set(UNSEEN) & set(text)
+        assert not any(steers in text for steers in ("\x1b[2J", "\x1b]", "\x1bc"))
     assert "a\\u202eb" in out.getvalue()
     assert "c\\u202ed" in out.getvalue()
     assert ("\x1b" in out.getvalue()) == (stream is Terminal)
+
+
+@pytest.mark.parametrize(("encoding", "shown"), [("ascii", "?"), ("utf-8", "ü")])
+def test_typer_does_not_write_past_the_guard(
+    monkeypatch: pytest.MonkeyPatch, encoding: str, shown: str
+) -> None:
+    """What typer takes for a misconfigured stream, it writes UTF-8 below."""
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding=encoding))
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    guard_terminal()
+    typer.echo("a\u202eü")
+    sys.stdout.flush()
+    assert raw.getvalue() == f"a\\u202e{shown}\n".encode(encoding)
 
 
 def test_every_command_prints_through_the_guard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,15 @@ def test_devices_and_folders_are_named(path: str, kind: str) -> None:
         read_text(Path(path))
 
 
+def test_a_pipe_of_the_shell_is_read() -> None:
+    """As in `twin run <(sed s/warehouse/shop/ a.yaml)`."""
+    reader, writer = os.pipe()
+    os.write(writer, b"name: a\n")
+    os.close(writer)
+    assert read(Path(f"/dev/fd/{reader}"), ScenarioError).data == {"name": "a"}
+    os.close(reader)
+
+
 def test_a_file_is_read_up_to_a_limit_with_its_lines_as_python_reads_them(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_bytes("é\r\nb\rc\n".encode())

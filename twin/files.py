@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -42,13 +43,17 @@ def _fault(path: Path) -> str:
 
 
 def absence(path: Path) -> str:
-    """Return why there is no such file to read, and which may have been meant; empty if there is one."""
+    """Return why there is no such file to read, and which may have been meant; empty if that is not why."""
     from difflib import get_close_matches
 
-    if path.is_dir():
-        return "is a folder; name a file"
-    if path.exists():
-        return ""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError:
+        return ""  # such as a name that is too long: whoever opens it says so
+    else:
+        return "is a folder; name a file" if stat.S_ISDIR(mode) else ""
     try:
         names = sorted(each.name for each in path.parent.iterdir() if each.is_file())
     except OSError:  # its folder is missing, too

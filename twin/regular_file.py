@@ -20,11 +20,17 @@ _CHUNK = 1 << 20
 
 
 def refusal(path: str | Path) -> str | None:
-    """Return why something is not to be opened: `it is a pipe, not a regular file`."""
+    """Return why something is not to be opened: `it is a pipe, not a regular file`.
+
+    A pipe without a name, which only who started this process can have given it, is to be: `/dev/stdin`, or
+    the `/dev/fd/63` that shells write for `<(command)`.
+    """
     try:
         mode = os.stat(path).st_mode
     except OSError:
         return None  # whoever opens it says what is wrong
+    if stat.S_ISFIFO(mode) and not os.path.exists(os.path.realpath(path)):
+        return None
     return None if stat.S_ISREG(mode) else f"it is {_KINDS.get(stat.S_IFMT(mode), 'odd')}, not a regular file"
 
 

@@ -149,12 +149,15 @@ def test_no_help_text_is_taken_for_markup() -> None:
 
 
 def test_what_to_put_in_is_named_in_one_way() -> None:
-    """Typer shows `{scenario}` for an argument of which nobody says what it is."""
+    """Typer shows `{scenario}` for an argument of which nobody says what it is, and adds brackets and dots."""
     wrong = []
+
+    def is_plain(metavar: str | None) -> bool:
+        return metavar is not None and "[" not in metavar and not metavar.endswith("...")
 
     def look(command: Any, name: str) -> None:
         arguments = [each for each in command.params if not each.opts[0].startswith("-")]
-        wrong.extend(f"{name} {each.name}" for each in arguments if each.metavar is None)
+        wrong.extend(f"{name} {each.name}" for each in arguments if not is_plain(each.metavar))
         for child, inner in getattr(command, "commands", {}).items():
             look(inner, f"{name} {child}")
 
@@ -162,11 +165,16 @@ def test_what_to_put_in_is_named_in_one_way() -> None:
     assert wrong == []
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["robots"], ["interface", "list"]])
-def test_a_full_disk_under_the_output_is_told(arguments: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "unbuffered"), [(["--help"], ""), (["robots"], "1"), (["interface", "list"], "")]
+)
+def test_a_full_disk_under_the_output_is_told(arguments: list[str], unbuffered: str) -> None:
     with Path("/dev/full").open("w") as full:
         command = [sys.executable, "-m", "twin.cli", *arguments]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        surroundings = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, env=surroundings, text=True, check=False
+        )
     assert (done.returncode, done.stderr) == (
         2,
         "error: No space left on device: what is printed is not whole; make room\n",
@@ -297,6 +305,14 @@ def test_a_run_that_breaks_is_2_with_an_error_verdict(
     assert (code, err) == (2, "error: the physics diverged at 0.3 s\n")
     assert json.loads(out)["verdict"] == "error"
     assert ElementTree.parse(demo.parent / "here" / "junit.xml").getroot().get("errors") == "1"
+
+
+@pytest.mark.parametrize(
+    "command", [("run",), ("check",), ("test",), ("play",), ("bag", "info"), ("map", "show")]
+)
+def test_a_name_that_is_too_long_for_a_file_is_told(command: tuple[str, ...], invoke: Invoke) -> None:
+    code, _, err = invoke(*command, "a" * 300)
+    assert (code, err.count("\n"), "File name too long" in err) == (2, 1, True)
 
 
 def test_a_bug_keeps_its_traceback(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable, Generator
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -23,40 +24,38 @@ def execute(goal: GoalHandle) -> Generator[None, None, Any]:
     return Fibonacci.Result(np.array([0, 1], np.int32))
 
 
-@pytest.mark.parametrize(
-    ("words", "answer"),
-    [
-        (("service", "call", "/add", "example_interfaces/srv/AddTwoInts", "{a: 1, b: 2}"), "sum=3"),
-        (("action", "send_goal", "/count", "example_interfaces/action/Fibonacci", "{order: 2}"), "SUCCEEDED"),
-    ],
-)
-def test_a_call_that_comes_before_its_server_is_answered(
-    endpoint: str, words: tuple[str, ...], answer: str
-) -> None:
-    command = [sys.executable, "-m", "twin.cli", *words, "--connect", endpoint]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as call:
-        try:
-            assert call.stderr is not None
+def test_calls_that_come_before_their_server_are_answered(endpoint: str) -> None:
+    calls = {
+        "sum=3": ("service", "call", "/add", "example_interfaces/srv/AddTwoInts", "{a: 1, b: 2}"),
+        "SUCCEEDED": ("action", "send_goal", "/count", "example_interfaces/action/Fibonacci", "{order: 2}"),
+    }
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with ExitStack() as running:
+        waiting = {}
+        for answer, words in calls.items():
+            command = [sys.executable, "-m", "twin.cli", *words, "--connect", endpoint]
+            waiting[answer] = running.enter_context(subprocess.Popen(command, **pipes))
+            running.callback(waiting[answer].kill)
+        for call in waiting.values():
             assert call.stderr.readline().startswith(f"waiting: nobody answers at {endpoint}; start ")
-            with Bus.open(Clock(), listen=[endpoint]) as bus:
-                bus.starting()
-                node = bus.create_node("late")
-                node.create_service(AddTwoInts, "add", lambda r: AddTwoInts.Response(r.a + r.b))
-                ActionServer(node, Fibonacci, "count", execute)
-                bus.started()
+        bus = running.enter_context(Bus.open(Clock(), listen=[endpoint]))
+        bus.starting()
+        node = bus.create_node("late")
+        node.create_service(AddTwoInts, "add", lambda r: AddTwoInts.Response(r.a + r.b))
+        ActionServer(node, Fibonacci, "count", execute)
+        bus.started()
 
-                def answered() -> bool:
-                    bus.external.wait(0.05)
-                    bus.admit()
-                    bus.spin()
-                    return call.poll() is not None
+        def answered() -> bool:
+            bus.external.wait(0.05)
+            bus.admit()
+            bus.spin()
+            return all(call.poll() is not None for call in waiting.values())
 
-                wait_for(answered, 120)
+        wait_for(answered, 120)
+        for answer, call in waiting.items():
             output, errors = call.communicate()
-        finally:
-            call.kill()
-    assert (call.returncode, errors) == (0, "")
-    assert answer in output
+            assert (call.returncode, errors) == (0, "")
+            assert answer in output
 
 
 def test_lists_of_a_graph_that_is_not_whole_say_so(

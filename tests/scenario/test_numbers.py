@@ -121,10 +121,10 @@ def test_every_number_of_the_schema_is_read_or_refused_in_a_sentence() -> None:
     places = list(_numbers(_SCHEMA, (), (), _BASE))
     assert len(places) > 300
     sound = 0
-    for loc, data, unit in places:
+    for number, (loc, data, unit) in enumerate(places):
         sound += any(_validated(data, loc, text)[0] for text in ("1", "0.5", "2", "20"))
         texts = [*_EXTREME, *(text.format(unit) for text in _WITH_UNIT if unit)]
-        for text in texts:
+        for text in texts[number % 4 :: 4]:  # each kind of place is there many times
             accepted, problems = _validated(data, loc, text)
             assert accepted or problems, (loc, text)
     assert sound > 0.6 * len(places)  # or nothing would be compared with other fields

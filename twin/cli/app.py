@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from typing import Annotated, TextIO
+from typing import Annotated
 
 import typer
 
@@ -110,21 +110,16 @@ def run_app() -> None:
 
 
 def _tell(fault: Exception) -> None:
-    """Tell of a full disk in a sentence; of a bug, in here or in a user's node, with its traceback."""
+    """Tell of a full disk or an impossible name in a sentence; of a bug with its traceback."""
+    if isinstance(fault, OSError) and fault.errno == errno.ENAMETOOLONG:
+        print_error(TwinError(f"{fault.filename}: {fault.strerror}"))
+        return
     if not isinstance(fault, OSError) or fault.errno not in _FULL:
         import traceback
 
         traceback.print_exception(fault)
         return
-    what = fault.filename or ("what is printed" if _is_full(sys.stdout) else "a file that was written")
+    what = fault.filename or "a file that was written"
     print_error(TwinError(f"{fault.strerror}: {what} is not whole; make room"))
     # What is still buffered goes nowhere; otherwise the interpreter complains when it flushes at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _is_full(stream: TextIO) -> bool:
-    try:
-        stream.flush()
-    except OSError:
-        return True
-    return False

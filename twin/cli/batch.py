@@ -17,7 +17,7 @@ def run_batch(
     paths: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[SCENARIO]...", help="Scenario files, or folders of them.", show_default="scenarios"
+            metavar="SCENARIO", help="Scenario files, or folders of them.", show_default="scenarios"
         ),
     ] = None,
     junit: Annotated[

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from twin.errors import Problem, TwinError
@@ -17,26 +20,49 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 
+class _Guarded:
+    """A stream that escapes what steers a terminal, and replaces what its encoding lacks."""
+
+    def __init__(self, stream: Any) -> None:
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+        self._stream, self._keeps_styles = stream, stream.isatty()
+        self._is_ascii = codecs.lookup(getattr(stream, "encoding", None) or "utf-8").name == "ascii"
+
+    def write(self, text: str) -> int:
+        with _named():
+            self._stream.write(escaped(text, keeps_styles=self._keeps_styles))
+        return len(text)
+
+    def flush(self) -> None:
+        with _named():
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "buffer" and self._is_ascii:
+            raise AttributeError(name)  # typer would write UTF-8 there, past this guard
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    """Name what could not be written, as faults of files have a name."""
+    try:
+        yield
+    except OSError as fault:
+        fault.filename = "what is printed"
+        raise
+
+
 def guard_terminal() -> None:
     """Let nothing that is printed steer the terminal, nor end the command if it cannot be shown.
 
     Files and other nodes choose names and texts.
     """
-    for stream in (sys.stdout, sys.stderr):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
         if stream is not None:
-            _guard(stream)
-
-
-def _guard(stream: Any) -> None:
-    if isinstance(stream, io.TextIOWrapper):
-        stream.reconfigure(errors="replace")
-    plain_write, keeps_styles = stream.write, stream.isatty()
-
-    def write(text: str) -> int:
-        plain_write(escaped(text, keeps_styles=keeps_styles))
-        return len(text)
-
-    stream.write = write
+            setattr(sys, name, _Guarded(stream))
 
 
 def stdout() -> Console:

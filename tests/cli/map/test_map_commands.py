@@ -46,6 +46,22 @@ def test_info_for_people(invoke: Invoke) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("output", ["", ".", ".."])
+def test_an_output_without_a_name_is_refused(invoke: Invoke, tmp_path: Path, output: str) -> None:
+    code, _, err = invoke("map", "convert", "warehouse", "-o", output)
+    assert (code, "it is a folder; name a file" in err) == (2, True)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("size", "told"),
+    [("1e-300", "more than 400000000 cells"), ("1e300", "valid is a positive number of metres up to 1e+06")],
+)
+def test_cells_of_no_size_are_refused(invoke: Invoke, size: str, told: str) -> None:
+    code, _, err = invoke("map", "convert", "warehouse", "-o", "new.yaml", "--resolution", size)
+    assert (code, told in err) == (2, True)
+
+
 def test_a_map_that_is_not_there(invoke: Invoke) -> None:
     code, _, err = invoke("map", "info", "warehuose")
     assert code == 2

@@ -20,7 +20,7 @@ _NO_PEER = "nano_astar is not installed, so times are not compared; valid is pip
 
 def grid(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="MovingAI .json, .scen or .map; map .yaml.")
+        list[Path], typer.Argument(metavar="FILE", help="MovingAI .json, .scen or .map; map .yaml.")
     ],
     pairs: Annotated[int, typer.Option(min=1, help="Start and goal pairs on a map .yaml.")] = 100,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the tables.")] = False,

@@ -23,7 +23,7 @@ def slam(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Lidar logs (.npz); FILE.relations beside one is what it is scored by.",
             show_default=False,
         ),

@@ -35,7 +35,8 @@ def yaml_path(output: Path) -> Path:
     """Return the YAML file that an output names, with or without its ending; raises if it cannot be."""
     from twin.files import check_file
 
-    path = output if output.suffix in (".yaml", ".yml") else Path(f"{output}.yaml")
+    is_file = output.suffix in (".yaml", ".yml") or output.name in ("", "..")  # those are folders
+    path = output if is_file else Path(f"{output}.yaml")
     check_file(path)
     return path
 

@@ -29,7 +29,7 @@ app.command(no_args_is_help=True, epilog="Example: [bold]twin bag rerun drive/ba
 @app.command(no_args_is_help=True, epilog="Example: [bold]twin bag record -a -o drive[/bold]")
 @joins
 def record(
-    topics: Annotated[list[str] | None, typer.Argument(metavar="[TOPIC]...", show_default=False)] = None,
+    topics: Annotated[list[str] | None, typer.Argument(metavar="TOPIC", show_default=False)] = None,
     everything: Annotated[bool, typer.Option("--all", "-a", help="All topics, also those to come.")] = False,
     regex: Regex = "",
     exclude: Exclude = "",

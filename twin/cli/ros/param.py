@@ -164,7 +164,7 @@ def delete(
 @joins
 def describe(
     node: Node,
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Of parameters.")],
+    names: Annotated[list[str], typer.Argument(metavar="NAME", help="Of parameters.")],
     hidden: Hidden = False,
     timeout: Timeout = 1.0,
     *,

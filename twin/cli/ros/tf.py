@@ -62,7 +62,7 @@ def echo(
         str, typer.Argument(metavar="SOURCE_FRAME", help="Frame in which the other one is shown.")
     ],
     target_frame: Annotated[str, typer.Argument(metavar="TARGET_FRAME", help="Frame whose pose is shown.")],
-    rate: Annotated[float, typer.Argument(metavar="[RATE]", min=1e-3, help="How often, in Hz.")] = 1.0,
+    rate: Annotated[float, typer.Argument(metavar="RATE", min=1e-3, help="How often, in Hz.")] = 1.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first.")] = False,
     timeout: Annotated[
         float | None,
@@ -92,10 +92,10 @@ def echo(
 @endless
 def monitor(
     source_frame: Annotated[
-        str | None, typer.Argument(metavar="[SOURCE_FRAME]", help="First frame of a chain.")
+        str | None, typer.Argument(metavar="SOURCE_FRAME", help="First frame of a chain.")
     ] = None,
     target_frame: Annotated[
-        str | None, typer.Argument(metavar="[TARGET_FRAME]", help="Last frame of a chain.")
+        str | None, typer.Argument(metavar="TARGET_FRAME", help="Last frame of a chain.")
     ] = None,
     duration: Annotated[float, typer.Option(min=0.01, help="Seconds between two reports.")] = 10.0,
     once: Annotated[bool, typer.Option("--once", help="End after the first report.")] = False,
@@ -143,7 +143,7 @@ def throttle(
     target_frame: Annotated[
         str, typer.Argument(metavar="TARGET_FRAME", help="The parent in what is published.")
     ],
-    source_frames: Annotated[list[str], typer.Argument(metavar="SOURCE_FRAME...", help="The children.")],
+    source_frames: Annotated[list[str], typer.Argument(metavar="SOURCE_FRAME", help="The children.")],
     rate: Annotated[float, typer.Option(help="At most so often, in Hz.")] = 10.0,
     trans_thres: Annotated[float, typer.Option(help="Only after moving farther, in m; 0: always.")] = 0.0,
     angular_thres: Annotated[

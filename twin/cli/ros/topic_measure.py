@@ -25,7 +25,7 @@ _SECOND_NS = 1_000_000_000
 @endless
 def hz(
     topics: Annotated[
-        list[str], typer.Argument(metavar="TOPIC...", help="Such as /chatter.", show_default=False)
+        list[str], typer.Argument(metavar="TOPIC", help="Such as /chatter.", show_default=False)
     ],
     window: Window = 10_000,
     filter_expr: Annotated[

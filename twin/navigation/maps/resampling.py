@@ -15,6 +15,9 @@ _TOUCH = 1e-6
 MOST_CELLS = 400_000_000
 """A bigger map is a slip of the pen: 20 000 x 20 000 cells are a square kilometre at 5 cm."""
 
+LARGEST_CELL = 1e6
+"""[m]"""
+
 
 def resampled(occupancy: OccupancyMap, resolution: float) -> OccupancyMap:
     """Return a map with cells of another size [m] and the same origin.
@@ -22,12 +25,16 @@ def resampled(occupancy: OccupancyMap, resolution: float) -> OccupancyMap:
     A cell gets the highest occupancy under it, so no wall is lost; it is unknown if everything under it is.
 
     Raises:
-        MapError: the resolution is not positive, or the map would be too big.
+        MapError: the resolution is not positive or no size of a map, or the map would be too big.
     """
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise MapError(f"resolution {resolution}; valid is a positive number of metres")
+    if not 0.0 < resolution <= LARGEST_CELL:
+        raise MapError(
+            f"resolution {resolution:g}; valid is a positive number of metres up to {LARGEST_CELL:g}"
+        )
     ratio = resolution / occupancy.resolution
-    if occupancy.width * occupancy.height / ratio**2 > MOST_CELLS:
+    if (
+        occupancy.width * occupancy.height > MOST_CELLS * ratio**2
+    ):  # and not a ratio, of which the square is 0
         raise MapError(
             f"resolution {resolution:g} m makes more than {MOST_CELLS} cells; valid is a coarser one"
         )
