@@ -23,6 +23,8 @@ from twin.models.mesh.meshes import mesh_faults
 
 DEEPEST = 450
 """Links in a row; tinyxml2 reads 500 elements inside of each other."""
+MOST_CACHED = 64 * 1024 * 1024
+"""Bytes of compiled meshes that MuJoCo keeps for the next compilation; a very large one has more."""
 
 
 def convert(
@@ -78,6 +80,7 @@ def convert(
 
 def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
     try:
+        mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), MOST_CACHED)
         with without_warnings():  # refuse_singular names a singular mass matrix
             return spec.copy().compile()
     except ValueError as error:

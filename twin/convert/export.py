@@ -125,7 +125,7 @@ def _reason(error: Exception) -> str:
 
 def _write_and_load(spec: mujoco.MjSpec, file: Path, description: RobotDescription) -> mujoco.MjModel:
     try:
-        file.write_text(exact_xml(spec), encoding="utf-8")
+        file.write_text(exact_xml(spec.copy()), encoding="utf-8")
         return mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:
         message = f"MuJoCo does not read what was written: {' '.join(str(error).split())}"

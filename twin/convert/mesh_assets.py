@@ -15,6 +15,8 @@ MOST_STL_FACES = 200_000
 """MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""
 MOST_FACE_BYTES = 1000
 """Of a triangle, on average, in a file that stays as it is; an OBJ file may hold anything beside them."""
+MOST_KEPT = 10 * 1024 * 1024
+"""Bytes of a file that stays as it is; MuJoCo takes many times as much to read an OBJ file."""
 _KEPT = {"stl": ".stl", "obj": ".obj", "msh": ".msh"}
 
 
@@ -37,7 +39,7 @@ def plain_stem(path: Path) -> str:
 @lru_cache(maxsize=128)
 def _content(path: Path, triangles: TriangleMesh) -> tuple[str, bytes]:
     few = len(triangles.faces) <= MOST_STL_FACES
-    lean = path.stat().st_size <= MOST_FACE_BYTES * (len(triangles.faces) + 4)
+    lean = path.stat().st_size <= min(MOST_KEPT, MOST_FACE_BYTES * (len(triangles.faces) + 4))
     if triangles.format in _KEPT and triangles.is_verbatim and lean and (few or triangles.format != "stl"):
         return _KEPT[triangles.format], read_bytes(path)
     if few:

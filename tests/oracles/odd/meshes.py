@@ -74,7 +74,7 @@ MESHES = {
     "STL that is flat": _bad(write_stl(FLAT, FACES), "is flat"),
     "a good STL": accepted(shaped(_mesh()), _one_mesh, files={"m.stl": STL}),
     "ball of 300000 faces": accepted(shaped(_mesh()), _one_mesh, files={"m.stl": _ball(300_000)}),
-    "two million faces": _bad(OBJ + b"f 1 2 3\n" * 2_000_000, "has more than 500000 triangles", name="m.obj"),
+    "two million faces": _bad(OBJ + b"f 1 2 3\n" * 2_000_000, "has more than 360000 triangles", name="m.obj"),
     "mirrored": accepted(shaped(_mesh(scale="-1 1 1")), _one_mesh, files={"m.stl": STL}),
     "scale of zero": _bad(STL, "has a scale of zero", scale="0 1 1"),
     "scale of NaN": _bad(STL, "is not finite", scale="nan 1 1"),

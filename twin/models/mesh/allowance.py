@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 MOST_PIECES = 20_000
 """Nodes, transforms, instances and lists of triangles, as often as the scene goes through them."""
 MOST_NUMBERS = 16_000_000
-"""500 000 triangles with normals and colours have less."""
+"""360 000 triangles with normals and colours have less."""
 _CHUNK = 1 << 20
 
 

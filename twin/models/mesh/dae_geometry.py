@@ -154,6 +154,8 @@ def _triangles(primitive: Element, offset: int, stride: int, allowance: Allowanc
     corners = _indices(primitive.find("{*}p"), offset, stride, allowance)
     if len(corners) % 3:
         raise ValueError(f"has triangles of {len(corners)} corners in all")
+    if len(corners) > 3 * MOST_FACES:
+        raise too_many()
     return corners.reshape(-1, 3)
 
 

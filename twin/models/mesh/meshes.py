@@ -26,12 +26,16 @@ from twin.models.shapes import Collision, Mesh, Visual
 from twin.models.urdf.xml_text import as_utf8
 from twin.regular_file import read_bytes
 
-MOST_BYTES = 64 * 1024 * 1024
-"""500 000 triangles as binary STL have 25 MB."""
+MOST_BYTES = 48 * 1024 * 1024
+"""360 000 triangles as binary STL have 18 MB."""
+MOST_DIFFERENT = 200_000
+"""Points after equal ones are joined; a closed surface has half as many as triangles."""
 LONGEST_FAULT = 200
 """Characters of what is wrong with a file: it may quote the file."""
 FARTHEST = 1e6
 """Largest coordinate [m], in the file and scaled; MuJoCo keeps meshes in single precision."""
+_MIX = 0x9E3779B97F4A7C15
+"""2^64 over the golden ratio: multiples of it spread well."""
 FLAT = 1e-6
 """Thickness, relative to its size, up to which a mesh has no volume."""
 
@@ -107,8 +111,14 @@ def _read_now(path: Path, apply_up_axis: bool) -> TriangleMesh:
         raise _fault(path, flaw, code="bad-mesh")
     used, faces = np.unique(read.faces, return_inverse=True)
     points, faces = read.points[used], faces.reshape(-1, 3)
+    is_verbatim = len(used) == len(read.points)
+    if len(points) > MOST_DIFFERENT:
+        points, faces, is_verbatim = *_joined(points, faces), False
+        if len(points) > MOST_DIFFERENT:
+            message = f"has {len(points)} different points; at most {MOST_DIFFERENT} are read"
+            raise _fault(path, message, code="bad-mesh")
     points.flags.writeable = faces.flags.writeable = False  # it is shared
-    return replace(read, points=points, faces=faces, is_verbatim=len(used) == len(read.points))
+    return replace(read, points=points, faces=faces, is_verbatim=is_verbatim)
 
 
 def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> TriangleMesh:
@@ -136,6 +146,16 @@ def _flaw(points: Array, faces: Faces) -> str | None:
     if _are_few(used[:64]) and _are_few(used):  # four different points are mostly among the first ones
         return "has less than four different points"
     return None
+
+
+def _joined(points: Array, faces: Faces) -> tuple[Array, Faces]:
+    """Return the mesh with equal points as one; all of them if that is not sure."""
+    bits = (points + 0.0).view(np.uint64)  # adding makes -0 a 0
+    mixed = (bits ^ (bits >> np.uint64(29))) @ np.array([_MIX, _MIX**3 % 2**64, _MIX**5 % 2**64], np.uint64)
+    _, first, which = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(points[first][which], points):
+        return points, faces
+    return points[first], which[faces]
 
 
 def _are_few(points: Array) -> bool:
