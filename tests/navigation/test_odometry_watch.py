@@ -138,3 +138,13 @@ def test_nothing_is_said_without_scans() -> None:
     for i in range(60):
         watch.take(lambda: np.zeros((0, 2)), Pose2(0.3 * i, 0.0, 0.0), i * 500_000_000)
     assert watch.fault == ""
+
+
+@pytest.mark.parametrize(("apart_s", "noticed"), [(0.5, True), (1.5, False)])
+def test_scans_that_are_far_apart_are_not_compared(apart_s: float, noticed: bool) -> None:
+    along = np.linspace(-2.0, 2.0, 50)
+    walls = np.concatenate([[(2.0, y), (-2.0, y), (y, 2.0), (y, -2.0)] for y in along])
+    watch = OdometryWatch()
+    for i in range(21):
+        watch.take(lambda: walls, Pose2(0.3 * i, 0.0, 0.0), round(i * apart_s * 1e9))
+    assert bool(watch.fault) == noticed
