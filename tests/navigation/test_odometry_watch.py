@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def watch_drive(
         ranges = hall.ranges(true, extra=extra(i)) + noise.normal(0.0, 0.01, len(hall.angles))
         seen = np.isfinite(ranges)
         ends = ranges[seen, None] * np.column_stack([np.cos(hall.angles), np.sin(hall.angles)])[seen]
-        watch.take(ends, odom, round(i * STEP_S * 1e9))
+        watch.take(partial(np.asarray, ends), odom, round(i * STEP_S * 1e9))
         true = moved(true, left, right) if i != kidnapped else Pose2(14.0, 9.0, 2.0)
         odom = moved(odom, *wheels(left, right))
     return watch
@@ -135,5 +136,15 @@ def test_a_corridor_tells_nothing_of_the_way_along_it(hall: Hall) -> None:
 def test_nothing_is_said_without_scans() -> None:
     watch = OdometryWatch()
     for i in range(60):
-        watch.take(np.zeros((0, 2)), Pose2(0.3 * i, 0.0, 0.0), i * 500_000_000)
+        watch.take(lambda: np.zeros((0, 2)), Pose2(0.3 * i, 0.0, 0.0), i * 500_000_000)
     assert watch.fault == ""
+
+
+@pytest.mark.parametrize(("apart_s", "noticed"), [(0.5, True), (1.5, False)])
+def test_scans_that_are_far_apart_are_not_compared(apart_s: float, noticed: bool) -> None:
+    along = np.linspace(-2.0, 2.0, 50)
+    walls = np.concatenate([[(2.0, y), (-2.0, y), (y, 2.0), (y, -2.0)] for y in along])
+    watch = OdometryWatch()
+    for i in range(21):
+        watch.take(lambda: walls, Pose2(0.3 * i, 0.0, 0.0), round(i * apart_s * 1e9))
+    assert bool(watch.fault) == noticed

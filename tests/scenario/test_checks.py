@@ -289,6 +289,7 @@ def test_energy() -> None:
     assert fold({"energy": {"max": 30}}, run).value == 30.0
     result = fold({"energy": {"max": 29}}, run)
     assert (result.passed, result.at_s, result.reason) == (False, 2.0, "bot used 30 J")
+    assert not fold({"energy": {"max": 30}}, [at(1, robots=bot(), moved={"walker"})]).passed, "another moved"
 
 
 def test_final_pose() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -69,11 +69,12 @@ class OdometryWatch:
         self._turned = 0.0
         self._comparisons: deque[_Comparison] = deque(maxlen=self._config.comparisons)
 
-    def take(self, points: Array, odom: Pose2, time_ns: int) -> None:
+    def take(self, points: Callable[[], Array], odom: Pose2, time_ns: int) -> None:
         """Take a scan.
 
         Args:
-            points: Where its rays end, in the frame of the base, shape (n, 2) [m].
+            points: Returns where its rays end, in the frame of the base, shape (n, 2) [m]; it is asked only
+                of scans that are compared.
             odom: The base's pose in odom when it was taken.
             time_ns: When it was taken.
         """
@@ -83,16 +84,13 @@ class OdometryWatch:
         self._odom = odom
         if self._before is not None and time_ns - self._before[0] < config.period_ns:
             return
-        before, self._before = self._before, (time_ns, odom, points)
+        ends = points()
+        before, self._before = self._before, (time_ns, odom, ends)
         turned, self._turned = self._turned, 0.0
-        if (
-            before is None
-            or time_ns - before[0] > 2 * config.period_ns
-            or not (len(points) and len(before[2]))
-        ):
+        if before is None or time_ns - before[0] > 2 * config.period_ns or not (len(ends) and len(before[2])):
             return
         moved = before[1].inverse() @ odom
-        compared = self._compare(before[2], points, Pose2(moved.x, moved.y, turned))
+        compared = self._compare(before[2], ends, Pose2(moved.x, moved.y, turned))
         if max(_extent(compared.odometry), _extent(compared.scans)) >= config.least_motion:
             self._comparisons.append(compared)
 

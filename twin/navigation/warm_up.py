@@ -47,8 +47,8 @@ def warm_up_odometry_watch() -> None:
     along = np.linspace(0.0, 1.0, 30)
     corner = np.column_stack([np.minimum(2.0 * along, 1.0), np.minimum(2.0 - 2.0 * along, 1.0)])
     watch = OdometryWatch()
-    watch.take(corner, Pose2(0.0, 0.0, 0.0), 0)
-    watch.take(corner, Pose2(0.0, 0.0, 1.0), 500_000_000)
+    watch.take(lambda: corner, Pose2(0.0, 0.0, 0.0), 0)
+    watch.take(lambda: corner, Pose2(0.0, 0.0, 1.0), 500_000_000)
 
 
 @cache

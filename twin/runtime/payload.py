@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-
-import numpy as np
+from itertools import combinations
 
 from twin.geometry import Array
 from twin.scenario.observation import ContactObservation
-from twin.sim.contacts import Touch
+from twin.sim.contacts import Touch, Vector
 from twin.sim.world import World
 
 _OPPOSED = -0.5
@@ -102,12 +101,15 @@ def _parted(touches: Iterable[Touch], belongs: Callable[[Touch], bool]) -> tuple
 
 def _is_held(pushes: Iterable[Touch], weight: float) -> bool:
     """Whether the pushes of a robot squeeze a good or bear it."""
-    forces = np.array([touch.push for touch in pushes])
-    if not len(forces) or forces[:, 2].sum() >= _BORNE * weight:
+    forces = [touch.push for touch in pushes]
+    if not forces or math.fsum(force[2] for force in forces) >= _BORNE * weight:
         return len(forces) > 0
-    sizes = np.linalg.norm(forces, axis=1)
-    directions = forces[sizes > 0.0] / sizes[sizes > 0.0, None]
-    return bool((directions @ directions.T < _OPPOSED).any())
+    return any(_cosine(a, b) < _OPPOSED for a, b in combinations(forces, 2))
+
+
+def _cosine(one: Vector, other: Vector) -> float:
+    sizes = math.hypot(*one) * math.hypot(*other)
+    return math.fsum(a * b for a, b in zip(one, other, strict=True)) / sizes if sizes else 1.0
 
 
 def _force(touches: Iterable[Touch]) -> float:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.geometry import Array
+Vector = tuple[float, float, float]
 
 
 class Contact(NamedTuple):
@@ -30,8 +30,8 @@ class Touch(NamedTuple):
 
     other: str
     """What touches it: a link `<robot>/<link>`, a static, goods, or the floor."""
-    push: Array
-    """The normal force on the body, along the axes of the world, shape (3,) [N]."""
+    push: Vector
+    """The normal force on the body, along the axes of the world [N]."""
 
 
 _FLOOR = -2
@@ -101,6 +101,7 @@ class ContactReader:
             mujoco.mj_contactForce(self._model, data, index, self._force)
             outwards = bool(mine[index, 0])  # normals point from the first geom to the second
             other = self._owners[geoms[index, int(outwards)]]
-            force = -self._force[0] if outwards else self._force[0]
-            touches.append(Touch(other, force * normals[index]))
+            force = float(-self._force[0] if outwards else self._force[0])
+            x, y, z = normals[index].tolist()
+            touches.append(Touch(other, (force * x, force * y, force * z)))
         return touches

@@ -76,8 +76,10 @@ class PositionServos:
         joints = model.actuator_trnid[kept, 0]
         self._actuators, self._target = kept, model.actuator_actadr[kept]
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        self._fastest = model.actuator_dynprm[kept, _SLEWMAX]
-        self._ahead = self._fastest * model.actuator_biasprm[kept, 2] / model.actuator_biasprm[kept, 1]
+        fastest = model.actuator_dynprm[kept, _SLEWMAX]
+        ahead = fastest * model.actuator_biasprm[kept, 2] / model.actuator_biasprm[kept, 1]
+        self._fastest: list[float] = fastest.tolist()
+        self._ahead: list[float] = ahead.tolist()
         self._time = float(data.time)
 
     def apply(self) -> None:
@@ -86,20 +88,20 @@ class PositionServos:
         elapsed, self._time = float(data.time) - self._time, float(data.time)
         if not len(self._actuators):
             return
-        here = data.qpos[self._qpos]
-        target = _bounded(data.act[self._target], here - self._ahead, here + self._ahead)
-        # where the joint will be at the end of the tick
-        there = here + elapsed * _bounded(data.qvel[self._dof], -self._fastest, self._fastest)
-        command = _bounded(data.ctrl[self._actuators], there - self._ahead, there + self._ahead)
-        data.act[self._target], data.ctrl[self._actuators] = target, command
+        position, velocity = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
+        targets, commands = data.act[self._target].tolist(), data.ctrl[self._actuators].tolist()
+        speeds = list(self._fastest)
+        # Numbers one by one: for a few joints arrays cost several times as much.
+        for i, (here, fastest, ahead) in enumerate(zip(position, self._fastest, self._ahead, strict=True)):
+            targets[i] = min(max(targets[i], here - ahead), here + ahead)
+            # where the joint will be at the end of the tick
+            there = here + elapsed * min(max(velocity[i], -fastest), fastest)
+            commands[i] = min(max(commands[i], there - ahead), there + ahead)
+            if elapsed > 0.0:
+                speeds[i] = min(abs(commands[i] - targets[i]) / elapsed, fastest)
+        data.act[self._target], data.ctrl[self._actuators] = targets, commands
         if elapsed > 0.0:
-            speed = np.minimum(abs(command - target) / elapsed, self._fastest)
-            self._model.actuator_dynprm[self._actuators, _SLEWMAX] = speed
-
-
-def _bounded(values: Array, least: Array, most: Array) -> Array:
-    """Return what np.clip does, which takes four times as long for a few joints."""
-    return np.minimum(np.maximum(values, least), most)
+            self._model.actuator_dynprm[self._actuators, _SLEWMAX] = speeds
 
 
 class EffortServos:

@@ -19,7 +19,7 @@ class WorkMeter:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[str]) -> None:
         """Bind to a model, at the start."""
-        self._data = data
+        self._force, self._velocity = data.qfrc_actuator, data.qvel  # views, made once: this is the hot loop
         self._half_step = 0.5 * float(model.opt.timestep)
         on_joints = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
         joints = sorted(set(model.actuator_trnid[on_joints, 0].tolist()))
@@ -32,12 +32,12 @@ class WorkMeter:
 
     def begin(self) -> None:
         """Note the state before physics steps."""
-        self._forces, self._velocities = [], [self._data.qvel.copy()]
+        self._forces, self._velocities = [], [self._velocity.copy()]
 
     def note(self) -> None:
         """Note a physics step."""
-        self._forces.append(self._data.qfrc_actuator.copy())
-        self._velocities.append(self._data.qvel.copy())
+        self._forces.append(self._force.copy())
+        self._velocities.append(self._velocity.copy())
 
     def end(self) -> None:
         """Add up what was noted since `begin`."""

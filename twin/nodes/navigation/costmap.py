@@ -209,8 +209,12 @@ class CostmapNode:
         T_base_lidar = self._robot_pose.at_stamp(frames.base, scan.header)
         if odom is None or T_base_lidar is None:
             return
-        ends = scan_points(scan, 0.0, inf_is_valid=False)
-        watch.take(T_base_lidar.apply(ends[np.isfinite(ends[:, 0])]), odom, stamp_ns)
+
+        def points() -> Array:
+            ends = scan_points(scan, 0.0, inf_is_valid=False)
+            return T_base_lidar.apply(ends[np.isfinite(ends[:, 0])])
+
+        watch.take(points, odom, stamp_ns)
 
     def _update(self) -> None:
         layers = self._layers
