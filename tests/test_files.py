@@ -46,6 +46,7 @@ def test_folders_are_made_links_are_followed_and_devices_stay(tmp_path: Path) ->
     target, link, pipe = tmp_path / "new" / "deep" / "a.txt", tmp_path / "link", tmp_path / "pipe"
     write_whole(target, "1")
     link.symlink_to(target)
+    assert target.stat().st_mode & 0o777 == 0o644  # whatever mkstemp makes: a CI server is another user
     write_whole(link, "2")
     assert (link.is_symlink(), target.read_text("utf-8")) == (True, "2")
     os.mkfifo(pipe)
@@ -118,6 +119,16 @@ def test_a_folder_is_written_by_one_process_at_a_time(tmp_path: Path) -> None:
         written_alone(tmp_path),
     ):
         pass
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_file_system_without_locks_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def flock(descriptor: int, how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))  # as NFS without its lock service
+
+    monkeypatch.setattr("fcntl.flock", flock)
+    with written_alone(tmp_path):
+        assert (tmp_path / ".lock").exists()
     assert not any(tmp_path.iterdir())
 
 

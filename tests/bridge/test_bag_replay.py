@@ -31,6 +31,8 @@ from twin.bridge.clock import Clock
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, stamp
 from twin.bridge.qos import LATCHED
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment
 from twin.errors import RecordingError
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.amcl import AmclNode, InitialPose
@@ -224,6 +226,18 @@ def test_a_run_from_outside_is_in_the_bag(tmp_path: Path) -> None:
         assert len(messages) == count
         assert [m.sequence for m in messages] == list(range(1, count + 1))
         assert codec(String).decode(messages[0].data).data == "hello"
+
+
+def test_topics_of_actions_of_others_are_not_in_the_bag(tmp_path: Path) -> None:
+    with Bus.open(Clock()) as bus:
+        tap, node = BagTap(tmp_path / "bag"), bus.create_node("robot")
+        for number, name in enumerate(("/a", "/dock/_action/status"), 1):
+            heard = node.create_subscription(String, name, lambda _: None)
+            data = (codec(String).encode(String("x")), Attachment(number, 0, bytes(16)))
+            tap.on_arrival(Arrival(data[1], heard, data))
+        tap.close()
+    with BagReader(tmp_path / "bag") as bag:
+        assert set(bag.topics) == {"/a"}
 
 
 @pytest.mark.parametrize("hidden", [False, True])

@@ -34,6 +34,7 @@ from twin.bridge.graph import Graph
 from twin.bridge.msgs import LaserScan, OccupancyGrid, String, TFMessage, TransformStamped, new
 from twin.bridge.qos import QoS
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.wire.entrance import read
 from twin.bridge.wire.external import ExternalQueue
 
 CHATTER = f"{STRING}/{STRING_HASH}"
@@ -325,3 +326,10 @@ def test_a_request_without_numbers_of_ros_is_answered_once(bus: Bus, endpoint: s
             )
         wait_for(lambda: _spin(bus) and len(sums) == 2)
         assert sorted(sums) == [1, 2]
+
+
+@pytest.mark.parametrize(("left", "counted"), [(0, 0), (3, 0), (4, 1)])
+def test_what_fills_the_last_word_of_a_message_does_not_follow_it(left: int, counted: int) -> None:
+    queue, strings = ExternalQueue(depth=1), codec(String)
+    message = read(queue, "/a", strings, strings.encode(String("abc")) + bytes(left))
+    assert (message, queue.trailing, dict(queue.refused)) == (String("abc"), counted, {})

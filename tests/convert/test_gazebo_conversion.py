@@ -64,6 +64,7 @@ def test_links_touch_each_other_if_one_of_them_wants_to(lines: tuple[str, ...], 
 def test_links_inside_of_each_other_from_the_start_do_not_touch_and_that_is_told() -> None:
     wish = on("a", "<selfCollide>true</selfCollide>")
     assert not touches(robot(wish, at=0.15))
+    assert touches(robot(wish, at=0.19995))  # who just touches at the start is meant to
     note = "none: their shapes are inside of each other at joint position zero"
     told = Guess(element="contact of links 'a' and 'b'", note=note)
     assert told in convert(robot(wish, at=0.15)).guesses

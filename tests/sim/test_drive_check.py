@@ -223,6 +223,7 @@ def test_a_robot_is_driven_no_faster_than_its_wheels_may_turn(limit: str) -> Non
         commands = {n: CommandSpec(joint=n, interface="velocity", lower=-2.0, upper=3.0) for n in wheels}
         slow = replace(slow, commands=commands)
     assert slow.drive is not None
+    assert drive_config(slow.drive, slow).max_wheel_velocity == 2.0
     ground = ProvingGround(convert(slow), drive_config(slow.drive, slow))
     assert ground.straight(1.0).true.x == pytest.approx(1.0, abs=0.005)
     turn = ground.circle(0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,3 +50,15 @@ def test_wheels_on_rockers_and_springs_drive(joint: str, axis: str) -> None:
     drive = guess_drive(robot(joint, axis))
     assert drive is not None
     assert (drive.kind, drive.left_joints) == ("skid_steer", ("left_joint", "left_2_joint"))
+
+
+def test_wheels_without_friction_drive_nothing() -> None:
+    """Casters of many files are such wheels."""
+    whole = robot("fixed", "0 0 1")
+    smooth = {
+        name: replace(whole.links[name], surface=replace(whole.links[name].surface, friction=0.0))
+        for name in ("left_2", "right_2")
+    }
+    drive = guess_drive(replace(whole, links={**whole.links, **smooth}))
+    assert drive is not None
+    assert (drive.kind, drive.left_joints) == ("diff_drive", ("left_joint",))
