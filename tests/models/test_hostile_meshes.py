@@ -79,7 +79,7 @@ def test_very_many_ids_are_found_soon(tmp_path: Path) -> None:
 
 def test_a_polygon_of_more_corners_than_are_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="more than 360000 triangles"):
-        read(tmp_path, OBJ.encode() + b"f" + b" 1" * 600_000, "m.obj")
+        read(tmp_path, OBJ.encode() + b"f" + b" 1" * 360_003, "m.obj")
 
 
 def test_blanks_take_no_more_memory_than_a_few_times_the_file(tmp_path: Path) -> None:
@@ -113,6 +113,29 @@ def test_a_fault_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr("twin.models.mesh.meshes.read_bytes", None)
 
 
+def test_equal_points_are_joined_where_there_are_many(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("twin.models.mesh.meshes.MOST_DIFFERENT", 4)
+    mesh = read(tmp_path, ascii_stl(), "m.stl")
+    assert len(mesh.points) == len(POINTS)
+    assert not mesh.is_verbatim
+    monkeypatch.setattr("twin.models.mesh.meshes.MOST_DIFFERENT", 3)
+    with pytest.raises(ModelError, match="has 4 different points; at most 3 are read"):
+        read(tmp_path, ascii_stl(), "n.stl")
+
+
+def test_indices_for_too_many_triangles_are_not_gone_through(tmp_path: Path) -> None:
+    content = dae(primitives=TRIANGLES[: TRIANGLES.index("<p>") + 3] + "1 " * 1_200_000 + "</p></triangles>")
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="more than 360000 triangles"):
+            read(tmp_path, content)
+        assert tracemalloc.get_traced_memory()[1] < 12 * len(content)
+    finally:
+        tracemalloc.stop()
+
+
 def test_a_cylinder_of_very_many_corners_has_its_hull_soon(tmp_path: Path) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 10_000, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
@@ -125,8 +148,8 @@ def test_a_cylinder_of_very_many_corners_has_its_hull_soon(tmp_path: Path) -> No
 
 @pytest.mark.timeout(120)
 def test_a_slice_of_the_fuzz_run_is_endured() -> None:
-    outcomes, _, _ = run(range(60))
-    assert outcomes["accepted"] >= 10
+    outcomes, _, _ = run(range(20))
+    assert outcomes["accepted"] >= 3
 
 
 def test_a_seed_is_always_the_same_file() -> None:
