@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test check bench soak oracle scenarios smoke docs clean
+.PHONY: run test check bench soak fuzz oracle scenarios smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
@@ -35,6 +35,9 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a
 
 soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory
 	$(BIN)/python -m tests.benchmarks.soak
+
+fuzz: $(VENV)/.ready  ## 10 000 broken and hostile mesh files, checked and converted: none takes 5 s of CPU or 500 MB
+	$(BIN)/python -m tests.oracles.mesh_fuzz
 
 oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'

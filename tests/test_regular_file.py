@@ -23,6 +23,7 @@ from twin.strict_yaml.document import read
 pytestmark = pytest.mark.timeout(20)
 
 READERS: dict[str, Callable[[Path], object]] = {
+    "robot": load,
     "scenario": lambda path: read(path, ScenarioError),
     "bag": BagReader,
     "parameters": files.read,
@@ -48,6 +49,15 @@ def test_a_pipe_is_refused_at_once(pipe: Path, kind: str) -> None:
 def test_a_pipe_as_behaviour_tree_is_told(pipe: Path) -> None:
     (problem,) = read_file(pipe).problems
     assert "is a pipe, not a regular file" in problem.message
+
+
+def test_a_pipe_as_the_image_of_a_map_is_told(pipe: Path) -> None:
+    file = pipe.with_name("map.yaml")
+    file.write_text(
+        "{image: pipe, resolution: 0.05, origin: [0, 0, 0], occupied_thresh: 0.6, free_thresh: 0.2}"
+    )
+    with pytest.raises(TwinError, match="is a pipe, not a regular file"):
+        read_metadata(file)
 
 
 @pytest.mark.parametrize(

@@ -30,21 +30,20 @@ def with_unused_numbers(content: bytes, count: int) -> bytes:
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        ("m.obj", b"#\n" + b"\n" * FLOOD + OBJ.encode()),
-        ("m.obj", OBJ.encode() + b" " * FLOOD + b"\n" + b"\r\n" * FLOOD),
-        ("m.obj", OBJ.encode() + b"v\x0b" + b"\n" * FLOOD),
+        ("m.obj", b"#" + b"\n" * FLOOD),
+        ("m.obj", b"#" + b" \n" * FLOOD),
         ("m.stl", b"solid\n" + b"\n" * FLOOD + ascii_stl()[20:]),
-        ("m.stl", ascii_stl()[:-9] + b"vertex\n" * FLOOD),
-        ("m.stl", ascii_stl()[:-9] + b" " * FLOOD),
-        ("m.dae", dae(primitives="<polygons>" + "\n" * FLOOD + "</polygons>" + TRIANGLES)),
+        ("m.stl", ascii_stl() + b"\n" * FLOOD),
+        ("m.stl", ascii_stl()[:-9] + b"\n" * FLOOD),
     ],
+    ids=["no points", "blanks", "before", "after", "no end"],
 )
 def test_a_flood_is_read_or_refused(tmp_path: Path, name: str, content: bytes) -> None:
     try:
         mesh = read(tmp_path, content, name)
     except ModelError:
         return
-    assert len(mesh.points) in (len(POINTS), 3 * len(POINTS))
+    assert len(mesh.points) == 3 * len(POINTS)
 
 
 def test_numbers_that_many_instances_share_are_read_once(tmp_path: Path) -> None:
@@ -55,14 +54,17 @@ def test_numbers_that_many_instances_share_are_read_once(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     "content",
     [
-        dae("<node id='n0'>" + "<instance_geometry url='#g'/>" * 20_001 + "</node>"),
-        dae("<node>" + "<scale>1 1 1</scale>" * 20_001 + "<instance_geometry url='#g'/></node>"),
-        dae(MANY, primitives=TRIANGLES * 8),
+        dae("<node id='n0'>" + "<instance_geometry url='#g'/>" * 201 + "</node>"),
+        dae("<node>" + "<scale>1 1 1</scale>" * 201 + "<instance_geometry url='#g'/></node>"),
+        dae("<node><instance_geometry url='#g'/></node>" * 50, primitives=TRIANGLES * 4),
     ],
     ids=["instances", "transforms", "primitives"],
 )
-def test_a_scene_has_a_limit_of_pieces_which_the_error_tells(tmp_path: Path, content: bytes) -> None:
-    with pytest.raises(ModelError, match="more than 20000 nodes, transforms and instances"):
+def test_a_scene_has_a_limit_of_pieces_which_the_error_tells(
+    tmp_path: Path, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("twin.models.mesh.allowance.MOST_PIECES", 200)
+    with pytest.raises(ModelError, match="more than 200 nodes, transforms and instances"):
         read(tmp_path, content)
 
 
@@ -73,13 +75,13 @@ def test_a_collada_file_has_a_limit_of_tags(tmp_path: Path, tag: str, noun: str)
 
 
 def test_very_many_ids_are_found_soon(tmp_path: Path) -> None:
-    ids = "".join(f"<a id='i{i}'/>" for i in range(100_000))
+    ids = "".join(f"<a id='i{i}'/>" for i in range(80_000))
     assert len(read(tmp_path, dae(primitives=ids + TRIANGLES)).points) == len(POINTS)
 
 
 def test_a_polygon_of_more_corners_than_are_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="more than 360000 triangles"):
-        read(tmp_path, OBJ.encode() + b"f" + b" 1" * 600_000, "m.obj")
+        read(tmp_path, OBJ.encode() + b"f" + b" 1" * 360_003, "m.obj")
 
 
 def test_blanks_take_no_more_memory_than_a_few_times_the_file(tmp_path: Path) -> None:
@@ -113,6 +115,29 @@ def test_a_fault_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr("twin.models.mesh.meshes.read_bytes", None)
 
 
+def test_equal_points_are_joined_where_there_are_many(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("twin.models.mesh.meshes.MOST_DIFFERENT", 4)
+    mesh = read(tmp_path, ascii_stl(), "m.stl")
+    assert len(mesh.points) == len(POINTS)
+    assert not mesh.is_verbatim
+    monkeypatch.setattr("twin.models.mesh.meshes.MOST_DIFFERENT", 3)
+    with pytest.raises(ModelError, match="has 4 different points; at most 3 are read"):
+        read(tmp_path, ascii_stl(), "n.stl")
+
+
+def test_indices_for_too_many_triangles_are_not_gone_through(tmp_path: Path) -> None:
+    content = dae(primitives=TRIANGLES[: TRIANGLES.index("<p>") + 3] + "1 " * 1_200_000 + "</p></triangles>")
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="more than 360000 triangles"):
+            read(tmp_path, content)
+        assert tracemalloc.get_traced_memory()[1] < 12 * len(content)
+    finally:
+        tracemalloc.stop()
+
+
 def test_a_cylinder_of_very_many_corners_has_its_hull_soon(tmp_path: Path) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 10_000, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
@@ -125,8 +150,8 @@ def test_a_cylinder_of_very_many_corners_has_its_hull_soon(tmp_path: Path) -> No
 
 @pytest.mark.timeout(120)
 def test_a_slice_of_the_fuzz_run_is_endured() -> None:
-    outcomes, _, _ = run(range(60))
-    assert outcomes["accepted"] >= 10
+    outcomes, _, _ = run(range(20))
+    assert outcomes["accepted"] >= 3
 
 
 def test_a_seed_is_always_the_same_file() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twin.errors import ModelError, Problem, nearest
+from twin.regular_file import refusal
 
 ROBOTS = Path(__file__).parent / "robots"
 """A ROS package (`$(find twin_robots)`) with one folder per robot."""
@@ -30,7 +31,9 @@ def resolve(name_or_path: str | Path) -> Path:
     if text in robots:
         return robots[text]
     if isinstance(name_or_path, Path) or path.suffix in (".urdf", ".xacro", ".xml") or len(path.parts) > 1:
-        raise ModelError(Problem(f"no such model file: {text}", code="no-file"))
+        why = refusal(path)
+        message = f"{text} is no model file: {why}" if why else f"no such model file: {text}"
+        raise ModelError(Problem(message, code="no-file"))
     message = f"unknown robot '{text}': {nearest(text, robots)}, or the path of a URDF or xacro file"
     raise ModelError(Problem(message, code="no-file"))
 

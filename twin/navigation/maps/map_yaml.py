@@ -13,7 +13,7 @@ import yaml
 
 from twin.errors import MapError, Problem
 from twin.geometry import Pose2
-from twin.regular_file import read_text
+from twin.regular_file import read_text, refusal
 
 Mode = Literal["trinary", "scale", "raw"]
 
@@ -122,7 +122,7 @@ class _MetadataReader:
             raise ValueError(f"is {value!r}; valid is the name of an image file")
         image = self.path.parent / Path(value).expanduser()
         if not image.is_file():
-            raise ValueError(f"names {image}, which is not there; valid is an image file")
+            raise ValueError(f"names {image}: {refusal(image) or 'it is not there'}; valid is an image file")
         return image
 
     def _report(self, message: str, key: str | None = None, *, name: bool = False) -> None:
