@@ -27,7 +27,7 @@ from twin.cli.child import run_in_child
 from twin.cli.options import RunOptions, parse_overrides, parse_pace
 from twin.cli.play import find_recording
 from twin.errors import RecordingError, ScenarioError, SimulationError
-from twin.files import written_alone
+from twin.files.writing import written_alone
 from twin.models import catalogue
 from twin.scenario.checks import CheckResult
 from twin.scenario.schema import Scenario

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError, Problem
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 PASSABLE = ".GS"
 """Ground, grass and swamp; trees (T), water (W) and what is out of bounds (@, O) are not."""

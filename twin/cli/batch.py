@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from twin.errors import ScenarioError
-from twin.files import absence
+from twin.files.reading import absence
 
 
 def run_batch(
@@ -39,7 +39,7 @@ def run_batch(
     from twin.cli.folders import results_folder
     from twin.cli.options import RunOptions
     from twin.cli.verdict_table import many_report
-    from twin.files import check_file, write_whole
+    from twin.files.writing import check_file, write_whole
 
     files = scenario_files(paths or [Path("scenarios")])
     if junit is not None:

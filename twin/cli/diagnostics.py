@@ -9,8 +9,8 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from twin.files.reading import read_text
 from twin.plain_text import escaped
-from twin.regular_file import read_text
 
 if TYPE_CHECKING:
     from pathlib import Path

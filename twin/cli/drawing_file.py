@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from twin.errors import RecordingError
-from twin.files import check_file, write_whole
+from twin.files.writing import check_file, write_whole
 
 Output = Annotated[
     Path | None,

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from twin.errors import RecordingError
-from twin.files import written_alone
+from twin.files.writing import written_alone
 
 
 def run_folder(scenario: str) -> Path:

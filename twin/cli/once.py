@@ -14,7 +14,7 @@ from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interru
 from twin.cli.options import RunOptions
 from twin.cli.progress import run_progress
 from twin.errors import TwinError
-from twin.files import check_file, written_alone
+from twin.files.writing import check_file, written_alone
 
 if TYPE_CHECKING:
     from twin.scenario.outside import ClockMode

@@ -18,7 +18,7 @@ def schema(
     import json
     import sys
 
-    from twin.files import check_file, write_whole
+    from twin.files.writing import check_file, write_whole
 
     if output is not None:
         check_file(output)

@@ -59,7 +59,7 @@ def view(
     Ctrl-C ends it, and so does closing the viewer. Exit code 0, or 2 for a file with errors.
     """
     from twin.cli.console import stderr
-    from twin.files import check_file
+    from twin.files.writing import check_file
     from twin.models import load
     from twin.recording.posture import Posture
     from twin.recording.robot_view import save as save_recording

@@ -24,9 +24,9 @@ from twin.convert.self_check import SelfCheck, self_check
 from twin.convert.sensors import add_sensors
 from twin.convert.tag_ledger import counts, tag_ledger
 from twin.errors import ConversionError, Problem
+from twin.files.reading import read_bytes
 from twin.models.checks import Diagnostic
 from twin.models.description import WORLD, RobotDescription
-from twin.regular_file import read_bytes
 
 MODEL, REPORT, ASSETS = "robot.xml", "report.json", "assets"
 

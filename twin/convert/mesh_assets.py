@@ -6,10 +6,10 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
+from twin.files.reading import read_bytes
 from twin.models.mesh.mesh_formats import write_msh, write_stl
 from twin.models.mesh.meshes import TriangleMesh, read_mesh
 from twin.models.shapes import Mesh
-from twin.regular_file import read_bytes
 
 MOST_STL_FACES = 200_000
 """MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twin.errors import ModelError, Problem, nearest
-from twin.regular_file import refusal
+from twin.files.reading import refusal
 
 ROBOTS = Path(__file__).parent / "robots"
 """A ROS package (`$(find twin_robots)`) with one folder per robot."""

@@ -17,7 +17,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from twin.errors import RecordingError, nearest
-from twin.regular_file import open_file
+from twin.files.reading import open_file
 
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""

@@ -14,7 +14,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from twin.errors import RecordingError
-from twin.files import replaced
+from twin.files.writing import replaced
 from twin.recording.frames import WORLD, Frames
 
 WALL_CLOCK_METRICS = frozenset(

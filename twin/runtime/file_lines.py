@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from twin.bridge.parameters import files
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 
 def lines_of(path: Path) -> dict[tuple[str, str], int]:

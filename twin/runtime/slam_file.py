@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, get_args
 
 from twin.errors import MapError
+from twin.files.reading import read_bytes
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Mode
 from twin.navigation.mapping.storage import unpack
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.slam_toolbox import SlamNodeConfig
-from twin.regular_file import read_bytes
 from twin.runtime.absent_parameters import Absent
 from twin.runtime.localisation_files import SLAM, differing, file_for
 from twin.runtime.nav2_file import Nav2Parameters

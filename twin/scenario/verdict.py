@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from twin.files import write_whole
+from twin.files.writing import write_whole
 from twin.scenario.checks import CheckResult
 from twin.scenario.junit import junit_xml
 

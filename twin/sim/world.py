@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from twin.errors import ScenarioError, nearest
-from twin.files import write_whole
+from twin.files.writing import write_whole
 from twin.geometry import Array, Pose3
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
 from twin.sim.contacts import Contact, ContactReader, Touch

@@ -11,8 +11,7 @@ import yaml
 from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
-from twin.files import absence
-from twin.regular_file import read_text
+from twin.files.reading import absence, read_text
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""

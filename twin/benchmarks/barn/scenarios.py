@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
-from twin.files import write_whole
+from twin.files.writing import write_whole
 
 ROBOT = "jackal"
 _MARGIN = 3.0

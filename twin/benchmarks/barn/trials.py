@@ -13,7 +13,7 @@ from pathlib import Path
 from twin.benchmarks.barn.referee import Referee, Trial
 from twin.benchmarks.barn.scenarios import BarnOptions, write
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
-from twin.files import write_whole
+from twin.files.writing import write_whole
 from twin.runtime import run
 from twin.scenario import schema
 

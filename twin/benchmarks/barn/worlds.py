@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from twin.errors import BenchmarkError, nearest
+from twin.files.reading import read_text
 from twin.geometry import Pose2
-from twin.regular_file import read_text
 
 FORMAT = "twin-barn/1"
 TOP_SPEED = 2.0

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import MapError
+from twin.files.reading import read_bytes
 from twin.geometry import Array
-from twin.regular_file import read_bytes
 
 SPEED = 1.0
 """Of a robot whose log has no usable times [m/s]; faster than most of these drove."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError
+from twin.files.reading import read_text
 from twin.geometry import Array, wrap_angles
-from twin.regular_file import read_text
 
 APART = 60
 """So many scans lie at least between the two of a place seen again ..."""

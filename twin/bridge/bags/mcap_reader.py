@@ -25,7 +25,7 @@ from twin.bridge.bags.mcap_records import (
     Statistics,
 )
 from twin.errors import RecordingError
-from twin.regular_file import open_file
+from twin.files.reading import open_file
 
 _LARGEST_RECORD = 1 << 32
 

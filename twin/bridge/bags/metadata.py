@@ -14,7 +14,7 @@ import yaml
 from twin.bridge.bags import offered_qos
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.errors import RecordingError
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 FILE = "metadata.yaml"
 VERSION = 9

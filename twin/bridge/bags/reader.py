@@ -11,7 +11,7 @@ from twin.bridge.bags import metadata
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.sources import McapSource, Rosbag1Source, Rosbag2Source, Source
 from twin.errors import RecordingError, nearest
-from twin.regular_file import open_file
+from twin.files.reading import open_file
 
 _MAGIC = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V2.0\n": "rosbag1"}
 _FOREVER = 2**63 - 2

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from twin.errors import BridgeError, Problem
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 KEY = "ros__parameters"
 _TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}

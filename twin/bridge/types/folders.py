@@ -9,7 +9,7 @@ from pathlib import Path
 
 from twin.bridge.types.parser import SECTIONS, Definition
 from twin.errors import BridgeError, Problem
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
 _FILE = re.compile(r"[A-Za-z][A-Za-z0-9]*")

@@ -16,7 +16,7 @@ import zenoh
 from twin.bridge.wire import Wire
 from twin.bridge.wire.interrupts import from_zenoh
 from twin.errors import BridgeError, NobodyAnswersError
-from twin.regular_file import refusal
+from twin.files.reading import refusal
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 """rmw_zenoh's: 'key=value;key=value', values in JSON5 (zenoh_config.cpp)."""

@@ -66,7 +66,7 @@ def barn(
     from twin.cli.console import stdout
     from twin.cli.folders import results_folder
     from twin.cli.options import parse_overrides
-    from twin.files import write_whole
+    from twin.files.writing import write_whole
 
     options = BarnOptions(
         seed=seed,

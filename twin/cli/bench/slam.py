@@ -78,7 +78,7 @@ def slam(
 
 def _write(folder: Path, name: str, mapped: Slam) -> None:
     from twin.benchmarks.slam.picture import png
-    from twin.files import write_whole
+    from twin.files.writing import write_whole
 
     mapped.map().save(folder / f"{name}.yaml")
     write_whole(folder / f"{name}.png", png(mapped))

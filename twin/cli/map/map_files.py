@@ -33,7 +33,7 @@ def map_path(name_or_path: str) -> Path:
 
 def yaml_path(output: Path) -> Path:
     """Return the YAML file that an output names, with or without its ending; raises if it cannot be."""
-    from twin.files import check_file
+    from twin.files.writing import check_file
 
     is_file = output.suffix in (".yaml", ".yml") or output.name in ("", "..")  # those are folders
     path = output if is_file else Path(f"{output}.yaml")

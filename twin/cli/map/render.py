@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.map.map_files import Format, told, yaml_path
-from twin.regular_file import read_text
+from twin.files.reading import read_text
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena

@@ -27,7 +27,7 @@ def show(
 ) -> None:
     """Draw a map: in the terminal, or as a picture with the map frame's axes and masks over it."""
     from twin.errors import RecordingError
-    from twin.files import check_file, write_whole
+    from twin.files.writing import check_file, write_whole
 
     if output is not None and output.suffix not in (".png", ".svg"):
         raise RecordingError(f"--output {output}: must end in .png or .svg")

@@ -8,8 +8,8 @@ import resource
 import sys
 from typing import Any
 
+from twin.files.reading import refusal
 from twin.models.urdf.packages import MANIFEST, Packages
-from twin.regular_file import refusal
 
 CPU_SECONDS = 15
 ADDRESS_SPACE_BYTES = 1 << 30

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import ModelError, Problem
+from twin.files.reading import read_bytes
 from twin.geometry import Array
 from twin.models.description import Link, RobotDescription
 from twin.models.mesh.dae import Rgb, read_dae
@@ -24,7 +25,6 @@ from twin.models.mesh.mesh_formats import (
 )
 from twin.models.shapes import Collision, Mesh, Visual
 from twin.models.urdf.xml_text import as_utf8
-from twin.regular_file import read_bytes
 
 MOST_BYTES = 48 * 1024 * 1024
 """360 000 triangles as binary STL have 18 MB."""

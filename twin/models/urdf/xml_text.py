@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from twin.errors import ModelError, Problem
-from twin.regular_file import read_bytes
+from twin.files.reading import read_bytes
 
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ELEMENTS = 200_000

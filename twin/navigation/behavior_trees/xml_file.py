@@ -8,7 +8,7 @@ from pathlib import Path
 from lxml import etree
 
 from twin.errors import Problem
-from twin.regular_file import read_bytes
+from twin.files.reading import read_bytes
 
 _EXPLICIT = ("Action", "Condition", "Control", "Decorator", "SubTree", "SubTreePlus")
 

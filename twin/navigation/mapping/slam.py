@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.errors import MapError
-from twin.files import replaced
+from twin.files.reading import read_bytes
+from twin.files.writing import replaced
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
 from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
@@ -25,7 +26,6 @@ from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
 from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.regular_file import read_bytes
 
 __all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError, Problem
-from twin.regular_file import read_bytes
+from twin.files.reading import read_bytes
 
 
 def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MapError
-from twin.files import replaced
+from twin.files.writing import replaced
 from twin.navigation.maps.map_image import write_image
 from twin.navigation.maps.map_yaml import MODES, Mode
 from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap

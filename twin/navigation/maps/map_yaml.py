@@ -12,8 +12,8 @@ from typing import Any, Literal
 import yaml
 
 from twin.errors import MapError, Problem
+from twin.files.reading import read_text, refusal
 from twin.geometry import Pose2
-from twin.regular_file import read_text, refusal
 
 Mode = Literal["trinary", "scale", "raw"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -40,26 +39,6 @@ def _fault(path: Path) -> str:
     if not folder.is_dir():
         return f"{folder} is not a folder; name another place"
     return "" if os.access(folder, os.W_OK | os.X_OK) else f"the folder {folder} is read-only; name another"
-
-
-def absence(path: Path) -> str:
-    """Return why there is no such file to read, and which may have been meant; empty if that is not why."""
-    from difflib import get_close_matches
-
-    try:
-        mode = path.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except OSError:
-        return ""  # such as a name that is too long: whoever opens it says so
-    else:
-        return "is a folder; name a file" if stat.S_ISDIR(mode) else ""
-    try:
-        names = sorted(each.name for each in path.parent.iterdir() if each.is_file())
-    except OSError:  # its folder is missing, too
-        names = []
-    like = get_close_matches(path.name, names, n=1, cutoff=0.7)
-    return f"no such file; did you mean {path.parent / like[0]}?" if like else "no such file"
 
 
 def write_whole(path: Path, content: bytes | str) -> None:

@@ -34,6 +34,26 @@ def refusal(path: str | Path) -> str | None:
     return None if stat.S_ISREG(mode) else f"it is {_KINDS.get(stat.S_IFMT(mode), 'odd')}, not a regular file"
 
 
+def absence(path: Path) -> str:
+    """Return why there is no such file to read, and which may have been meant; empty if that is not why."""
+    from difflib import get_close_matches
+
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError:
+        return ""  # such as a name that is too long: whoever opens it says so
+    else:
+        return "is a folder; name a file" if stat.S_ISDIR(mode) else ""
+    try:
+        names = sorted(each.name for each in path.parent.iterdir() if each.is_file())
+    except OSError:  # its folder is missing, too
+        names = []
+    like = get_close_matches(path.name, names, n=1, cutoff=0.7)
+    return f"no such file; did you mean {path.parent / like[0]}?" if like else "no such file"
+
+
 def open_file(path: Path) -> BinaryIO:
     """Open a file for reading.
 

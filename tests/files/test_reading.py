@@ -11,13 +11,13 @@ import pytest
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.parameters import files
 from twin.errors import ModelError, ScenarioError, TwinError
+from twin.files.reading import read_text
 from twin.models import load
 from twin.navigation.behavior_trees.xml_file import read_file
 from twin.navigation.mapping.slam import Slam
 from twin.navigation.maps.map_image import read_image
 from twin.navigation.maps.map_yaml import read_metadata
 from twin.recording.read_back import check_recording
-from twin.regular_file import read_text
 from twin.strict_yaml.document import read
 
 pytestmark = pytest.mark.timeout(20)

@@ -12,11 +12,12 @@ from pathlib import Path
 import pytest
 
 from twin.errors import RecordingError
-from twin.files import absence, check_file, replaced, write_whole, written_alone
+from twin.files.reading import absence
+from twin.files.writing import check_file, replaced, write_whole, written_alone
 
 _HOLDER = """
 import pathlib, sys
-from twin.files import written_alone
+from twin.files.writing import written_alone
 with written_alone(pathlib.Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()

@@ -1,0 +1,1 @@
+"""Files that users name: read with care, written whole."""
