@@ -171,5 +171,5 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     file.symlink_to(file)
     with pytest.raises(ModelError, match="no such model file"):
         load(file)
-    with pytest.raises(ModelError, match="no such model file"):
+    with pytest.raises(ModelError, match="it is a folder"):
         load(tmp_path)

@@ -23,6 +23,8 @@ WALL_CLOCK_METRICS = frozenset(
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
 FLUSH_TIMEOUT_S = 60
 """Longest wait for a disk that is slow."""
+_abandoned: list[Any] = []
+"""Streams whose writer has ended."""
 _FOOTER = b"RRF2FOOT"
 """Begins the last twelve bytes of a file that was closed."""
 
@@ -71,7 +73,10 @@ def flush(recording: rr.RecordingStream, path: Path) -> None:
             return
         except RuntimeError as fault:
             if "timed out" not in str(fault) or not _has_room(path.parent):
-                raise _not_whole(path) from fault
+                break
+    # When it is collected, or the process ends, Rerun would wait for that writer, too.
+    _abandoned.append(recording.inner)
+    rr.unregister_shutdown()
     raise _not_whole(path)
 
 
@@ -87,9 +92,12 @@ def _has_room(folder: Path) -> bool:
 def end_recording(recording: rr.RecordingStream, path: Path) -> None:
     """Write the footer and close the file.
 
+    A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
+
     Raises:
         RecordingError: The file is not whole.
     """
+    flush(recording, path)
     recording.disconnect()
     with path.open("rb") as file:
         file.seek(-min(len(_FOOTER) + 4, path.stat().st_size), os.SEEK_END)

@@ -291,13 +291,11 @@ class MobileManipulationNode(MissionNode):
 
     def _grip_fault(self, width: float) -> str | None:
         """Return what the finger's encoder and drive tell against a grip, if anything."""
-        finger, effort = (
-            self._joints.get(self._gripper_joint, 0.0),
-            self._efforts.get(self._gripper_joint, 0.0),
-        )
+        finger = self._joints.get(self._gripper_joint, 0.0)
+        effort = self._efforts.get(self._gripper_joint)
         if abs(finger - width / 2.0) > self.skills.grip_tolerance:
             return f"finger at {finger:.3f} m instead of {width / 2.0:.3f} m"
-        if abs(effort) < self.skills.least_grip * self._grip_effort:
+        if effort is not None and abs(effort) < self.skills.least_grip * self._grip_effort:
             return f"finger presses with {abs(effort):.0f} N instead of {self._grip_effort:.0f} N"
         return None
 

@@ -16,9 +16,9 @@ WHOLE = robot(link())
 XML = {
     "empty": refused("", "the file is empty"),
     "only spaces": refused(" \n ", "the file is empty"),
-    "a folder": refused(Path.mkdir, "no such model file"),
-    "a pipe": refused(os.mkfifo, "no such model file"),
-    "an endless device": refused(_device, "no such model file"),
+    "a folder": refused(Path.mkdir, "it is a folder"),
+    "a pipe": refused(os.mkfifo, "it is a pipe"),
+    "an endless device": refused(_device, "it is a device"),
     "binary": refused(bytes(range(256)), "is no UTF-8"),
     "a null byte": refused(WHOLE.replace("><", ">\0<", 1), "null byte"),
     "HTML": refused("<html><body><p>404</p></body></html>", "root element is <html>"),
