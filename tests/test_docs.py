@@ -130,7 +130,7 @@ class Reader:
         )
 
     def _judge(self, command: str, process: subprocess.Popen[str], output: list[str]) -> None:
-        printed, _ = process.communicate(timeout=200)
+        printed, _ = process.communicate(timeout=600)
         assert process.returncode == 0, f"{command}\n{printed}"
         rest = " ".join(printed.split())
         for line in output:
@@ -140,6 +140,7 @@ class Reader:
             )
 
 
+@pytest.mark.timeout(900)  # `twin test scenarios` runs them all, one after the other
 @pytest.mark.parametrize(
     "page", [pytest.param(page, marks=[pytest.mark.slow] if page in SLOW else []) for page in sorted(PAGES)]
 )
