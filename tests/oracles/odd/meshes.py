@@ -73,6 +73,7 @@ MESHES = {
     "STL of four milliard faces": _bad(STL[:80] + b"\xff" * 4 + STL[84:], "4294967295 triangles"),
     "STL that is flat": _bad(write_stl(FLAT, FACES), "is flat"),
     "a good STL": accepted(shaped(_mesh()), _one_mesh, files={"m.stl": STL}),
+    "ball of 300000 faces": _bad(_ball(300_000), "900000 different points; at most 200000"),
     "ball of 60000 faces": accepted(shaped(_mesh()), _one_mesh, files={"m.stl": _ball(60_000)}),
     "two million faces": _bad(OBJ + b"f 1 2 3\n" * 2_000_000, "has more than 360000 triangles", name="m.obj"),
     "mirrored": accepted(shaped(_mesh(scale="-1 1 1")), _one_mesh, files={"m.stl": STL}),
