@@ -30,9 +30,9 @@ from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
-from twin.nodes.navigation.controller_server_config import ControllerServerConfig
-from twin.nodes.navigation.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking_server import DockingServerConfig
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking.server import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.nodes.node_parameters import parameter_names
 from twin.runtime.build import build

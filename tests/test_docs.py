@@ -23,7 +23,7 @@ from tests.processes import free_endpoint, wait_for_listener
 from twin.cli import app as app_module
 from twin.models import load
 from twin.models.catalogue import catalogue
-from twin.runtime.derive import footprint
+from twin.runtime.defaults.from_description import footprint
 from twin.scenario.checks import CheckEntry, CheckResult
 from twin.scenario.schema import json_schema
 from twin.scenario.verdict import Verdict

@@ -45,7 +45,7 @@ WALL_CLOCK = {
     "twin/benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
     "twin/benchmarks/grid_maps.py": {"perf_counter"},  # the same
     "twin/benchmarks/slam/trial.py": {"perf_counter"},  # how many times faster than the robot drove
-    "twin/cli/folders.py": {"now"},  # the name of a run's folder
+    "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""
 

@@ -14,9 +14,7 @@ from hypothesis import strategies as st
 from pydantic import Field, TypeAdapter, model_validator
 
 from twin.errors import MapError
-from twin.strict_yaml import (
-    Fault,
-    Faults,
+from twin.parameters import (
     Hertz,
     Joules,
     Kilograms,
@@ -26,9 +24,8 @@ from twin.strict_yaml import (
     Radians,
     RadiansPerSecond,
     Seconds,
-    StrictModel,
-    load,
 )
+from twin.strict_yaml import Fault, Faults, StrictModel, load
 
 
 class Physics(StrictModel):

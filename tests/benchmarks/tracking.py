@@ -25,7 +25,7 @@ from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.warm_up import warm_up_controller
-from twin.runtime.controller_config import controller_server_config
+from twin.runtime.defaults.controllers import controller_server_config
 from twin.scenario.controllers import ControllerParameters
 
 DT, LAG, WINDOW = 0.06, 0.1, 2.0

@@ -35,11 +35,11 @@ from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment
 from twin.errors import RecordingError
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime import run
-from twin.runtime.localisation_stack import _initial_guess
+from twin.runtime.stacks.localisation import _initial_guess
 from twin.scenario.schema import load
 from twin.warehouse import arena
 

@@ -10,8 +10,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import String
 from twin.bridge.qos import LATCHED
-from twin.bridge.raw import RawSample, RawSubscription
 from twin.bridge.topics import Subscription
+from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.wire.session import direct
 
 

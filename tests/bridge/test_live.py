@@ -10,10 +10,10 @@ from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, Twist, stamp
-from twin.bridge.node_options import BARE
+from twin.bridge.node.options import BARE
 from twin.bridge.qos import LATCHED
-from twin.bridge.raw import RawSample, RawSubscription
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.errors import BridgeError
 
 

@@ -12,7 +12,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Log, String
 from twin.bridge.node import Node
-from twin.bridge.node_options import NodeOptions
+from twin.bridge.node.options import NodeOptions
 from twin.bridge.qos import QoS
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError

@@ -7,7 +7,7 @@ import pytest
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Log, String
-from twin.bridge.node_options import NodeOptions
+from twin.bridge.node.options import NodeOptions
 from twin.bridge.parameters import files as parameter_files
 from twin.bridge.programs import ros_args
 from twin.errors import BridgeError

@@ -10,7 +10,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import ParameterDescriptor, ParameterEvent, SetParametersResult
 from twin.bridge.node import Node
-from twin.bridge.node_options import NodeOptions
+from twin.bridge.node.options import NodeOptions
 from twin.bridge.parameters.errors import (
     InvalidParameterValueException,
     ParameterImmutableException,

@@ -34,7 +34,7 @@ from twin.bridge.graph import Graph
 from twin.bridge.msgs import LaserScan, OccupancyGrid, String, TFMessage, TransformStamped, new
 from twin.bridge.qos import QoS
 from twin.bridge.srvs import AddTwoInts
-from twin.bridge.wire.entrance import read
+from twin.bridge.wire.admission import read
 from twin.bridge.wire.external import ExternalQueue
 
 CHATTER = f"{STRING}/{STRING_HASH}"

@@ -30,8 +30,8 @@ from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String, Twist
 from twin.bridge.qos import LATCHED, QoS
-from twin.bridge.raw import RawSample, RawSubscription
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.wire import WIRES, Wire
 from twin.errors import BridgeError
 

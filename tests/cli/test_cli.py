@@ -22,10 +22,10 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from twin.cli import app as app_module
-from twin.cli import batch, repeat
-from twin.cli.child import run_in_child
-from twin.cli.options import RunOptions, parse_overrides, parse_pace
 from twin.cli.play import find_recording
+from twin.cli.run import batch, repeat
+from twin.cli.run.child import run_in_child
+from twin.cli.run.options import RunOptions, parse_overrides, parse_pace
 from twin.errors import RecordingError, ScenarioError, SimulationError
 from twin.files.writing import written_alone
 from twin.models import catalogue
@@ -352,7 +352,7 @@ def _no_run(*_: object) -> None:
 def test_two_commands_do_not_write_into_one_folder(
     demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
-    for place in ("twin.cli.child.run_in_child", "twin.cli.repeat.run_in_child"):
+    for place in ("twin.cli.run.child.run_in_child", "twin.cli.run.repeat.run_in_child"):
         monkeypatch.setattr(place, _no_run)
     held = demo.parent / "held"
     held.mkdir()
@@ -399,7 +399,7 @@ def test_where_nothing_can_be_written_is_told_before_any_work(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str], option: str, place: str
 ) -> None:
     for work in (
-        "twin.cli.child.run_in_child",
+        "twin.cli.run.child.run_in_child",
         "twin.models.loader.load",
         "twin.cli.ros.joining.Joining.open",
         "twin.scenario.schema.json_schema",
@@ -457,7 +457,7 @@ def test_options_survive_the_way_to_a_child(
 ) -> None:
     understood: list[RunOptions] = []
     monkeypatch.setattr(
-        "twin.cli.once.run_once", lambda options, out, as_json: understood.append(options) or 0
+        "twin.cli.run.once.run_once", lambda options, out, as_json: understood.append(options) or 0
     )
     code, _, err = invoke(*options.arguments(Path("out")))
     assert (code, err) == (0, "")
@@ -516,7 +516,7 @@ def test_test_runs_all_and_writes_one_junit(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (demo.parent / "second.yaml").write_text(SCENARIO, encoding="utf-8")
-    monkeypatch.setattr("twin.cli.child.run_in_child", child(iter("ab"), passed=False))
+    monkeypatch.setattr("twin.cli.run.child.run_in_child", child(iter("ab"), passed=False))
     code, out, _ = invoke("test", str(demo.parent), "--junit", "reports/all.xml")
     assert code == 1
     assert "0 of 2 passed" in out
@@ -548,7 +548,7 @@ def test_a_child_that_crashes_says_its_last_line_and_keeps_the_rest(
 ) -> None:
     crash = "import sys; sys.exit('Traceback\\n  many lines\\nTypeError: no')"
     monkeypatch.setattr(RunOptions, "arguments", lambda *_: [])
-    monkeypatch.setattr("twin.cli.child.COMMAND", (sys.executable, "-c", crash))
+    monkeypatch.setattr("twin.cli.run.child.COMMAND", (sys.executable, "-c", crash))
     verdict = run_in_child(RunOptions(scenario=Path("demo.yaml")), tmp_path / "new")
     assert verdict["verdict"] == "error"
     assert verdict["error"].startswith("the run's process ended with code 1: TypeError: no (all of it: ")

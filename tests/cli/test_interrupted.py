@@ -109,7 +109,8 @@ def test_an_interrupt_at_any_import_ends_with_130_and_no_word(command: str, step
 _SIGNALLED = """
 import os, signal, sys, types
 import twin
-from twin.cli import app, main, once
+from twin.cli import app, main
+from twin.cli.run import once
 from twin.scenario import schema
 from twin.scenario.verdict import Verdict
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from twin.cli import app as app_module
-from twin.cli.view import Layer
+from twin.cli.model.view import Layer
 from twin.recording.read_back import read
-from twin.recording.robot_layers import LAYERS
+from twin.recording.view.robot_layers import LAYERS
 
 Invoke = Callable[..., tuple[int, str]]
 

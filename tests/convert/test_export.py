@@ -15,11 +15,11 @@ import pytest
 from lxml import etree
 
 from twin.convert import convert
+from twin.convert.contact_roles import roles_of
 from twin.convert.export import export
 from twin.convert.inspection import inspect_file
-from twin.convert.roles import roles_of
+from twin.convert.ledger.tags import tag_ledger
 from twin.convert.self_check import self_check
-from twin.convert.tag_ledger import tag_ledger
 from twin.errors import ConversionError
 from twin.models import catalogue, load
 from twin.models.checks import check

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from twin.convert import convert
+from twin.convert.contact_roles import roles_of
 from twin.convert.conversion import Guess
 from twin.convert.export import export
-from twin.convert.roles import roles_of
 from twin.models import load
 from twin.models.description import RobotDescription
 from twin.models.loader import parse_urdf

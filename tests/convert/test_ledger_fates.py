@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from twin.convert.roles import roles_of
-from twin.convert.tag_ledger import TagEntry, tag_ledger
+from twin.convert.contact_roles import roles_of
+from twin.convert.ledger.tags import TagEntry, tag_ledger
 from twin.models.loader import parse_urdf
 
 INERTIAL = "<inertial><origin/><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial>"

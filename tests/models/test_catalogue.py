@@ -14,7 +14,7 @@ from twin.models import catalogue, link_poses, load
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_positions
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
-from twin.runtime.derive import footprint
+from twin.runtime.defaults.from_description import footprint
 
 ROBOTS = ("diff_bot", "jackal", "r2d2", "sp1s", "test_robot", "warehouse_bot")
 

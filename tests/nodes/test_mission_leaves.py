@@ -13,7 +13,7 @@ from twin.bridge.actions import ActionClient, ActionServer, GoalHandle
 from twin.bridge.msgs import GoalStatus, duration, new
 from twin.bridge.srvs import AddTwoInts
 from twin.navigation.behavior_trees.node import Status
-from twin.nodes.mission_leaves import CallAction, CallService, Condition, Do, sequence, with_recovery
+from twin.nodes.missions.leaves import CallAction, CallService, Condition, Do, sequence, with_recovery
 
 
 class Server:

@@ -14,7 +14,7 @@ from twin.geometry import Array
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.docking.docks import DockType
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.controller_server_config import ControllerServerConfig
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.node_parameters import declare_config
 
 

@@ -31,10 +31,10 @@ from twin.models import load
 from twin.models.kinematics import link_poses
 from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.amcl import AmclNode, InitialPose
-from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
+from twin.nodes.navigation.localisation.static import StaticLocalisationNode
+from twin.nodes.navigation.mapping.map_server import MapServerNode
 from twin.nodes.navigation.robot_pose import Frames
-from twin.nodes.navigation.static_localisation import StaticLocalisationNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.nodes.transforms import TransformListenerNode

@@ -14,9 +14,9 @@ from twin.bridge.msgs import Float64MultiArray, JointState, MultiArrayLayout, Od
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
-from twin.nodes.mission_nodes import VelocityProfileNode
-from twin.nodes.navigation.twist_mux import TwistMuxNode
-from twin.nodes.navigation.velocity_smoother import VelocitySmootherNode
+from twin.nodes.missions.simple import VelocityProfileNode
+from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
+from twin.nodes.navigation.velocity.velocity_smoother import VelocitySmootherNode
 from twin.nodes.position_controller import PositionControllerNode
 
 

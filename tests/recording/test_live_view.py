@@ -13,12 +13,12 @@ import pytest
 
 from twin.errors import RecordingError
 from twin.models import load
-from twin.recording import live_view as live_view_module
 from twin.recording import player
-from twin.recording.live_view import LiveViewConfig, live_view
-from twin.recording.live_viewer import LiveViewer, connect
-from twin.recording.posture import Posture
-from twin.recording.robot_view import RobotView, robot_layout
+from twin.recording.view import live_view as live_view_module
+from twin.recording.view.live_view import LiveViewConfig, live_view
+from twin.recording.view.live_viewer import LiveViewer, connect
+from twin.recording.view.posture import Posture
+from twin.recording.view.robot_view import RobotView, robot_layout
 
 needs_vulkan = pytest.mark.skipif(
     not player.has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"

@@ -13,10 +13,10 @@ from twin.errors import ModelError
 from twin.geometry import Pose3, matrix_from_quat_wxyz
 from twin.models import link_poses, load
 from twin.models.description import Inertial, RobotDescription
-from twin.recording.posture import Posture
 from twin.recording.read_back import content_digest, read
-from twin.recording.robot_layers import LAYERS, inertia_box
-from twin.recording.robot_view import save
+from twin.recording.view.posture import Posture
+from twin.recording.view.robot_layers import LAYERS, inertia_box
+from twin.recording.view.robot_view import save
 
 BOX = "<geometry><box size='0.2 0.1 0.1'/></geometry>"
 MASS = "<inertial><mass value='2'/><inertia ixx='0.01' iyy='0.02' izz='0.03'/></inertial>"

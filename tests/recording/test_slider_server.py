@@ -14,13 +14,13 @@ from twin.convert.inspection import inspect_robot
 from twin.errors import RecordingError
 from twin.models import ReadOptions, link_poses, load
 from twin.models.description import RobotDescription
-from twin.recording.live_view import Watcher, reload
-from twin.recording.posture import Posture
 from twin.recording.read_back import read
-from twin.recording.robot_session import RobotSession
-from twin.recording.robot_view import RobotView, robot_layout
-from twin.recording.slider_server import MAX_BODY, SliderServer
 from twin.recording.stream import open_recording
+from twin.recording.view.live_view import Watcher, reload
+from twin.recording.view.posture import Posture
+from twin.recording.view.robot_session import RobotSession
+from twin.recording.view.robot_view import RobotView, robot_layout
+from twin.recording.view.slider_server import MAX_BODY, SliderServer
 
 ROBOT = """<robot name='r'><link name='a'/><link name='b'/><link name='c'/>
 <joint name='lift' type='prismatic'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/>

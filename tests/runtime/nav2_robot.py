@@ -8,8 +8,8 @@ from typing import Any
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.footprint import rectangle
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.nav2_parameters import with_file, with_plugins
-from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
+from twin.runtime.parameter_files.nav2.parameters import with_file, with_plugins
 from twin.scenario.navigation import NavigationConfig
 
 

@@ -17,8 +17,8 @@ import pytest
 from twin import runtime
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
-from twin.cli.once import run_once
-from twin.cli.options import RunOptions
+from twin.cli.run.once import run_once
+from twin.cli.run.options import RunOptions
 from twin.errors import BridgeError, MapError, ModelError, SimulationError, TwinError
 from twin.geometry import Pose2
 from twin.models import load as load_robot

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from twin.models import load
-from twin.runtime import derive
+from twin.runtime.defaults import from_description as derive
 
 CASTERED = """<robot name="cart">
   <link name="base"/><link name="l"/><link name="r"/><link name="fork"/><link name="arm"/><link name="roll"/>

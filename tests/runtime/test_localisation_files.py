@@ -13,13 +13,13 @@ from twin.bridge.topics import Sample
 from twin.errors import NavigationError
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Slam
-from twin.nodes.navigation.ekf import EkfNodeConfig, for_robot
+from twin.nodes.navigation.localisation.ekf import EkfNodeConfig, for_robot
+from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
-from twin.nodes.navigation.slam_toolbox import SlamNodeConfig
-from twin.runtime.ekf_file import ekf_with_file
-from twin.runtime.localisation_files import localisation_nodes
+from twin.runtime.parameter_files.ekf import ekf_with_file
+from twin.runtime.parameter_files.localisation import localisation_nodes
+from twin.runtime.parameter_files.slam import slam_with_file
 from twin.runtime.run import Run
-from twin.runtime.slam_file import slam_with_file
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
 

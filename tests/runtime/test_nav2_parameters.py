@@ -17,10 +17,10 @@ from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
 from twin.navigation.docking.docks import Dock
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.costmap import CostmapNodeConfig
-from twin.runtime.nav2_parameters import amcl_with_file, monitor_with_file
-from twin.runtime.navigation_config import NavigationParameters
-from twin.runtime.overrides import overridden
+from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.runtime.defaults.navigation import NavigationParameters
+from twin.runtime.defaults.overrides import overridden
+from twin.runtime.parameter_files.nav2.parameters import amcl_with_file, monitor_with_file
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.schema import load
@@ -518,7 +518,7 @@ collision_monitor:
     Stop: {type: circle, action_type: stop, radius: wide, max_points: many}
 """
     code = (
-        "import sys; from twin.runtime.nav2_parameters import monitor_with_file as read\n"
+        "import sys; from twin.runtime.parameter_files.nav2.parameters import monitor_with_file as read\n"
         "from twin.scenario.navigation import NavigationConfig\n"
         "try: read(NavigationConfig(params_file=sys.argv[1]), '')\n"
         "except Exception as error: print(error)"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.runtime import nav2_robot
-from twin.runtime.navigation_config import NavigationParameters
+from twin.runtime.defaults.navigation import NavigationParameters
 
 
 def applied(tmp_path: Path, text: str, config: dict[str, Any]) -> NavigationParameters:

@@ -12,7 +12,7 @@ from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
-from twin.runtime.controller_config import controller_server_config
+from twin.runtime.defaults.controllers import controller_server_config
 from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
 from twin.scenario.navigation import NavigationConfig
 from twin.scenario.schema import load

@@ -9,7 +9,7 @@ from twin.models.catalogue import catalogue
 from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.planner import PlannerConfig, ThetaStarConfig
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.navigation_config import NavigationParameters, navigation_parameters
+from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
 from twin.scenario.navigation import NavigationConfig
 
 

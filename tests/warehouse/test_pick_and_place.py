@@ -28,7 +28,7 @@ from twin.geometry import Pose2, Pose3
 from twin.manipulation.telescopic_arm import GraspPose
 from twin.models import load
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
-from twin.runtime import derive
+from twin.runtime.defaults import from_description as derive
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
 from twin.warehouse.skills import Station
 

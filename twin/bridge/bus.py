@@ -13,12 +13,12 @@ import zenoh
 
 from twin.bridge import names
 from twin.bridge.clock import Clock
-from twin.bridge.exchange import Exchange
 from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
-from twin.bridge.node_options import NodeOptions
-from twin.bridge.node_services import StandardServices
+from twin.bridge.node.options import NodeOptions
+from twin.bridge.node.services import StandardServices
 from twin.bridge.topics import Sample
+from twin.bridge.topics.in_process import Exchange
 from twin.bridge.wire import Wire
 from twin.bridge.wire.external import Arrival, ExternalQueue
 from twin.bridge.wire.interrupts import guard

@@ -18,12 +18,12 @@ from twin.bridge.cdr.codec import codec
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
-from twin.bridge.node_options import NodeOptions
+from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs import ros_args
 from twin.bridge.programs.arguments import parser_of, split
 from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
-from twin.bridge.wire.entrance import Entrance, read
+from twin.bridge.wire.admission import Entrance, read
 from twin.bridge.wire.interrupts import noted_signals
 from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.naming import Interface

@@ -11,7 +11,7 @@ from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
-from twin.bridge.wire.entrance import Entrance, read
+from twin.bridge.wire.admission import Entrance, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, pack_attachment
 from twin.bridge.wire.naming import parse_key

@@ -9,12 +9,14 @@ from typing import Annotated
 
 import typer
 
-from twin.cli import batch, check, convert, exec, graph, play, robots, run, schema, tree, view
+from twin.cli import exec, play, run, schema
 from twin.cli.bench import app as bench_app
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
+from twin.cli.model import check, convert, graph, robots, tree, view
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
+from twin.cli.run import batch
 from twin.errors import TwinError
 
 app = typer.Typer(

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 
 from twin.convert.bodies import LEAST_RANGE
+from twin.convert.contact_roles import commanded_wheels
 from twin.convert.conversion import Guess
-from twin.convert.roles import commanded_wheels
 from twin.models.checks.wheels import Wheel
 from twin.models.description import Joint, RobotDescription
 from twin.models.kinematics import ONE_DOF

@@ -42,4 +42,4 @@ class Conversion:
     moved_inertia: Mapping[str, float] = field(default_factory=dict)
     """Of each commanded joint with all that it moves [kg or kg m²]."""
     guesses: tuple[Guess, ...]
-    """Of everything else, `twin.convert.tag_ledger` tells what became of it."""
+    """Of everything else, `twin.convert.ledger.tags` tells what became of it."""

@@ -8,14 +8,14 @@ import mujoco
 
 from twin.convert.actuators import add_actuators, moved_inertia
 from twin.convert.bodies import Base, add_bodies, free_name
+from twin.convert.contact_roles import roles_of
 from twin.convert.contacts import add_excludes, exclude_overlaps, spawn_height
 from twin.convert.conversion import Conversion
 from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
 from twin.convert.guesses import contact_guesses
+from twin.convert.massless_links import refuse_singular
 from twin.convert.mujoco_log import without_warnings
-from twin.convert.roles import roles_of
-from twin.convert.stand_ins import refuse_singular
 from twin.convert.tyres import carry_load
 from twin.errors import ConversionError, Problem
 from twin.models.description import WORLD, RobotDescription

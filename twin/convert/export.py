@@ -14,15 +14,15 @@ from typing import Any
 import mujoco
 
 from twin.convert.bodies import Base, natural_base
+from twin.convert.contact_roles import roles_of
 from twin.convert.conversion import Conversion, Guess
 from twin.convert.convert import convert
 from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
+from twin.convert.ledger.tags import counts, tag_ledger
 from twin.convert.mujoco_log import without_warnings
-from twin.convert.roles import roles_of
 from twin.convert.self_check import SelfCheck, self_check
 from twin.convert.sensors import add_sensors
-from twin.convert.tag_ledger import counts, tag_ledger
 from twin.errors import ConversionError, Problem
 from twin.files.reading import read_bytes
 from twin.models.checks import Diagnostic

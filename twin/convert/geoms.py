@@ -7,8 +7,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from twin.convert.contact_roles import Roles
 from twin.convert.mesh_assets import mesh_asset, plain_stem
-from twin.convert.roles import Roles
 from twin.convert.tyres import stiff, wheel_contact
 from twin.geometry import Array, Pose3
 from twin.models.checks.discs import disc_of

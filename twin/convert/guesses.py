@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from twin.convert.contact_roles import Roles
 from twin.convert.conversion import Guess
-from twin.convert.roles import Roles
 from twin.models.description import RobotDescription
 
 

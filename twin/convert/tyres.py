@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.controllers.skid_steer import weight_shares
-from twin.convert.roles import Roles
+from twin.convert.contact_roles import Roles
 from twin.geometry import Array
 from twin.models.dynamics import STANDARD_GRAVITY
 

@@ -13,8 +13,8 @@ from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import LaserScan, PoseArray, header, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
-from twin.navigation.docking.controller import find_box_faces
-from twin.nodes.navigation.costmap import scan_points
+from twin.navigation.docking.faces import find_box_faces
+from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
 
 

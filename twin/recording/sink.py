@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays f
     import rerun as rr
 
     from twin.recording.belief import Belief
-    from twin.recording.channel import Channel, Context
+    from twin.recording.channels.channel import Channel, Context
     from twin.recording.columns import TransformColumns
     from twin.recording.extents import RobotBox, Stage
 
@@ -117,7 +117,7 @@ class RerunSink:
             RecordingError: The file cannot be written.
         """
         from twin.recording.blueprint import layout
-        from twin.recording.channel import Context
+        from twin.recording.channels.channel import Context
         from twin.recording.columns import TransformColumns
         from twin.recording.extents import Stage, robot_box
         from twin.recording.shapes import declare_shapes
@@ -164,7 +164,7 @@ class RerunSink:
             return
         key = (sample.topic, sample.msgtype)
         if key not in self._channels:
-            from twin.recording.channels import open_channel
+            from twin.recording.channels.table import open_channel
 
             self._channels[key] = open_channel(self._context, sample.topic, sample.msgtype)
         channel = self._channels[key]

@@ -11,7 +11,7 @@ from typing import Any
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.names import RemapRule
-from twin.bridge.node_options import NodeOptions
+from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs.factory import create_nodes
 from twin.bridge.programs.ros_args import RosArguments
 from twin.bridge.topics import Sample
@@ -22,13 +22,13 @@ from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.runtime.drives import with_drive
-from twin.runtime.missions import MissionHandle, build_mission
-from twin.runtime.obstacles import hidden_pose, standing_pose
-from twin.runtime.robot_stack import RobotStack
-from twin.runtime.stack_context import StackContext
+from twin.runtime.defaults.drives import with_drive
+from twin.runtime.events.obstacles import hidden_pose, standing_pose
+from twin.runtime.parameter_files.unpublished_topics import tell_unheard_scans
+from twin.runtime.stacks.context import StackContext
+from twin.runtime.stacks.missions import MissionHandle, build_mission
+from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
-from twin.runtime.unheard import tell_unheard_scans
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone

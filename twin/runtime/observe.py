@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twin.geometry import Pose3
-from twin.runtime.derive import GRASP_FRAME
-from twin.runtime.missions import MissionHandle
+from twin.runtime.defaults.from_description import GRASP_FRAME
 from twin.runtime.payload import Payload
-from twin.runtime.robot_stack import RobotStack
+from twin.runtime.stacks.missions import MissionHandle
+from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
 from twin.sim.world import World

@@ -16,11 +16,11 @@ from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
 from twin.recording.digest import RunDigest
-from twin.runtime import derive
 from twin.runtime.build import Parts, build
-from twin.runtime.faults import FaultSchedule
+from twin.runtime.defaults import from_description as derive
+from twin.runtime.events.faults import FaultSchedule
+from twin.runtime.events.obstacles import ObstacleSchedule
 from twin.runtime.observe import Observer
-from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.outside import Lockstep
 from twin.runtime.pacing import Pace
 from twin.runtime.saved_maps import save_maps

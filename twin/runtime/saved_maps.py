@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twin.errors import RecordingError
-from twin.runtime.robot_stack import RobotStack
+from twin.runtime.stacks.robot import RobotStack
 
 
 def save_maps(stacks: Mapping[str, RobotStack], folder: Path) -> None:

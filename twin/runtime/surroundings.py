@@ -8,7 +8,7 @@ from twin.models.kinematics import link_poses
 from twin.models.shapes import Box
 from twin.models.specs import LidarSpec
 from twin.navigation.costmaps.footprint import radii
-from twin.runtime.robot_stack import RobotStack
+from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import Surroundings
 from twin.sim.scene import Scene
 from twin.warehouse.footprint import Rectangle

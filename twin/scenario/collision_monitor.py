@@ -6,8 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from twin.scenario.fields import Fraction, NotNegative, Positive, RosName
-from twin.strict_yaml import Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
+from twin.parameters import (
+    Fraction,
+    Metres,
+    MetresPerSecond,
+    NotNegative,
+    Positive,
+    RadiansPerSecond,
+    Seconds,
+)
+from twin.scenario.fields import RosName
+from twin.strict_yaml import StrictModel
 
 
 def _corners(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:

@@ -11,19 +11,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from twin.scenario.fields import NotNegative, Positive
-from twin.scenario.parameter_group import ParameterGroup
-from twin.scenario.predictive_controllers import DWBParameters, MPPIParameters
-from twin.strict_yaml import (
-    Fault,
-    Faults,
+from twin.parameters import (
     Hertz,
     Metres,
     MetresPerSecond,
+    NotNegative,
+    Positive,
     Radians,
     RadiansPerSecond,
     Seconds,
 )
+from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.predictive_controllers import DWBParameters, MPPIParameters
+from twin.strict_yaml import Fault, Faults
 
 
 def _not_the_first(name: str) -> str:

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from twin.scenario.fields import NotNegative, PoseConfig, Positive
+from twin.parameters import Metres, NotNegative, Positive, Radians, Seconds
+from twin.scenario.fields import PoseConfig
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, Radians, Seconds, StrictModel
+from twin.strict_yaml import StrictModel
 
 
 class DockTypeParameters(ParameterGroup):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from twin.scenario.fields import NotNegative, OneOf, PoseConfig, Positive
-from twin.strict_yaml import Metres, Radians, Seconds, StrictModel
+from twin.parameters import Metres, NotNegative, Positive, Radians, Seconds
+from twin.scenario.fields import OneOf, PoseConfig
+from twin.strict_yaml import StrictModel
 
 
 class RobotFault(StrictModel):

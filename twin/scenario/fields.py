@@ -11,7 +11,6 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     ConfigDict,
-    Field,
     ValidationInfo,
     WithJsonSchema,
     model_validator,
@@ -19,7 +18,8 @@ from pydantic import (
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.strict_yaml import Fault, Faults, Metres, Radians, StrictModel
+from twin.parameters import Metres, Radians
+from twin.strict_yaml import Fault, Faults, StrictModel
 
 
 def _ros_name(value: str) -> str:
@@ -117,8 +117,3 @@ class OneOf(StrictModel):
         """The value of that key."""
         config: StrictModel = getattr(self, self.kind)
         return config
-
-
-Positive = Field(gt=0)
-NotNegative = Field(ge=0)
-Fraction = Field(ge=0, le=1)

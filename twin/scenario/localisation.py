@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from twin.scenario.fields import FileBeside, NameOrPath, NotNegative, PoseConfig
+from twin.parameters import Metres, NotNegative, Radians
+from twin.scenario.fields import FileBeside, NameOrPath, PoseConfig
 from twin.scenario.localisation_parameters import AmclParameters, EkfParameters, SlamParameters
-from twin.strict_yaml import Metres, Radians, StrictModel
+from twin.strict_yaml import StrictModel
 
 
 class InitialPoseError(StrictModel):

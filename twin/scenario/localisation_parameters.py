@@ -8,9 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from twin.scenario.fields import Fraction, NotNegative, Positive
+from twin.parameters import Fraction, Metres, NotNegative, Positive, Radians, Seconds
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, Radians, Seconds
 
 
 class AmclParameters(ParameterGroup):

@@ -6,8 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from twin.scenario.fields import NotNegative, OneOf, Positive
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, Radians, RadiansPerSecond, Seconds, StrictModel
+from twin.parameters import (
+    Hertz,
+    Metres,
+    MetresPerSecond,
+    NotNegative,
+    Positive,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+)
+from twin.scenario.fields import OneOf
+from twin.strict_yaml import StrictModel
 
 
 class PickAndPlaceTask(StrictModel):

@@ -9,13 +9,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from twin.parameters import Hertz, Metres, MetresPerSecond, NotNegative, Positive, RadiansPerSecond, Seconds
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
-from twin.scenario.fields import NameOrPath, NotNegative, Positive
+from twin.scenario.fields import NameOrPath
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.planners import PlannerParameters
-from twin.strict_yaml import Hertz, Metres, MetresPerSecond, RadiansPerSecond, Seconds, StrictModel
+from twin.strict_yaml import StrictModel
 
 
 class CostmapParameters(ParameterGroup):

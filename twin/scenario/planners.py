@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from twin.scenario.fields import NotNegative, Positive
+from twin.parameters import Metres, NotNegative, Positive, Seconds
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, Seconds
 
 _AtLeastOne = Field(ge=1.0)
 

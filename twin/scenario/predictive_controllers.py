@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from twin.scenario.fields import NotNegative, Positive
+from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, RadiansPerSecond, Seconds
 from twin.scenario.parameter_group import ParameterGroup
-from twin.strict_yaml import Metres, MetresPerSecond, RadiansPerSecond, Seconds
 
 _Negative = Field(le=0.0)
 _Weight = Annotated[float, NotNegative]

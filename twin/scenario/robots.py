@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from twin.models.catalogue import catalogue
-from twin.scenario.fields import ArgumentText, NameOrPath, NotNegative, PoseConfig, RosName, known
+from twin.parameters import NotNegative, Seconds
+from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
-from twin.strict_yaml import Fault, Faults, Seconds, StrictModel
+from twin.strict_yaml import Fault, Faults, StrictModel
 
 
 class RobotConfig(StrictModel):

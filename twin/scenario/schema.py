@@ -10,15 +10,16 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from twin.errors import ScenarioError
+from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import consistency
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
-from twin.scenario.fields import NotNegative, Positive, RosName
+from twin.scenario.fields import RosName
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
 from twin.scenario.robots import RobotConfig
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import Faults, Seconds, StrictModel
+from twin.strict_yaml import Faults, StrictModel
 from twin.strict_yaml import load as load_yaml
 
 

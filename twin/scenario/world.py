@@ -6,8 +6,9 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from twin.scenario.fields import NameOrPath, NotNegative, PoseConfig, Positive, RosName, known
-from twin.strict_yaml import Fault, Faults, Hertz, Kilograms, Metres, MetresPerSecond, Seconds, StrictModel
+from twin.parameters import Hertz, Kilograms, Metres, MetresPerSecond, NotNegative, Positive, Seconds
+from twin.scenario.fields import NameOrPath, PoseConfig, RosName, known
+from twin.strict_yaml import Fault, Faults, StrictModel
 from twin.warehouse.arena import catalogue
 
 Length = Annotated[Metres, Positive]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.convert.actuators import drive_ratio, leader_of
-from twin.convert.roles import commanded_wheels
+from twin.convert.contact_roles import commanded_wheels
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription

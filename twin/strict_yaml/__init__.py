@@ -18,15 +18,6 @@ from twin.strict_yaml.document import Loc as Loc
 from twin.strict_yaml.document import apply_override, read
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults
-from twin.strict_yaml.units import Hertz as Hertz
-from twin.strict_yaml.units import Joules as Joules
-from twin.strict_yaml.units import Kilograms as Kilograms
-from twin.strict_yaml.units import Metres as Metres
-from twin.strict_yaml.units import MetresPerSecond as MetresPerSecond
-from twin.strict_yaml.units import Newtons as Newtons
-from twin.strict_yaml.units import Radians as Radians
-from twin.strict_yaml.units import RadiansPerSecond as RadiansPerSecond
-from twin.strict_yaml.units import Seconds as Seconds
 from twin.strict_yaml.validate import validate
 
 M = TypeVar("M", bound=BaseModel)

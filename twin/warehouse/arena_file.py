@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.strict_yaml import Fault, Faults, Kilograms, Metres, StrictModel
+from twin.parameters import Kilograms, Metres
+from twin.strict_yaml import Fault, Faults, StrictModel
 from twin.warehouse.arena_types import Colour, Interval, Length, Point, PoseList
 from twin.warehouse.cylinders import CylindersEntry, outside
 from twin.warehouse.footprint import Rectangle, overlap

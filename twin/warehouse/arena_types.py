@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from twin.strict_yaml import Metres, Radians
+from twin.parameters import Metres, Radians
 
 Length = Annotated[Metres, Field(gt=0.0)]
 Point = tuple[Metres, Metres]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from twin.bridge.bus import Bus
 from twin.manipulation.telescopic_arm import TelescopicArm
 from twin.navigation.behavior_trees.node import TreeNode
-from twin.nodes.mission_leaves import sequence, with_recovery
+from twin.nodes.missions.leaves import sequence, with_recovery
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.warehouse.skills import MobileManipulationNode, Station
 

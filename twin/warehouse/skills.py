@@ -38,7 +38,7 @@ from twin.manipulation.trajectory import plan_joint_move
 from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.navigation.docking.docks import DockType
 from twin.nodes.messages import pose_stamped
-from twin.nodes.mission_leaves import (
+from twin.nodes.missions.leaves import (
     CallAction,
     CallService,
     Condition,
@@ -47,7 +47,7 @@ from twin.nodes.mission_leaves import (
     sequence,
     while_true,
 )
-from twin.nodes.mission_nodes import MissionNode
+from twin.nodes.missions.simple import MissionNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
 

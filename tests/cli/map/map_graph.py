@@ -10,7 +10,7 @@ import numpy as np
 from twin.bridge import live
 from twin.geometry import Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.mapping.map_server import MapServerNode
 
 CELLS = [[0, 0, 0, 100], [-1, 0, 0, 0], [0, 100, 0, 0]]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from twin.bridge import live
-from twin.bridge.node_options import BARE
+from twin.bridge.node.options import BARE
 
 Twin = Callable[..., "subprocess.CompletedProcess[str]"]
 

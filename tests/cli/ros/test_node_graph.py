@@ -12,9 +12,9 @@ import pytest
 
 from twin.bridge.graph import Graph
 from twin.bridge.wire.keys import mangle
-from twin.cli.ros.node_drawing import svg
-from twin.cli.ros.node_graph import GraphChoice, NodeGraph, Topic, graphviz, node_graph, text
-from twin.cli.ros.node_layout import GAP_Y, LINE_GAP, Edge, Layout, Size, lay_out
+from twin.cli.ros.node.drawing import svg
+from twin.cli.ros.node.graph import GraphChoice, NodeGraph, Topic, graphviz, node_graph, text
+from twin.cli.ros.node.layout import GAP_Y, LINE_GAP, Edge, Layout, Size, lay_out
 
 TOPICS = (Path(__file__).with_name("warehouse_topics.txt")).read_text("utf-8").split("\n")
 """Of a run of scenarios/warehouse.yaml: 'MP /amcl /amcl_pose' is a publisher; NN is a node."""

@@ -8,8 +8,8 @@ import pytest
 from twin.bridge.msgs import LaserScan, Point, PointStamped, String, Twist
 from twin.bridge.types.default_values import new
 from twin.bridge.types.fields import fields_of
-from twin.cli.ros.topic_filter import compile_filter
-from twin.cli.ros.topic_values import value_text
+from twin.cli.ros.topic.filter import compile_filter
+from twin.cli.ros.topic.values import value_text
 from twin.errors import BridgeError
 
 SCAN = new(LaserScan, range_max=8.0, ranges=np.array([0.5, 2.0, 9.0], np.float32))

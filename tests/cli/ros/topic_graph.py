@@ -13,8 +13,8 @@ from twin.bridge.actions import ActionClient, ActionServer
 from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import LaserScan, PointStamped, String, Twist, stamp
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
-from twin.bridge.raw_publisher import RawPublisher
 from twin.bridge.srvs import AddTwoInts
+from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.bridge.types.default_values import new
 
 types.register("course_msgs/msg/Gps", "string name\nfloat64 x\nfloat64[2] position")

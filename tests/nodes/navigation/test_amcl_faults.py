@@ -24,8 +24,8 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty, SetInitialPose
 from twin.geometry import Pose2
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.amcl import AmclNode, AmclNodeConfig, InitialPose, StartPose
-from twin.nodes.navigation.map_server import MapServerNode
+from twin.nodes.navigation.localisation.amcl import AmclNode, AmclNodeConfig, InitialPose, StartPose
+from twin.nodes.navigation.mapping.map_server import MapServerNode
 
 TRUTH = Pose2(0.4, -0.3, 0.2)
 

@@ -27,11 +27,11 @@ from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.messages import path_msg, pose_stamped
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig, BtNavigatorNode
-from twin.nodes.navigation.controller_server import ControllerServerNode
-from twin.nodes.navigation.controller_server_config import ControllerServerConfig
-from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
-from twin.nodes.navigation.map_server import MapServerNode
-from twin.nodes.navigation.planner_server import PlannerServerNode
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.nodes.navigation.controller_server.server import ControllerServerNode
+from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.mapping.map_server import MapServerNode
+from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 
 HALF = 0.15
 FOOTPRINT = ((HALF, HALF), (-HALF, HALF), (-HALF, -HALF), (HALF, -HALF))

@@ -24,7 +24,7 @@ from twin.navigation.control.collision_monitor import (
     time_to_collision,
 )
 from twin.navigation.costmaps.footprint import rectangle
-from twin.nodes.navigation.collision_monitor import CollisionMonitorNode
+from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 
 FOOTPRINT = rectangle(0.4, 0.3)
 ZONE = ((0.6, 0.3), (-0.2, 0.3), (-0.2, -0.3), (0.6, -0.3))

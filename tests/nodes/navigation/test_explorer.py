@@ -16,9 +16,9 @@ from twin.bridge.qos import LATCHED
 from twin.geometry import Pose2
 from twin.navigation.exploration.explorer import ExplorerConfig
 from twin.navigation.exploration.frontiers import FrontierConfig
-from twin.nodes.explore_mission import ExploreMissionNode
-from twin.nodes.navigation.explorer import ExplorerNode, ExplorerNodeConfig
-from twin.nodes.navigation.map_server import grid_msg
+from twin.nodes.missions.explore import ExploreMissionNode
+from twin.nodes.navigation.exploration.explorer import ExplorerNode, ExplorerNodeConfig
+from twin.nodes.navigation.mapping.map_server import grid_msg
 
 
 class Navigator:

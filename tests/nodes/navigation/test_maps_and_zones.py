@@ -43,12 +43,12 @@ from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.maps.zones import empty_mask, rectangle, with_zone
 from twin.nodes.messages import path_msg, pose_stamped
-from twin.nodes.navigation.controller_server import ControllerServerNode
-from twin.nodes.navigation.controller_server_config import ControllerServerConfig
-from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
-from twin.nodes.navigation.costmap_filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
-from twin.nodes.navigation.map_saver import MapSaverNode
-from twin.nodes.navigation.map_server import MapServerNode, grid_msg, occupancy_map
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.nodes.navigation.controller_server.server import ControllerServerNode
+from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
+from twin.nodes.navigation.mapping.map_saver import MapSaverNode
+from twin.nodes.navigation.mapping.map_server import MapServerNode, grid_msg, occupancy_map
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LAYERS = CostmapConfig(

@@ -17,10 +17,10 @@ from twin.geometry import Pose2
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.planner import ThetaStarConfig, path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
-from twin.nodes.navigation.costmap import CostmapNode, CostmapNodeConfig
-from twin.nodes.navigation.map_server import MapServerNode
-from twin.nodes.navigation.planner_server import PlannerServerConfig, PlannerServerNode
-from twin.nodes.navigation.smoother_server import SmootherServerNode
+from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.mapping.map_server import MapServerNode
+from twin.nodes.navigation.planning.planner_server import PlannerServerConfig, PlannerServerNode
+from twin.nodes.navigation.planning.smoother_server import SmootherServerNode
 
 pytestmark = pytest.mark.xdist_group("planning")
 

@@ -35,7 +35,7 @@ from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import SlamConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.nodes.navigation.slam_toolbox import SlamNodeConfig, SlamToolboxNode
+from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig, SlamToolboxNode
 
 pytestmark = pytest.mark.xdist_group("slam")
 

@@ -18,8 +18,8 @@ from twin.bridge.topics import Sample
 from twin.geometry import Array, Pose2, Pose3, wrap_angle
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 from twin.runtime.build import build
-from twin.runtime.robot_stack import RobotStack
 from twin.runtime.run import Run
+from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.schema import Scenario
 from twin.warehouse.map_files import named_map
 

@@ -11,7 +11,7 @@ import numpy as np
 from twin.benchmarks.barn.clearance import clearance
 from twin.benchmarks.barn.worlds import BarnSet, BarnWorld
 from twin.geometry import Array, Pose2
-from twin.runtime import derive
+from twin.runtime.defaults import from_description as derive
 from twin.runtime.run import Run
 
 MOVED_M = 0.1

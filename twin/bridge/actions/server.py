@@ -6,10 +6,10 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
-from twin.bridge import tasks
 from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
 from twin.bridge.actions.states import GoalEvent, is_cancelable, transition
 from twin.bridge.msgs import GoalStatus, GoalStatusArray, ns, stamp
+from twin.bridge.node import tasks
 from twin.bridge.qos import LATCHED
 from twin.bridge.services import Respond
 from twin.bridge.srvs import CancelGoal

@@ -17,7 +17,7 @@ from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.graph import Graph
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import Clock, stamp
-from twin.bridge.raw_publisher import RawPublisher
+from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.bridge.types import ServiceType
 from twin.errors import RecordingError
 

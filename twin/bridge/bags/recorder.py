@@ -18,7 +18,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph, is_hidden
 from twin.bridge.node import Node
 from twin.bridge.qos import QoS
-from twin.bridge.raw import RawSample, RawSubscription
+from twin.bridge.topics.raw import RawSample, RawSubscription
 
 _HISTORY = QoS(depth=1000, durability="transient_local")
 """Latched samples that were published before come too; other publishers do not mind."""

@@ -16,8 +16,8 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.node import Node
-from twin.bridge.raw_publisher import RawPublisher
 from twin.bridge.topics import Publisher, Sample
+from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.errors import BridgeError, RecordingError
 
 _CLOCK = "/clock"

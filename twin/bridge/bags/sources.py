@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from twin.bridge.bags import metadata, offered_qos
-from twin.bridge.bags.mcap_reader import McapReader
+from twin.bridge.bags.mcap.reader import McapReader
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.errors import BridgeError, RecordingError

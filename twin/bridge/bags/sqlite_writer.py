@@ -10,7 +10,7 @@ from pathlib import Path
 
 from twin.bridge.bags import compression, metadata
 from twin.bridge.bags.compression import Compression
-from twin.bridge.bags.mcap_records import Attachment
+from twin.bridge.bags.mcap.records import Attachment
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import to_yaml
 from twin.errors import RecordingError

@@ -11,8 +11,8 @@ from typing import Literal, Protocol, Self, cast, get_args
 from twin.bridge.bags import metadata
 from twin.bridge.bags.compression import Compression
 from twin.bridge.bags.definitions import complete
-from twin.bridge.bags.mcap_records import Attachment, Message
-from twin.bridge.bags.mcap_writer import McapConfig, McapWriter
+from twin.bridge.bags.mcap.records import Attachment, Message
+from twin.bridge.bags.mcap.writer import McapConfig, McapWriter
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import to_yaml
 from twin.errors import RecordingError, nearest

@@ -17,7 +17,7 @@ from twin.bridge.clock import Clock
 from twin.bridge.lockstep.protocol import STEP, node_token, requests, responses, run_token, step_key
 from twin.bridge.lockstep.recorder import Recorder
 from twin.bridge.msgs import ns
-from twin.bridge.node_services import StandardServices
+from twin.bridge.node.services import StandardServices
 from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.keys import pack_attachment, parse_attachment
 from twin.bridge.wire.session import direct, open_session

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from twin.bridge.graph import EndpointInfo, Graph
 from twin.bridge.qos import QoS
-from twin.bridge.raw import RawSample, RawSubscription
-from twin.bridge.raw_publisher import Presence, RawPublisher
 from twin.bridge.tools.unknown_types import hash_of, same_hash
+from twin.bridge.topics.raw import RawSample, RawSubscription
+from twin.bridge.topics.raw_publisher import Presence, RawPublisher
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:

@@ -64,8 +64,8 @@ def barn(
     from twin.benchmarks.barn.scenarios import BarnOptions
     from twin.benchmarks.barn.trials import run_worlds
     from twin.cli.console import stdout
-    from twin.cli.folders import results_folder
-    from twin.cli.options import parse_overrides
+    from twin.cli.run.folders import results_folder
+    from twin.cli.run.options import parse_overrides
     from twin.files.writing import write_whole
 
     options = BarnOptions(

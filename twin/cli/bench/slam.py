@@ -43,7 +43,7 @@ def slam(
     from twin.benchmarks.slam.relations import load_relations, relations_of
     from twin.benchmarks.slam.trial import run_log
     from twin.cli.console import stdout
-    from twin.cli.folders import results_folder
+    from twin.cli.run.folders import results_folder
 
     paths = list(
         dict.fromkeys(path.with_suffix(".npz") if path.suffix == ".relations" else path for path in files)

@@ -41,9 +41,9 @@ def save(
     joining: Joining,
 ) -> None:
     """Save the map of a live graph as YAML and image; as `ros2 run nav2_map_server map_saver_cli`."""
-    from twin.cli.folders import map_name
+    from twin.cli.run.folders import map_name
     from twin.navigation.maps.map_saver import SaveParameters, save_map
-    from twin.nodes.navigation.map_server import occupancy_map
+    from twin.nodes.navigation.mapping.map_server import occupancy_map
 
     parameters = SaveParameters(
         mode=mode,  # type: ignore[arg-type]

@@ -11,6 +11,6 @@ if TYPE_CHECKING:
 
 def tool_node(bus: Bus, name: str, *, shown_as: str | None = None) -> Node:
     """Return a node without parameters and log: `_ros2cli_<name>`, which lists leave out, or as asked for."""
-    from twin.bridge.node_options import BARE
+    from twin.bridge.node.options import BARE
 
     return bus.create_node(shown_as or f"_ros2cli_{name}", options=BARE)

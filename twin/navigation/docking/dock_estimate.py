@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.docking.controller import fit_wall
+from twin.navigation.docking.faces import fit_wall
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.navigation import recovery
 from twin.navigation.warm_up import warm_up_behaviors
-from twin.nodes.navigation.costmap import CostmapNode
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
 Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.AssistedTeleop

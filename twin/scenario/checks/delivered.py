@@ -6,10 +6,9 @@ import math
 from typing import Annotated
 
 from twin.geometry import Pose3, matrix_from_quat_wxyz
+from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
-from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.observation import CheckContext, Observation, Zone
-from twin.strict_yaml import Metres, MetresPerSecond, Radians
 
 
 class DeliveredConfig(CheckConfig):

@@ -8,10 +8,9 @@ from typing import Annotated
 from pydantic import model_validator
 
 from twin.geometry import Pose2
+from twin.parameters import Metres, NotNegative, Positive, Seconds
 from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
-from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.observation import CheckContext, Observation
-from twin.strict_yaml import Metres, Seconds
 
 
 class LocalisationErrorConfig(RobotCheckConfig):

@@ -13,11 +13,10 @@ from scipy.spatial import cKDTree
 
 from twin.geometry import Array
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.parameters import Fraction, Metres, Positive
 from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
 from twin.scenario.checks.map_truth import FREE_TO, MapTruth, wall_cells
-from twin.scenario.fields import Fraction, Positive
 from twin.scenario.observation import CheckContext, Observation
-from twin.strict_yaml import Metres
 
 
 class MapAccuracyConfig(RobotCheckConfig):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from fnmatch import fnmatchcase
 from typing import Annotated
 
+from twin.parameters import Positive, Seconds
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
-from twin.scenario.fields import Positive
 from twin.scenario.observation import CheckContext, Observation
-from twin.strict_yaml import Seconds
 
 
 class _MissionCheck(Check):

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated
 
+from twin.parameters import Newtons, NotNegative
 from twin.scenario.checks.check import NOTHING, Check, CheckConfig, CheckResult
-from twin.scenario.fields import NotNegative
 from twin.scenario.observation import CheckContext, ContactObservation, Observation
-from twin.strict_yaml import Newtons, StrictModel
+from twin.strict_yaml import StrictModel
 
 
 class AllowedContact(StrictModel):

@@ -6,10 +6,9 @@ import math
 from typing import Annotated
 
 from twin.geometry import Pose2, wrap_angle
+from twin.parameters import Metres, Positive, Radians
 from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
-from twin.scenario.fields import Positive
 from twin.scenario.observation import CheckContext, Observation
-from twin.strict_yaml import Metres, Radians
 
 
 class FinalPoseConfig(RobotCheckConfig):

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import model_validator
 
+from twin.parameters import NotNegative
 from twin.scenario.checks.check import NOTHING, Check, CheckResult, RobotCheckConfig
-from twin.scenario.fields import NotNegative
 from twin.scenario.observation import CheckContext, Observation
 
 

@@ -8,10 +8,9 @@ from typing import Annotated
 from pydantic import model_validator
 
 from twin.geometry import Array
+from twin.parameters import Joules, Metres, NotNegative, Positive
 from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
-from twin.scenario.fields import NotNegative, Positive
 from twin.scenario.observation import CheckContext, Observation
-from twin.strict_yaml import Joules, Metres
 
 
 class DrivenDistanceConfig(RobotCheckConfig):

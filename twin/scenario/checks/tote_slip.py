@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from twin.geometry import Array
+from twin.parameters import Metres, Positive
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
-from twin.scenario.fields import Positive
 from twin.scenario.observation import CheckContext, Held, Observation
-from twin.strict_yaml import Metres
 
 _LONGEST_GAP_NS = 500_000_000
 """A tote that nobody holds for longer was put down [ns]."""

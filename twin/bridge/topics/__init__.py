@@ -1,0 +1,284 @@
+"""Publishers and subscriptions."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import zenoh
+import zenoh.ext
+
+from twin.bridge import types
+from twin.bridge.cdr.codec import codec
+from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.wire.admission import Entrance, read
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
+from twin.bridge.wire.naming import Interface
+from twin.bridge.wire.session import direct
+from twin.errors import BridgeError
+
+if TYPE_CHECKING:
+    from twin.bridge.node import Node
+
+M = TypeVar("M")
+
+_HEARTBEAT_S = 0.5  # rmw_zenoh's period
+_KEEP_ALL = 100_000
+"""What keep_all keeps at most: no unbounded memory."""
+
+
+class Sample(Generic[M]):
+    """A message as published; `payload` is valid during the tap's call and encoded when first read."""
+
+    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
+
+    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        """The publisher's count, from 1."""
+        self.topic: str = publisher.name
+        """Absolute name."""
+        self.msgtype = publisher.codec.msgtype
+        self.time_ns = time_ns
+        """Simulated time of publishing [ns]."""
+        self.message = message
+        """The publisher's own object: not to be changed or kept."""
+        self._codec = publisher.codec
+        self._payload: bytes | None = None
+
+    @property
+    def payload(self) -> bytes:
+        """The message as CDR."""
+        if self._payload is None:
+            self._payload = self._codec.encode(self.message)
+        return self._payload
+
+
+class Endpoint:
+    """What publishers, subscriptions, services and clients have in common: a key, a token, a gid."""
+
+    def __init__(self, node: Node, kind: EndpointKind, name: str, typename: str, qos: QoS) -> None:
+        bus = node.bus
+        self.interface = Interface(name, types.dds_name(typename), types.rihs01(typename))
+        type_hash = bus.naming.type_hash(self.interface.type_hash)
+        token = node.token.endpoint(bus.next_id(), kind, name, self.interface.dds_name, type_hash, qos)
+        self.name: str = name
+        """Absolute name of the topic or service."""
+        self.node = node
+        self.qos = qos
+        self.key = bus.naming.key(self.interface)
+        self.gid = gid(token)
+        self._token = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
+        self._declared: list[Any] = []
+
+    def announce(self) -> None:
+        """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
+        if self._token is not None:
+            self._declared.append(self.node.bus.zenoh.liveliness().declare_token(self._token))
+
+    def destroy(self) -> None:
+        """Leave the graph; nothing arrives any more. Harmless when repeated."""
+        for entity in reversed(self._declared):
+            entity.undeclare()
+        self._declared.clear()
+
+
+class Publisher(Endpoint, Generic[M]):
+    """Publishes messages of one type on a topic."""
+
+    def __init__(self, node: Node, cls: type[M], name: str, qos: QoS) -> None:
+        self.codec = codec(cls)
+        super().__init__(node, "MP", name, self.codec.msgtype, qos)
+        self._bus = node.bus
+        self._sequence = 0
+        self._latched = qos.durability == "transient_local"
+        self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
+        self._line = None if self._latched or node.bus.networked else node.bus.exchange.line(self.key)
+        self._declared.append(self._zenoh)
+        self.announce()
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether somebody listens now, here or elsewhere; always true if latched: Zenoh does not tell."""
+        if self._line is not None and self._line.is_direct:
+            return bool(self._line.receivers)
+        return self._latched or self._zenoh.matching_status.matching
+
+    def publish(self, message: M) -> None:
+        """Publish at the clock's time.
+
+        Raises:
+            TypeError: a message of another type.
+            BridgeError: the publisher is destroyed.
+        """
+        if type(message) is not self.codec.cls:
+            raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
+        if not self._declared:
+            raise BridgeError(f"the publisher of {self.name} is destroyed")
+        self._sequence += 1
+        time_ns = self._bus.clock.now_ns
+        sample = None
+        if self._bus.taps:
+            sample = Sample(self, self._sequence, time_ns, message)
+            for tap in self._bus.taps:
+                tap(sample)
+        line = self._line
+        if line is not None and line.is_direct and self._bus.in_own_thread():
+            if line.receivers:
+                payload = self.codec.encode(message) if sample is None else sample.payload
+                data = payload, Attachment(self._sequence, time_ns, self.gid)
+                for receiver in line.receivers:
+                    receiver.enqueue(data, False)
+            return
+        # Asking who listens costs more than a put that nobody hears, once the payload is there.
+        if sample is not None or self.has_subscribers:
+            payload = self.codec.encode(message) if sample is None else sample.payload
+            self._zenoh.put(payload, attachment=pack_attachment(self._sequence, time_ns, self.gid))
+
+
+class Subscription(Endpoint, Generic[M]):
+    """Calls back, in its node's spin, for every message on a topic; keeps the last `depth` between spins."""
+
+    def __init__(
+        self,
+        node: Node,
+        cls: type[M],
+        name: str,
+        callback: Callable[[M], Any],
+        qos: QoS,
+        *,
+        wanted: Callable[[bytes], bool] | None = None,
+    ) -> None:
+        """Hear a topic; a payload for which `wanted` returns False is not decoded."""
+        self.codec = codec(cls)
+        super().__init__(node, "MS", name, self.codec.msgtype, qos)
+        self.dropped = 0
+        """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
+        self._origin: zenoh.Sample | Attachment | None = None
+        self._callback = callback
+        self._wanted = wanted
+        self._pending: deque[list[Any]] = deque()
+        self._inbox = node.inbox
+        self._most = qos.depth if qos.history == "keep_last" else _KEEP_ALL
+        self._lifespan_ns = None if qos.lifespan_ns == INFINITE_NS else qos.lifespan_ns
+        self._received_ns: deque[int] = deque()
+        """When what is pending came, if that matters."""
+        bus = node.bus
+        self._networked = bus.networked
+        # ros2dds's keys tell no type: what comes even from here may be another one's.
+        self._untyped = bus.networked and bus.naming.wire == "ros2dds"
+        self._entrance = Entrance(bus.external, self.interface)
+        for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
+            self._declared.append(declare_subscriber(bus.zenoh, key, self._on_sample, qos))
+        self._line = bus.exchange.line(self.key)
+        self._latched = qos.durability == "transient_local"
+        if self._latched:
+            self._line.through_zenoh += 1
+        else:
+            self._line.receivers.append(self)
+        self.announce()
+
+    @property
+    def source(self) -> Attachment | None:
+        """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if not isinstance(self._origin, zenoh.Sample):
+            return self._origin
+        attachment = self._origin.attachment  # read only if asked for: few want to know
+        return parse_attachment(attachment.to_bytes() if attachment else None)
+
+    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
+        """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
+        if len(self._pending) >= self._most:
+            self._pending.popleft()[0] = None
+            self.dropped += 1
+            if self._lifespan_ns is not None:
+                self._received_ns.popleft()
+        entry: list[Any] = [self, data, external]
+        self._pending.append(entry)
+        self._inbox.append(entry)
+        if self._lifespan_ns is not None:
+            self._received_ns.append(self.node.now_ns)
+
+    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
+        """Decode and call back."""
+        self._pending.popleft()
+        if self._lifespan_ns is not None:
+            age_ns = self.node.now_ns - self._received_ns.popleft()
+            if age_ns > self._lifespan_ns:
+                self.dropped += 1
+                return
+        payload, origin = data
+        if self._wanted is not None and not self._wanted(payload):
+            return
+        message = read(self.node.bus.external, self.name, self.codec, payload)
+        if message is None:
+            return
+        self._origin = origin
+        self._callback(message)
+        self._origin = None
+
+    def destroy(self) -> None:
+        """Leave the graph; waiting messages are not delivered."""
+        if self._declared:
+            if self._latched:
+                self._line.through_zenoh -= 1
+            else:
+                self._line.receivers.remove(self)
+        super().destroy()
+        for entry in self._pending:
+            entry[0] = None
+        self._pending.clear()
+        self._received_ns.clear()
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        bus = self.node.bus
+        if bus.in_own_thread():
+            # The wide expressions of a networked bus match this process's topics of other types too.
+            if not self._networked or str(sample.key_expr) == self.key:
+                self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
+            return
+        attachment = sample.attachment.to_bytes() if sample.attachment else None
+        source = self._entrance.source(str(sample.key_expr), attachment)
+        if source is not None:
+            payload = sample.payload.to_bytes()
+            bus.external.push(Arrival(source, self, (payload, source), len(payload)))
+
+
+def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+    """Return a publisher with rmw_zenoh's settings (rmw_publisher_data.cpp)."""
+    reliable = qos.reliability == "reliable"
+    waits = reliable and qos.history == "keep_all"
+    settings: dict[str, Any] = {
+        "congestion_control": zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP,
+        "reliability": zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT,
+    }
+    if qos.durability == "volatile":
+        return session.declare_publisher(key, **settings)
+    miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
+    return zenoh.ext.declare_advanced_publisher(
+        session,
+        key,
+        **settings,
+        cache=zenoh.ext.CacheConfig(qos.depth),
+        sample_miss_detection=miss if reliable else None,
+        publisher_detection=True,
+    )
+
+
+def declare_subscriber(
+    session: zenoh.Session, key: str | zenoh.KeyExpr, callback: Callable[[zenoh.Sample], None], qos: QoS
+) -> Any:
+    """Return a subscriber with rmw_zenoh's settings (rmw_subscription_data.cpp)."""
+    if qos.durability == "volatile":
+        return session.declare_subscriber(key, direct(callback))
+    reliable = qos.reliability == "reliable"
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        direct(callback),
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True) if reliable else None,
+        subscriber_detection=True,
+    )

@@ -1,0 +1,94 @@
+"""`twin action`: what is offered, and sending goals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from twin.cli.ros.action.goal import send_goal
+from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.joining import Joining, joins
+
+if TYPE_CHECKING:
+    from twin.bridge.graph import EndpointInfo
+
+app = typer.Typer(no_args_is_help=True, help="Actions: list, look, send goals; as `ros2 action`.")
+
+_Name = Annotated[str, typer.Argument(metavar="ACTION", help="Such as /fibonacci.")]
+_Types = Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")]
+_Count = Annotated[bool, typer.Option("--count-actions", "-c", help="Only show how many.")]
+
+app.command(
+    "send_goal",
+    no_args_is_help=True,
+    epilog='Example: [bold]twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"[/bold]',
+)(joins(send_goal))
+
+
+@app.command("list", epilog="Example: [bold]twin action list -t[/bold]")
+@joins
+def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
+    """List the actions that somebody offers or uses."""
+    actions = joining.graph().actions()
+    if count:
+        typer.echo(len(actions))
+        return
+    for name, types in actions.items():
+        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+
+
+@app.command("type", no_args_is_help=True, epilog="Example: [bold]twin action type /fibonacci[/bold]")
+@joins
+def show_type(action: _Name, *, joining: Joining) -> None:
+    """Print the type of an action."""
+    actions, name = joining.graph().actions(), absolute(action)
+    if name not in actions:
+        raise unknown("action", name, actions)
+    for typename in actions[name]:
+        typer.echo(typename)
+
+
+@app.command(
+    "find",
+    no_args_is_help=True,
+    epilog="Example: [bold]twin action find example_interfaces/action/Fibonacci[/bold]",
+)
+@joins
+def find(
+    action_type: Annotated[str, typer.Argument(metavar="TYPE")], count: _Count = False, *, joining: Joining
+) -> None:
+    """List the actions of a type."""
+    names = [name for name, types in joining.graph().actions().items() if action_type in types]
+    if count:
+        typer.echo(len(names))
+        return
+    for name in names:
+        typer.echo(name)
+
+
+@app.command("info", no_args_is_help=True, epilog="Example: [bold]twin action info -t /fibonacci[/bold]")
+@joins
+def info(
+    action: _Name,
+    show_types: _Types = False,
+    count: Annotated[bool, typer.Option("--count", "-c", help="Only show how many.")] = False,
+    *,
+    joining: Joining,
+) -> None:
+    """Print who uses and who offers an action."""
+    graph, name = joining.graph(), absolute(action)
+    goals = f"{name}/_action/send_goal"
+    clients, servers = graph.clients(goals), graph.servers(goals)
+    if not clients and not servers:
+        raise unknown("action", name, graph.actions())
+    typer.echo(f"Action: {name}")
+    for title, endpoints in (("clients", clients), ("servers", servers)):
+        typer.echo(f"Action {title}: {len(endpoints)}")
+        for endpoint in () if count else endpoints:
+            typer.echo(f"    {_line(endpoint, show_types)}")
+
+
+def _line(endpoint: EndpointInfo, show_types: bool) -> str:
+    typename = endpoint.type.removesuffix("_SendGoal")
+    return f"{endpoint.node.full_name} [{typename}]" if show_types else endpoint.node.full_name

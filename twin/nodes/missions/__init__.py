@@ -1,0 +1,1 @@
+"""What robots are told to do, as nodes."""

@@ -1,0 +1,144 @@
+"""Simple missions: a list of actions one after the other, a profile of velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from twin.bridge.actions import ActionClient
+from twin.bridge.bus import Bus
+from twin.bridge.conversions import twist_from_planar
+from twin.bridge.msgs import String, Twist
+from twin.bridge.qos import LATCHED
+from twin.bridge.types import ActionType
+from twin.navigation.behavior_trees.node import Status, TreeNode
+from twin.nodes.missions.leaves import CallAction, Do, WaitUntil, sequence
+from twin.periods import next_due
+
+
+class MissionNode:
+    """`/mission`: publishes `mission/state`, and knows whether the mission is over and how it ended."""
+
+    def __init__(self, bus: Bus, *, namespace: str = "") -> None:
+        self.node = bus.create_node("mission", namespace)
+        self._publisher = self.node.create_publisher(String, "mission/state", LATCHED)
+        self.state = "start"
+        self.done = False
+        self.succeeded: bool | None = None
+        self.reason = ""
+
+    def run(self, tree: TreeNode, period_ns: int) -> None:
+        """Tick a tree until it ends, and the mission with it."""
+
+        def tick() -> None:
+            status = Status.IDLE if self.done else tree.execute_tick()
+            if status.is_completed:
+                self.finish(status is Status.SUCCESS)
+
+        self.node.create_timer(period_ns, tick)
+
+    def enter(self, state: str) -> None:
+        """Go on to `state` and tell it."""
+        self.state = state
+        self._publisher.publish(String(data=state))
+        self.node.get_logger().info(state)
+
+    def note(self, reason: str) -> None:
+        """Keep a reason for a failure; the last one is that of the mission."""
+        self.reason = f"{self.state}: {reason}"
+        self.node.get_logger().warn(self.reason)
+
+    def finish(self, succeeded: bool) -> None:
+        """End the mission."""
+        self.done, self.succeeded = True, succeeded
+        if succeeded:
+            self.reason = ""
+        self.enter("done" if succeeded else "failed")
+
+
+@dataclass(frozen=True)
+class ActionStep:
+    """One action to call."""
+
+    label: str
+    """Shown as the mission's state."""
+    action_type: ActionType
+    name: str
+    """Of the action."""
+    goal: Callable[[], Any]
+    """Makes the goal message when its turn comes."""
+    ready: Callable[[], bool] | None = None
+    """What the step waits for."""
+
+
+class ActionSequenceNode(MissionNode):
+    """Calls actions one after the other; the first that fails ends the mission."""
+
+    def __init__(
+        self, bus: Bus, steps: Sequence[ActionStep], *, period_ns: int = 100_000_000, namespace: str = ""
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        clients: dict[str, ActionClient] = {}
+        leaves: list[TreeNode] = []
+        for step in steps:
+            if step.name not in clients:
+                clients[step.name] = ActionClient(self.node, step.action_type, step.name)
+            leaves.append(Do(f"State[{step.label}]", partial(self.enter, step.label)))
+            if step.ready is not None:
+                leaves.append(WaitUntil(f"Ready[{step.label}]", step.ready))
+            leaves += [
+                CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
+            ]
+        self.run(sequence("Behaviors", leaves), period_ns)
+
+
+class VelocityProfileNode(MissionNode):
+    """Sends velocities open loop on `cmd_vel`: steps of duration [s], linear [m/s], angular [rad/s].
+
+    A step ends in the first control period at or after its end; ends are counted from the start.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        steps: Sequence[tuple[float, float, float]],
+        *,
+        control_period_ns: int = 20_000_000,
+        period_ns: int = 100_000_000,
+        settle_ns: int = 1_000_000_000,
+        namespace: str = "",
+    ) -> None:
+        super().__init__(bus, namespace=namespace)
+        self._ends: list[tuple[int, float, float]] = []
+        end = 0
+        for duration, linear, angular in steps:
+            end += round(duration * 1e9)
+            self._ends.append((end, linear, angular))
+        self._settle_ns = settle_ns
+        self._period_ns = period_ns
+        self._start = self._due_ns = next_due(period_ns, self.node.now_ns)
+        self._step = -1
+        self._commands = self.node.create_publisher(Twist, "cmd_vel", 10)
+        self.node.create_timer(control_period_ns, self._update)
+
+    def _update(self) -> None:
+        now = self.node.now_ns
+        elapsed = now - self._start
+        if self.done or elapsed < 0:
+            return
+        step = next((i for i, (end, _, _) in enumerate(self._ends) if elapsed < end), len(self._ends))
+        begins = step != self._step
+        if not begins and now < self._due_ns:
+            return
+        self._due_ns, self._step = next_due(self._period_ns, now), step
+        if step == len(self._ends):
+            self._commands.publish(twist_from_planar(0.0, 0.0))
+            if elapsed >= self._ends[-1][0] + self._settle_ns:
+                self.finish(succeeded=True)
+            return
+        _, linear, angular = self._ends[step]
+        if begins:
+            self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
+        self._commands.publish(twist_from_planar(linear, angular))

@@ -1,0 +1,1 @@
+"""`/controller_server`, as in Nav2."""

@@ -1,0 +1,1 @@
+"""A costmap as a node: its sources, its services, its messages."""

@@ -1,0 +1,67 @@
+"""A costmap as the messages of Nav2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.bridge.conversions import pose_from_pose2
+from twin.bridge.msgs import Costmap as CostmapMessage
+from twin.bridge.msgs import (
+    CostmapMetaData,
+    OccupancyGrid,
+    Point32,
+    Polygon,
+    PolygonStamped,
+    header,
+    stamp,
+)
+from twin.geometry import Array, Pose2
+from twin.navigation.costmaps.costmap import (
+    INSCRIBED_INFLATED_OBSTACLE,
+    LETHAL_OBSTACLE,
+    NO_INFORMATION,
+    Costmap,
+)
+from twin.nodes.navigation.mapping.map_server import grid_msg
+
+
+def _occupancy_of_costs() -> NDArray[np.int8]:
+    """Return nav2_costmap_2d's table from costs to the values of an OccupancyGrid."""
+    table = 1 + (97 * (np.arange(256) - 1)) // 251
+    table[0] = 0
+    table[INSCRIBED_INFLATED_OBSTACLE] = 99
+    table[LETHAL_OBSTACLE] = 100
+    table[NO_INFORMATION] = -1
+    return table.astype(np.int8)
+
+
+_OCCUPANCY = _occupancy_of_costs()
+
+
+def occupancy_grid(grid: Costmap, frame: str, time_ns: int) -> OccupancyGrid:
+    """Return a costmap as `costmap` shows it: 0 free ... 98, 99 inscribed, 100 lethal, -1 unknown."""
+    return grid_msg(_OCCUPANCY[grid.costs], grid.resolution, Pose2(*grid.origin, 0.0), frame, time_ns)
+
+
+def costmap_msg(grid: Costmap, frame: str, time_ns: int) -> Any:
+    """Return a costmap as `costmap_raw` shows it, with its own costs."""
+    height, width = grid.costs.shape
+    metadata = CostmapMetaData(
+        map_load_time=stamp(0),
+        update_time=stamp(time_ns),
+        layer="master",
+        resolution=float(grid.resolution),
+        size_x=width,
+        size_y=height,
+        origin=pose_from_pose2(Pose2(*grid.origin, 0.0)),
+    )
+    return CostmapMessage(header=header(time_ns, frame), metadata=metadata, data=grid.costs.flatten())
+
+
+def polygon_msg(corners: Array, frame: str, time_ns: int) -> PolygonStamped:
+    """Return corners, shape (n, 2) [m], as a polygon in a frame."""
+    points = [Point32(x=float(x), y=float(y), z=0.0) for x, y in corners]
+    return PolygonStamped(header=header(time_ns, frame), polygon=Polygon(points=points))

@@ -1,0 +1,1 @@
+"""`/docking_server`, as in Nav2's opennav_docking."""

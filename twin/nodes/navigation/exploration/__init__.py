@@ -1,0 +1,1 @@
+"""`/explore`, as explore_lite."""

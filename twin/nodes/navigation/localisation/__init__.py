@@ -1,0 +1,1 @@
+"""The nodes that tell a robot where it is."""

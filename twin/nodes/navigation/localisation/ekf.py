@@ -1,0 +1,238 @@
+"""`/ekf_filter_node`: wheels and IMU fused into `odometry/filtered`, with robot_localization's interface."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from twin.bridge.bus import Bus
+from twin.bridge.conversions import pose3_from_pose
+from twin.bridge.msgs import (
+    Imu,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+    header,
+    new,
+    ns,
+)
+from twin.bridge.qos import SENSOR_DATA, QoS
+from twin.bridge.srvs import SetEkfPose
+from twin.bridge.tf import TransformBroadcaster, TransformBuffer, TransformListener, transform_stamped
+from twin.geometry import Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
+from twin.navigation.localisation import ekf as states
+from twin.navigation.localisation.ekf import SIZE, Ekf, EkfConfig
+from twin.navigation.localisation.gyro_bias import GyroBias
+from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource, SourceReader
+from twin.nodes.node_parameters import declare_config
+
+
+def _which(*chosen: int) -> tuple[bool, ...]:
+    return tuple(state in chosen for state in range(SIZE))
+
+
+_WHEELS_AND_IMU = {
+    "odom0": EkfSource(topic="odom", config=_which(states.VX, states.VY, states.VYAW)),
+    "imu0": EkfSource(topic="imu", config=_which(states.VYAW)),
+}
+# Accelerations and turns of a driven robot: what it does within a tenth of a second is not foreseen.
+_ON_A_FLOOR = EkfConfig(
+    two_d_mode=True,
+    process_noise_covariance=(
+        *(1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-7),
+        *(1.0, 1e-3, 1e-3, 1e-3, 1e-3, 5.0),
+        *(1.0, 1.0, 1.0),
+    ),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EkfNodeConfig:
+    """Parameters; names are robot_localization's. Defaults fit a wheeled robot with an IMU."""
+
+    ekf: EkfConfig = _ON_A_FLOOR
+    period_ns: int = 20_000_000
+    """Between outputs; as `frequency` [Hz]."""
+    publish_tf: bool = True
+    transform_time_offset_ns: int = 0
+    """The transform is stamped this far ahead [ns]."""
+    map_frame: str = "map"
+    odom_frame: str = "odom"
+    base_link_frame: str = "base_footprint"
+    world_frame: str = "odom"
+    """Parent of the transform that is published."""
+    sources: Mapping[str, EkfSource] = field(default_factory=lambda: _WHEELS_AND_IMU)
+    """By robot_localization's names: `odomN`, `poseN`, `twistN`, `imuN`."""
+
+    def __post_init__(self) -> None:
+        for name in self.sources:
+            if not re.fullmatch(rf"({'|'.join(KINDS)})\d+", name):
+                raise ValueError(
+                    f"ekf_filter_node: no source is called '{name}'; valid are odom0, pose0, twist0, imu0..."
+                )
+
+
+class EkfNode:
+    """Takes `odom`, `imu` and `set_pose`; publishes `odometry/filtered` and odom → base.
+
+    Measurements are taken in at their stamps, oldest first, then the state is predicted to the present.
+    """
+
+    def __init__(self, bus: Bus, config: EkfNodeConfig | None = None, *, namespace: str = "") -> None:
+        self.node = node = bus.create_node("ekf_filter_node", namespace)
+        self.config = config = config or EkfNodeConfig()
+        self.filter = Ekf(config.ekf)
+        self._time_ns: int | None = None
+        self._waiting: list[tuple[int, int, SourceReader, Any]] = []
+        declare_config(node, _parameters(config), names={"ekf": ""})
+        self._buffer = TransformBuffer()
+        self._listener = TransformListener(self._buffer, node)
+        self._tf = TransformBroadcaster(node)
+        self._publisher = node.create_publisher(Odometry, "odometry/filtered", 10)
+        node.create_subscription(PoseWithCovarianceStamped, "set_pose", self._on_set_pose, 1)
+        node.create_service(SetEkfPose, "set_pose", self._on_set_pose_request)
+        self._readers: list[SourceReader] = []
+        for name, source in config.sources.items():
+            self._listen(name, source)
+        node.create_timer(config.period_ns, self._update)
+
+    @property
+    def biases(self) -> list[GyroBias]:
+        """What was learnt about the gyroscopes, by source."""
+        return [reader.bias for reader in self._readers]
+
+    def _listen(self, name: str, source: EkfSource) -> None:
+        kind = KINDS[name.rstrip("0123456789")]
+        reader = SourceReader(
+            source,
+            self._buffer,
+            GyroBias(source.bias_stddev),
+            world_frame=self.config.world_frame,
+            base=self.config.base_link_frame,
+        )
+        self._readers.append(reader)
+
+        def on_message(message: Any) -> None:
+            self._waiting.append((ns(message.header.stamp), len(self._waiting), reader, message))
+            if isinstance(message, Odometry):
+                self._tell_wheels(message)
+
+        qos = replace(SENSOR_DATA if kind is Imu else QoS(), depth=source.queue_size)
+        self.node.create_subscription(kind, source.topic, on_message, qos)
+
+    def _tell_wheels(self, message: Odometry) -> None:
+        """Tell all gyroscopes what wheels do: while they stand, what is measured is bias."""
+        twist = message.twist.twist
+        for reader in self._readers:
+            reader.bias.wheels(twist.linear.x, twist.angular.z, ns(message.header.stamp) * 1e-9)
+
+    def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
+        pose, covariance = pose3_from_pose(message.pose.pose), message.pose.covariance.reshape(6, 6)
+        vector = np.concatenate([pose.xyz, rpy_from_quat_wxyz(pose.quat_wxyz)])
+        log, frame = self.node.get_logger(), message.header.frame_id
+        if not (np.all(np.isfinite(vector)) and np.all(np.isfinite(covariance))):
+            log.error("set_pose refused: it must be finite")
+            return
+        if frame not in ("", self.config.world_frame):
+            log.error(f"set_pose refused: its frame is '{frame}', not '{self.config.world_frame}'")
+            return
+        self.filter.set_pose(vector, covariance)
+        self._waiting.clear()
+        for reader in self._readers:
+            reader.reset()
+
+    def _on_set_pose_request(self, request: Any) -> object:
+        self._on_set_pose(request.pose)
+        return new(SetEkfPose.Response)
+
+    def _update(self) -> None:
+        now = self.node.now_ns
+        self._waiting.sort(key=lambda entry: entry[:2])
+        for stamp_ns, _, reader, message in self._waiting:
+            self._predict(min(stamp_ns, now))
+            for found in reader.read(message, stamp_ns, self.filter.state[states.ANGLES]):
+                self.filter.correct(found.states, found.values, found.covariance, threshold=found.threshold)
+        self._waiting.clear()
+        if self._time_ns is not None:
+            self._predict(now)
+            self._publish(now)
+
+    def _predict(self, time_ns: int) -> None:
+        if self._time_ns is not None and time_ns > self._time_ns:
+            dt = (time_ns - self._time_ns) * 1e-9
+            self.filter.predict(dt)
+            drifts = [reader.bias.drift(dt) for reader in self._readers if reader.believes_gyroscope]
+            self.filter.doubt(states.YAW, min(drifts, default=0.0))
+        self._time_ns = time_ns if self._time_ns is None else max(self._time_ns, time_ns)
+
+    def _publish(self, now_ns: int) -> None:
+        config, state, covariance = self.config, self.filter.state, self.filter.covariance
+        w, x, y, z = quat_wxyz_from_rpy(*state[states.ANGLES])
+        linear, angular = state[states.VELOCITY].tolist(), state[states.RATES].tolist()
+        self._publisher.publish(
+            Odometry(
+                header=header(now_ns, config.world_frame),
+                child_frame_id=config.base_link_frame,
+                pose=PoseWithCovariance(
+                    pose=Pose(
+                        position=Point(*state[states.POSITION].tolist()),
+                        orientation=Quaternion(x=x, y=y, z=z, w=w),
+                    ),
+                    covariance=covariance[:6, :6].ravel(),
+                ),
+                twist=TwistWithCovariance(
+                    twist=Twist(linear=Vector3(*linear), angular=Vector3(*angular)),
+                    covariance=covariance[6:12, 6:12].ravel(),
+                ),
+            )
+        )
+        if config.publish_tf:
+            pose = Pose3(state[states.POSITION].copy(), np.array([w, x, y, z]))
+            stamp_ns = now_ns + config.transform_time_offset_ns
+            self._tf.send_transform(
+                transform_stamped(config.world_frame, config.base_link_frame, stamp_ns, pose)
+            )
+
+
+def _parameters(config: EkfNodeConfig) -> dict[str, Any]:
+    """Return the config with robot_localization's flat names: `odom0` is a topic, `odom0_config`, ..."""
+    found = {f.name: getattr(config, f.name) for f in fields(config) if f.name != "sources"}
+    for name, source in config.sources.items():
+        for item in fields(source):
+            key = name if item.name == "topic" else f"{name}_{item.name}"
+            found[key] = getattr(source, item.name)
+    return found
+
+
+def for_robot(
+    odom_frame: str, base_frame: str, period_ns: int, imu: str, bias_stddev: float
+) -> EkfNodeConfig:
+    """Return the defaults for a robot's frames, its control period [ns], and its IMU.
+
+    Args:
+        odom_frame: Name.
+        base_frame: Name.
+        period_ns: [ns]
+        imu: Topic.
+        bias_stddev: Of its gyroscope [rad/s].
+    """
+    return EkfNodeConfig(
+        odom_frame=odom_frame,
+        world_frame=odom_frame,
+        base_link_frame=base_frame,
+        period_ns=period_ns,
+        sources={
+            **_WHEELS_AND_IMU,
+            "imu0": replace(_WHEELS_AND_IMU["imu0"], topic=imu, bias_stddev=bias_stddev),
+        },
+    )

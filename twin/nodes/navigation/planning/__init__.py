@@ -1,0 +1,1 @@
+"""`/planner_server` and `/smoother_server`, as in Nav2."""

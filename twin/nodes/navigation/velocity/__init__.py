@@ -1,0 +1,1 @@
+"""The nodes between a controller's command and the wheels."""

@@ -1,0 +1,1 @@
+"""What topics look like in a recording."""

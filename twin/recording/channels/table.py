@@ -1,0 +1,38 @@
+"""Which topics a recording shows, and how: by ROS type, or by name and type."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from twin.recording.channels.channel import Channel, Context
+from twin.recording.channels.series import (
+    JointChannel,
+    LogChannel,
+    StateChannel,
+    TransformChannel,
+    VelocityChannel,
+)
+from twin.recording.channels.spatial import GridChannel, PathChannel, PoseArrayChannel, ScanChannel
+
+_BY_TYPE: dict[str, type[Any]] = {
+    "sensor_msgs/msg/LaserScan": ScanChannel,
+    "nav_msgs/msg/OccupancyGrid": GridChannel,
+    "nav_msgs/msg/Path": PathChannel,
+    "geometry_msgs/msg/PoseArray": PoseArrayChannel,
+    "rcl_interfaces/msg/Log": LogChannel,
+}
+_BY_NAME: dict[tuple[str, str], type[Any]] = {
+    ("cmd_vel", "geometry_msgs/msg/Twist"): VelocityChannel,
+    ("cmd_vel", "geometry_msgs/msg/TwistStamped"): VelocityChannel,
+    ("odom", "nav_msgs/msg/Odometry"): VelocityChannel,
+    ("joint_states", "sensor_msgs/msg/JointState"): JointChannel,
+    ("tf", "tf2_msgs/msg/TFMessage"): TransformChannel,
+    ("mission/state", "std_msgs/msg/String"): StateChannel,
+}
+
+
+def open_channel(context: Context, topic: str, msgtype: str) -> Channel | None:
+    """Return how a topic is drawn, or None for a topic that a recording does not show."""
+    namespace, name = context.frames.split(topic)
+    kind = _BY_TYPE.get(msgtype) or _BY_NAME.get((name, msgtype))
+    return None if kind is None else kind(context, namespace, topic)

@@ -1,0 +1,1 @@
+"""A robot alone in a viewer: `twin view`."""

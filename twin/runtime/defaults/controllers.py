@@ -1,0 +1,173 @@
+"""The controller server's parameters: defaults for a robot's limits, under the scenario's overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.goal_checker import (
+    GoalCheckerConfig,
+    PositionGoalCheckerConfig,
+    StoppedGoalCheckerConfig,
+)
+from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.mppi.config import (
+    GoalAngleCriticConfig,
+    GoalCriticConfig,
+    MPPIConfig,
+    PathAlignCriticConfig,
+)
+from twin.navigation.control.plugins import ControllerConfig
+from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.runtime.defaults.overrides import overridden
+from twin.scenario.controllers import ControllerParameters
+
+_PERIOD_NS = 60_000_000
+_PATIENCE_NS = 4_000_000_000
+"""How long somebody in the way is waited for: until they have walked past, or are planned around."""
+_TOLERANCE = 0.05
+"""Of position [m] and heading [rad]: what docking can start from."""
+_TOLERANCE_BUFFER = 0.25
+"""A robot that is farther off while it turns at the goal was carried away, or localised anew [m]."""
+_TURN = 1.2
+"""Rate [rad/s] and acceleration [rad/s²] of turns in place."""
+
+
+def controller_server_config(
+    parameters: ControllerParameters,
+    smoother: VelocitySmootherConfig,
+    further: Mapping[str, ControllerParameters] | None = None,
+) -> ControllerServerConfig:
+    """Return the server's parameters for a robot that the velocity smoother limits.
+
+    Args:
+        parameters: Of the server, and of the controller `FollowPath`.
+        smoother: Its limits are the controllers'.
+        further: More controllers, by id; each brings a goal checker of the same id.
+    """
+    overrides = parameters.overrides()
+    frequency, tolerance = overrides.get("controller_frequency"), overrides.get("failure_tolerance")
+    period_ns = _PERIOD_NS if frequency is None else round(1e9 / frequency)
+    by_id = {"FollowPath": parameters, **(further or {})}
+    checkers = {
+        "general_goal_checker" if name == "FollowPath" else name: _goal_checker(one.overrides())
+        for name, one in by_id.items()
+    }
+    return ControllerServerConfig(
+        controllers={name: _controller(one, smoother, period_ns * 1e-9) for name, one in by_id.items()},
+        goal_checkers=checkers,
+        progress_checkers={"progress_checker": _progress_checker(overrides)},
+        controller_period_ns=period_ns,
+        maneuver=ManeuverConfig() if overrides.get("maneuvers", True) else ManeuverConfig(reach=0.0),
+        failure_tolerance_ns=_PATIENCE_NS if tolerance is None else round(tolerance * 1e9),
+    )
+
+
+def _controller(
+    parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float
+) -> ControllerConfig:
+    overrides = parameters.overrides()
+    controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig
+    if parameters.chosen == "mppi":
+        controller = overridden(_mppi(smoother, period, overrides), overrides)
+    elif parameters.chosen == "dwb":
+        controller = overridden(_dwb(smoother, overrides), overrides)
+    else:
+        tolerance = _goal_checker(overrides).xy_goal_tolerance
+        controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
+    if not parameters.shim:
+        return controller
+    shim = RotationShimConfig(
+        primary_controller=controller,
+        rotate_to_heading_angular_vel=min(_TURN, smoother.angular.max_velocity),
+        max_angular_accel=_TURN,
+        rotate_to_goal_heading=True,
+    )
+    return overridden(shim, overrides)
+
+
+def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> RegulatedPurePursuitConfig:
+    """Return a lookahead that grows with speed."""
+    return RegulatedPurePursuitConfig(
+        desired_linear_vel=smoother.linear.max_velocity,
+        use_velocity_scaled_lookahead_dist=True,
+        min_lookahead_dist=0.35,
+        max_lookahead_dist=1.0,
+        lookahead_time=1.0,
+        rotate_to_heading_angular_vel=min(_TURN, smoother.angular.max_velocity),
+        max_angular_accel=_TURN,
+        rotate_to_heading_min_angle=0.6,
+        approach_velocity_scaling_dist=0.8,
+        xy_goal_tolerance=tolerance,
+        max_linear_decel=_braking(smoother.linear),
+        cost_scaling_dist=0.7,
+    )
+
+
+def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[str, Any]) -> MPPIConfig:
+    """Return a horizon of 2.4 s, and critics that end within centimetres.
+
+    Fewer rollouts than Nav2's, of slower noise: they reach as far aside, in a third of the time.
+    """
+    linear, angular = smoother.linear, smoother.angular
+    speed = overrides.get("vx_max") or linear.max_velocity
+    model_dt = overrides.get("model_dt") or period
+    steps = overrides.get("time_steps") or max(8, round(2.4 / model_dt))
+    return MPPIConfig(
+        batch_size=600,
+        time_steps=steps,
+        model_dt=model_dt,
+        vx_max=speed,
+        vx_min=-0.15,
+        wz_max=angular.max_velocity,
+        ax_max=linear.max_acceleration,
+        ax_min=-_braking(linear),
+        az_max=angular.max_acceleration,
+        vx_std=max(0.2, 0.2 * speed),
+        noise_time_constant=0.6,
+        prune_distance=max(1.7, speed * steps * model_dt),
+        # The rotation shim turns to the goal's heading; until there the path is kept to.
+        GoalCritic=GoalCriticConfig(cost_weight=15.0),
+        GoalAngleCritic=GoalAngleCriticConfig(enabled=False),
+        PathAlignCritic=PathAlignCriticConfig(offset_from_furthest=2, threshold_to_consider=0.05),
+    )
+
+
+def _dwb(smoother: VelocitySmootherConfig, overrides: Mapping[str, Any]) -> DWBConfig:
+    """Return a local path as long as a sample drives: a farther end is driven to across the corners."""
+    linear, angular = smoother.linear, smoother.angular
+    speed, sim_time = overrides.get("max_vel_x") or linear.max_velocity, overrides.get("sim_time") or 1.2
+    return DWBConfig(
+        sim_time=sim_time,
+        prune_distance=max(0.6, speed * sim_time),
+        max_vel_x=linear.max_velocity,
+        max_vel_theta=angular.max_velocity,
+        acc_lim_x=linear.max_acceleration,
+        decel_lim_x=-_braking(linear),
+        acc_lim_theta=angular.max_acceleration,
+        decel_lim_theta=-_braking(angular),
+    )
+
+
+def _braking(limits: AxisLimits) -> float:
+    return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
+
+
+def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:
+    kind = overrides.get("goal_checker")
+    there: dict[str, Any] = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
+    if kind == "position":
+        return overridden(PositionGoalCheckerConfig(**there), overrides)
+    of = StoppedGoalCheckerConfig if kind == "stopped" else GoalCheckerConfig
+    return overridden(of(**there, yaw_goal_tolerance=_TOLERANCE), overrides)
+
+
+def _progress_checker(overrides: Mapping[str, Any]) -> ProgressCheckerConfig:
+    of = PoseProgressCheckerConfig if overrides.get("progress_checker") == "pose" else ProgressCheckerConfig
+    return overridden(of(), overrides)

@@ -1,0 +1,34 @@
+"""The docking server's parameters: what ships, under the scenario's docks and types."""
+
+from __future__ import annotations
+
+from twin.errors import ScenarioError
+from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
+from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.runtime.defaults.overrides import overridden
+from twin.scenario.docking import DockingParameters
+
+
+def docking_config(group: DockingParameters) -> DockingServerConfig:
+    """Return the config of `/docking_server`.
+
+    Raises:
+        ScenarioError: a dock of a type that there is not.
+    """
+    own = DockDatabase()
+    changed = {
+        name: overridden(own.types.get(name, DockType()), parameters.overrides())
+        for name, parameters in group.types.items()
+    }
+    docks = {
+        name: Dock(type=dock.type, frame=dock.frame, pose=dock.pose.pose)
+        for name, dock in group.docks.items()
+    }
+    database = DockDatabase(types={**own.types, **changed}, docks=docks)
+    for name, dock in docks.items():
+        try:
+            database.type_of(dock.type)
+        except DockError as error:
+            raise ScenarioError(f"dock '{name}': {error}") from error
+    rest = {name: value for name, value in group.overrides().items() if name not in ("types", "docks")}
+    return overridden(DockingServerConfig(database=database), rest)

@@ -1,0 +1,177 @@
+"""A robot's navigation parameters: defaults for its drive and footprint, under the scenario's overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.geometry import Array
+from twin.models.specs import DriveSpec
+from twin.navigation.costmaps.layered_costmap import CostmapConfig
+from twin.navigation.planning.commitment import CommitmentConfig
+from twin.navigation.planning.goal_access import GoalAccessConfig
+from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
+from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.planning.planner_server import PlannerServerConfig
+from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
+from twin.nodes.navigation.robot_pose import Frames
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
+from twin.runtime.defaults.controllers import controller_server_config
+from twin.runtime.defaults.docking import docking_config
+from twin.runtime.defaults.overrides import overridden as overridden
+from twin.scenario.navigation import NavigationConfig
+from twin.scenario.parameter_group import ParameterGroup
+
+C = TypeVar("C")
+
+_GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
+_LOCAL_COSTMAP_PERIOD_NS = 200_000_000
+_MISSED_SCANS = 3.5
+"""After so many scan periods without a scan the robot stops: three in a row are missing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NavigationParameters:
+    """What each navigation node is built with."""
+
+    smoother: VelocitySmootherConfig
+    global_costmap: CostmapNodeConfig
+    local_costmap: CostmapNodeConfig
+    planner: PlannerPluginConfig
+    planner_server: PlannerServerConfig
+    commitment: CommitmentConfig
+    goal_access: GoalAccessConfig
+    controller_server: ControllerServerConfig
+    path_smoother: SmootherServerConfig
+    behaviors: BehaviorConfig
+    docking: DockingServerConfig
+    navigator: BtNavigatorConfig
+    waypoints: WaypointFollowerConfig
+
+
+def navigation_parameters(
+    config: NavigationConfig,
+    drive: DriveSpec,
+    footprint: Array,
+    frames: Frames,
+    *,
+    mapping: bool = False,
+    scan_rate: float | None = None,
+) -> NavigationParameters:
+    """Return the parameters for a robot.
+
+    Args:
+        config: What the scenario overrides.
+        drive: Whose limits hold where the scenario gives none.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+        frames: The robot's.
+        mapping: Whether the map is made on the way: paths may lead through what is unknown.
+        scan_rate: How often its lidar scans [Hz]; None: it has none.
+    """
+    polygon = tuple((float(x), float(y)) for x, y in footprint)
+    layers = CostmapConfig(
+        footprint=polygon,
+        footprint_padding=0.0,  # it is in the footprint already
+        inflation_radius=0.8,
+        cost_scaling_factor=4.0,
+        obstacle_max_range=4.0,
+        raytrace_max_range=5.0,
+    )
+    rolling = replace(
+        layers,
+        rolling_window=True,
+        width=4.0,
+        height=4.0,
+        obstacle_max_range=3.0,
+        expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
+    )
+    smoother = _smoother(config, drive)
+    return NavigationParameters(
+        smoother=smoother,
+        # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
+        global_costmap=replace(
+            _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
+            publish_period_ns=2_000_000_000,
+        ),
+        local_costmap=_costmap(
+            "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
+        ),
+        planner=overridden(
+            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
+        ),
+        planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
+        commitment=overridden(CommitmentConfig(), config.planner.overrides()),
+        goal_access=overridden(GoalAccessConfig(), config.planner.overrides()),
+        controller_server=controller_server_config(config.controller, smoother, config.controllers),
+        behaviors=BehaviorConfig(footprint=polygon),
+        path_smoother=SmootherServerConfig(),
+        docking=docking_config(config.docking),
+        navigator=_navigator(config.navigator.overrides()),
+        waypoints=WaypointFollowerConfig(),
+    )
+
+
+def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherConfig:
+    """Return the limits of what is commanded.
+
+    No more than the drive does: what is asked beyond that leaves the curve that was checked for collisions.
+    """
+    return VelocitySmootherConfig(
+        linear=_limits(
+            config.max_linear_speed or drive.max_linear_velocity or 1.0,
+            config.max_linear_acceleration or 0.8,
+            config.max_linear_deceleration or 1.2,
+            drive.max_linear_acceleration,
+        ),
+        angular=_limits(
+            config.max_angular_speed or drive.max_angular_velocity or 1.5,
+            config.max_angular_acceleration or 2.0,
+            config.max_angular_acceleration or 3.0,
+            drive.max_angular_acceleration,
+        ),
+        scale_velocities=True,
+    )
+
+
+def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
+    defaults = BtNavigatorConfig()
+    frequency = overrides.get("bt_loop_frequency")
+    return replace(
+        overridden(defaults, overrides),
+        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
+    )
+
+
+def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
+    return AxisLimits(
+        max_velocity=speed,
+        max_acceleration=min(acceleration, drive or acceleration),
+        max_deceleration=min(deceleration, drive or deceleration),
+    )
+
+
+def _costmap(
+    name: str, frame: str, layers: CostmapConfig, group: ParameterGroup, period_ns: int
+) -> CostmapNodeConfig:
+    overrides = group.overrides()
+    return CostmapNodeConfig(
+        name=name,
+        frame=frame,
+        layers=overridden(
+            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
+        ),
+        scan_topics=tuple(overrides.get("scan_topics") or ("scan",)),
+        range_topics=tuple(overrides.get("range_topics") or ()),
+        update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
+    )
+
+
+def _period_ns(frequency: float | None, default: int) -> int:
+    return default if frequency is None else round(1e9 / frequency)

@@ -1,0 +1,121 @@
+"""robot_localization's parameter files: what `/ekf_filter_node` takes of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from twin.navigation.localisation.ekf import SIZE
+from twin.nodes.navigation.localisation.ekf import EkfNodeConfig
+from twin.nodes.navigation.localisation.ekf_sources import EkfSource
+from twin.runtime.parameter_files.absent import Absent
+from twin.runtime.parameter_files.localisation import EKF, corrects_map, differing, file_for
+from twin.runtime.parameter_files.nav2.file import Nav2Parameters
+from twin.scenario.localisation_parameters import EkfParameters
+from twin.scenario.robots import RobotConfig
+
+_SOURCE = r"(odom|pose|twist|imu)\d+"
+_OUTPUT = "odometry/filtered"
+_FRAMES = ("map_frame", "odom_frame", "base_link_frame", "world_frame")
+_CONTROL = frozenset(
+    {
+        *("control_config", "control_timeout", "stamped_control"),
+        *("acceleration_limits", "acceleration_gains", "deceleration_limits", "deceleration_gains"),
+    }
+)
+_IDLE = frozenset(
+    {
+        *("nodelay", "print_diagnostics", "debug", "debug_out_file", "silent_tf_failure"),
+        # The filter here predicts to the present at every output, and waits for no transform.
+        *("sensor_timeout", "predict_to_current_time", "permit_corrected_publication", "transform_timeout"),
+        *("use_sim_time", "diagnostics_updater.period"),
+    }
+)
+_HARMLESS = {
+    "publish_acceleration": False,
+    "dynamic_process_noise_covariance": False,
+    "smooth_lagged_data": False,
+    "use_control": False,
+    "reset_on_time_jump": False,
+    "disabled_at_startup": False,
+    "pose_use_child_frame": False,
+    "history_length": 0.0,
+    "gravitational_acceleration": 9.80665,
+    "initial_state": [0.0] * SIZE,
+}
+_MISSED = frozenset({"base_link_frame_output", "tf_prefix"})
+
+
+def ekf_with_file(
+    config: EkfNodeConfig, robot: RobotConfig, namespace: str, bias_stddevs: Mapping[str, float]
+) -> tuple[EkfNodeConfig, list[str]]:
+    """Return the filter's config with a file's values, and what of them was not understood.
+
+    Sources are those of the file alone; what else it does not say stays as it is.
+
+    Args:
+        config: What holds without the file.
+        robot: What the scenario says of the robot.
+        namespace: Of the robot.
+        bias_stddevs: Topic of an IMU -> standard deviation of its gyroscope's bias [rad/s].
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    found = file_for(EKF, robot, namespace)
+    if found is None:
+        return config, []
+    file, node = found
+    values = file.effective(node)
+    own = {"map_frame": "map", **{name: getattr(config, name) for name in _FRAMES[1:]}}
+    frames = differing(file, node, own)
+    if corrects_map(values):
+        said = f"is {values['world_frame']}, but a filter of odometry publishes odom → base; valid is odom"
+        file.wrong(node, "world_frame", said)
+    nothing = (False,) * SIZE
+    named = [name for name in values if re.fullmatch(_SOURCE, name)]
+    config = file.applied(
+        node,
+        replace(config, sources={name: EkfSource(topic=name, config=nothing) for name in named}),
+        {"ekf": ""},
+        keep=frozenset(_FRAMES),
+        limits=EkfParameters,
+        rename=_renamed,
+        absent=_absent(values),
+    )
+    sources = {}
+    for name, source in config.sources.items():
+        topic = file.relative(source.topic)
+        if topic == _OUTPUT:
+            file.wrong(node, name, f"is {topic}, which the filter itself publishes")
+        sources[name] = replace(source, topic=topic, bias_stddev=bias_stddevs.get(topic, source.bias_stddev))
+    idle = [name for name, source in sources.items() if not any(source.config)]
+    told = [f"{file.path.name}: {node} takes nothing from {', '.join(idle)}: config is false"] if idle else []
+    return replace(config, sources=sources), [*_finished(file, robot), *frames, *told]
+
+
+def _finished(file: Nav2Parameters, robot: RobotConfig) -> list[str]:
+    """Return what was not understood; of navigation's file other nodes are told elsewhere."""
+    return file.finish() if getattr(robot.odometry, "params_file", None) else file.ignored()
+
+
+def _renamed(name: str) -> str:
+    """Return 'sources.odom0.config' for 'odom0_config', as the config here has it."""
+    found = re.fullmatch(rf"({_SOURCE})(_(.+))?", name)
+    if found is None:
+        return name
+    source, kind, key = found[1], found[2], found[4] or "topic"
+    if key == "rejection_threshold" and kind in ("pose", "twist"):
+        key = f"{kind}_rejection_threshold"
+    return f"sources.{source}.{key}"
+
+
+def _absent(values: Mapping[str, Any]) -> Absent:
+    controls = values.get("use_control") is True
+    return Absent(
+        idle=_IDLE if controls else _IDLE | _CONTROL,
+        harmless=_HARMLESS,
+        missed=_MISSED | _CONTROL,
+    )

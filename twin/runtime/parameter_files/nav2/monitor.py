@@ -1,0 +1,108 @@
+"""The collision monitor of Nav2's parameter files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from twin.runtime.parameter_files.nav2.checks import said_of
+from twin.runtime.parameter_files.nav2.file import Nav2Parameters
+from twin.runtime.parameter_files.nav2.names import corners_of
+from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonConfig
+
+_NODE = "collision_monitor"
+_CIRCLE_CORNERS = 16
+_SERVER = ("polygons", "observation_sources", "source_timeout")
+_POLYGON = (*MonitorPolygonConfig.model_fields, "type", "radius", "enabled", "max_points")
+_SENSOR = ("type", "topic", "enabled")
+_SENSORS = ("scan", "range")
+"""Types of sources that are here."""
+
+
+def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
+    """Return the file's collision monitor; None if it has none. Faults are noted in `file`."""
+    values = file.values(_NODE)
+    names = values.get("polygons")
+    if not isinstance(names, list) or not names:
+        return None
+    file.others(_NODE, tuple(_read(values)))
+    active = [name for name in names if values.get(f"{name}.enabled", True)]
+    fitting = [name for name in active if values.get(f"{name}.type") != "velocity_polygon"]
+    polygons = tuple(found for name in fitting if (found := _polygon(name, file, values)))
+    try:
+        return CollisionMonitorParameters(
+            # A file of other polygons alone leaves the robot its usual guard.
+            polygons=polygons if fitting or not active else None,
+            source_timeout=values.get("source_timeout", 2.0),
+            scan_topics=_topics(file, values, "scan") or None,
+            range_topics=_topics(file, values, "range"),
+        )
+    except ValidationError as error:
+        file.wrong(_NODE, str(error.errors()[0]["loc"][0]), said_of(error))
+        return None
+
+
+def _read(values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the names that are understood, and those in sections that no list names: Nav2 reads none."""
+    yield from _SERVER
+    polygons, sensors = values["polygons"], values.get("observation_sources") or ()
+    yield from (
+        name for name in values if "." in name and name.partition(".")[0] not in {*polygons, *sensors}
+    )
+    for name in polygons:
+        if values.get(f"{name}.type") != "velocity_polygon":
+            yield from (f"{name}.{key}" for key in _POLYGON)
+    for name in sensors:
+        if values.get(f"{name}.type", "scan") in _SENSORS:
+            yield from (f"{name}.{key}" for key in _SENSOR)
+
+
+def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tuple[str, ...]:
+    return tuple(
+        file.relative(str(values.get(f"{name}.topic", "scan")))
+        for name in values.get("observation_sources") or ()
+        if values.get(f"{name}.type", "scan") == type_ and values.get(f"{name}.enabled", True)
+    )
+
+
+def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonConfig | None:
+    inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
+    given = {key: inside[key] for key in MonitorPolygonConfig.model_fields if key in inside}
+    for key in ("radius", "max_points"):
+        if key in inside and type(inside[key]) not in (int, float):
+            file.wrong(_NODE, f"{name}.{key}", f"must be a number, not {inside[key]!r}")
+            return None
+    if inside.get("type") == "circle" and "radius" not in inside:
+        file.wrong(_NODE, f"{name}.type", "is circle, which needs a radius")
+        return None
+    points = _points(inside)
+    if points is None:
+        file.wrong(_NODE, f"{name}.points", f"must be corners '[[x, y], ...]', not {inside['points']!r}")
+        return None
+    if "max_points" in inside:
+        given["min_points"] = inside["max_points"] + 1
+    try:
+        return MonitorPolygonConfig.model_validate({**given, "name": name, "points": points})
+    except ValidationError as error:
+        file.wrong(_NODE, f"{name}.{error.errors()[0]['loc'][0]}", said_of(error))
+        return None
+
+
+def _points(inside: Mapping[str, Any]) -> Sequence[Sequence[float]] | None:
+    """Return the corners of a polygon, none: the robot's footprint; None if they are no corners."""
+    if inside.get("type") == "circle":
+        return _circle(float(inside["radius"]))
+    points = inside.get("points", "")
+    if isinstance(points, list):  # Nav2 until Iron: x, y, x, y, …
+        return list(zip(points[::2], points[1::2], strict=True)) if len(points) % 2 == 0 else None
+    return corners_of(str(points))
+
+
+def _circle(radius: float) -> list[tuple[float, float]]:
+    """Return a polygon around a circle [m]."""
+    reach = radius / math.cos(math.pi / _CIRCLE_CORNERS)
+    angles = [2.0 * math.pi * i / _CIRCLE_CORNERS for i in range(_CIRCLE_CORNERS)]
+    return [(reach * math.cos(angle), reach * math.sin(angle)) for angle in angles]

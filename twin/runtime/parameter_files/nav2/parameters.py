@@ -1,0 +1,202 @@
+"""Nav2's parameter files: what a node here has by the same name is taken, what it lacks is told."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.docking.server import NAMES as DOCKING_NAMES
+from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
+from twin.runtime.defaults.navigation import NavigationParameters
+from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
+from twin.runtime.parameter_files.nav2.checks import (
+    NavigatorParameters,
+    VelocitySmootherParameters,
+    WaypointFollowerParameters,
+)
+from twin.runtime.parameter_files.nav2.file import Nav2Parameters
+from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
+from twin.runtime.parameter_files.nav2.monitor import monitor_of
+from twin.runtime.parameter_files.nav2.names import PLANNERS
+from twin.runtime.parameter_files.nav2.trees import with_trees
+from twin.scenario.collision_monitor import CollisionMonitorParameters
+from twin.scenario.controllers import ControllerParameters
+from twin.scenario.navigation import CostmapParameters, NavigationConfig
+from twin.scenario.planners import PlannerParameters
+
+_CONTROLLER_NAMES = dict.fromkeys(
+    ("controllers", "goal_checkers", "progress_checkers", "primary_controller"), ""
+)
+_CONTROLLERS = {
+    "RegulatedPurePursuitController": "regulated_pure_pursuit",
+    "DWBLocalPlanner": "dwb",
+    "MPPIController": "mppi",
+}
+_GOAL_CHECKERS = {
+    "SimpleGoalChecker": "simple",
+    "StoppedGoalChecker": "stopped",
+    "PositionGoalChecker": "position",
+}
+_PROGRESS_CHECKERS = {"SimpleProgressChecker": "simple", "PoseProgressChecker": "pose"}
+
+
+def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
+    """Return a scenario's navigation with the file's plugins, unless it names its own.
+
+    Raises:
+        NavigationError: the file is no parameter file.
+    """
+    if config.params_file is None:
+        return config
+    file = Nav2Parameters(Path(config.params_file), namespace)
+    controller, planner = config.controller, config.planner
+    chosen = file.plugin("controller_server", "FollowPath")
+    if chosen == "RotationShimController":
+        primary = file.plugin("controller_server", "FollowPath", "primary_controller")
+        update = {"rotation_shim": True, "plugin": _CONTROLLERS.get(primary)}
+    else:
+        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
+    given = controller.model_fields_set
+    may_be = "plugin" not in given or controller.plugin == update["plugin"]
+    if update["plugin"] and may_be and "rotation_shim" not in given:
+        controller = controller.model_copy(update=update)
+    for key, section, classes in (
+        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
+        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS),
+    ):
+        chosen = classes.get(file.plugin("controller_server", section), "")
+        if chosen and key not in controller.model_fields_set:
+            controller = controller.model_copy(update={key: chosen})
+    found = PLANNERS.get(file.plugin("planner_server", "GridBased"))
+    if found and "plugin" not in planner.model_fields_set:
+        planner = planner.model_copy(update={"plugin": found})
+    return config.model_copy(update={"controller": controller, "planner": planner})
+
+
+@dataclass(frozen=True, kw_only=True)
+class AmclParameters:
+    """All of `/amcl`."""
+
+    filter: AmclConfig
+    node: AmclNodeConfig
+
+
+def amcl_with_file(
+    config: AmclConfig, given: frozenset[str], params_file: str | None, namespace: str
+) -> tuple[AmclParameters, list[str]]:
+    """Return the parameters of `/amcl` with those of a file, and what of them was not understood.
+
+    Args:
+        config: What holds without the file.
+        given: Parameters that the scenario gives: they stay.
+        params_file: Absent: there is none.
+        namespace: Of the robot.
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    parameters = AmclParameters(filter=config, node=AmclNodeConfig())
+    if params_file is None:
+        return parameters, []
+    file = Nav2Parameters(Path(params_file), namespace)
+    parameters = file.applied("amcl", parameters, {"filter": "", "node": ""}, keep=given)
+    return parameters, file.ignored()
+
+
+def monitor_with_file(config: NavigationConfig, namespace: str) -> CollisionMonitorParameters:
+    """Return the collision monitor: the scenario's, else the file's, else the default.
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    if config.collision_monitor is not None:
+        return config.collision_monitor
+    if config.params_file is None:
+        return CollisionMonitorParameters()
+    file = Nav2Parameters(Path(config.params_file), namespace)
+    monitor = monitor_of(file)
+    file.ignored()
+    return monitor or CollisionMonitorParameters()
+
+
+def with_file(
+    parameters: NavigationParameters,
+    config: NavigationConfig,
+    namespace: str,
+    elsewhere: Collection[str] = (),
+) -> tuple[NavigationParameters, list[str]]:
+    """Return a robot's parameters with those of its file, and what of the file was not understood.
+
+    Args:
+        parameters: What holds without the file.
+        config: What the scenario says.
+        namespace: Of the robot.
+        elsewhere: Further nodes of the file that are read on another occasion.
+
+    Raises:
+        NavigationError: the file is wrong.
+    """
+    if config.params_file is None:
+        return parameters, []
+    file = Nav2Parameters(Path(config.params_file), namespace)
+    docking = parameters.docking
+    docking = replace(docking, database=database_of(file, docking.database))
+    changed = replace(
+        parameters,
+        smoother=file.applied(
+            "velocity_smoother",
+            parameters.smoother,
+            keep=nav2_given.for_smoother(config),
+            limits=VelocitySmootherParameters,
+        ),
+        global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
+        local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
+        planner=file.applied(
+            "planner_server",
+            parameters.planner,
+            prefix="GridBased.",
+            keep=nav2_given.for_planner(config.planner),
+            limits=PlannerParameters,
+        ),
+        controller_server=file.applied(
+            "controller_server",
+            parameters.controller_server,
+            _CONTROLLER_NAMES,
+            keep=nav2_given.for_controllers(config),
+            limits=ControllerParameters,
+        ),
+        behaviors=file.applied("behavior_server", parameters.behaviors),
+        docking=file.applied(
+            "docking_server", docking, DOCKING_NAMES, keep=nav2_given.for_docking(config.docking)
+        ),
+        path_smoother=file.applied("smoother_server", parameters.path_smoother),
+        navigator=file.applied(
+            "bt_navigator",
+            parameters.navigator,
+            keep=nav2_given.for_navigator(config.navigator),
+            limits=NavigatorParameters,
+        ),
+        waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
+    )
+    navigator, told = with_trees(file, changed.navigator, nav2_given.for_navigator(config.navigator))
+    changed = replace(changed, navigator=navigator)
+    if config.collision_monitor is None:
+        monitor_of(file)
+    return changed, [*told, *file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))]
+
+
+def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
+    node, keep = f"{config.name}/{config.name}", nav2_given.for_costmap(group)
+    scans, ranges = sources_of(file, node)
+    config = replace(
+        config,
+        scan_topics=scans if scans and "scan_topics" not in keep else config.scan_topics,
+        range_topics=ranges if ranges and "range_topics" not in keep else config.range_topics,
+    )
+    changed = file.applied(node, config, {"layers": ""}, keep=keep, limits=CostmapParameters)
+    if file.is_round(node) and "robot_radius" not in keep:
+        changed = replace(changed, layers=replace(changed.layers, footprint=()))
+    return changed

@@ -1,0 +1,1 @@
+"""The nodes of a robot, in the order in which they run."""

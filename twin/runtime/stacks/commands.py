@@ -1,0 +1,88 @@
+"""The nodes between whoever commands a velocity and the wheels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from twin.controllers.limiter import AxisLimits
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.geometry import Array
+from twin.models.specs import DriveSpec, LidarSpec
+from twin.navigation.control.collision_monitor import (
+    FOOTPRINT_APPROACH,
+    CollisionMonitorConfig,
+    MonitorPolygon,
+)
+from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
+from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
+from twin.runtime.stacks.context import StackContext
+from twin.scenario.collision_monitor import CollisionMonitorParameters
+
+_GUARDED = "cmd_vel_muxed"
+_SCAN = "scan"
+_REACTION_S = 0.2
+"""Age of a scan, and a command's way to the wheels."""
+
+
+def build_commands(
+    context: StackContext,
+    config: CollisionMonitorParameters,
+    pose: RobotPose,
+    footprint: Array,
+    brakes: VelocitySmootherConfig,
+) -> None:
+    """Create the multiplexer, and behind it the collision monitor if the robot has what it looks with.
+
+    Args:
+        context: What the robot's nodes are built from.
+        config: What the scenario overrides.
+        pose: What the robot believes about its pose.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+        brakes: What its drive can do.
+    """
+    bus, namespace = context.bus, context.namespace
+    sensors = context.handle.description.sensors
+    scans = config.scan_topics
+    if scans is None:
+        there = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
+        scans = (_SCAN,) if there else ()
+    if not config.enabled or not (scans or config.range_topics):
+        TwistMuxNode(bus, namespace=namespace)
+        return
+    TwistMuxNode(bus, output=_GUARDED, namespace=namespace)
+    polygons: tuple[MonitorPolygon, ...] = (_approach(brakes.linear),)
+    if config.polygons is not None:
+        polygons = tuple(MonitorPolygon(**polygon.model_dump()) for polygon in config.polygons)
+    CollisionMonitorNode(
+        bus,
+        pose,
+        footprint,
+        CollisionMonitorConfig(polygons=polygons, source_timeout_ns=round(config.source_timeout * 1e9)),
+        brakes=brakes,
+        hardest=_hardest(brakes.linear, context.handle.description.drive),
+        cmd_vel_in=_GUARDED,
+        scan_topics=scans,
+        range_topics=config.range_topics,
+        namespace=namespace,
+    )
+
+
+def _hardest(limits: AxisLimits, drive: DriveSpec | None) -> float:
+    """Return how many times harder than in `limits` a drive brakes when it must."""
+    usual = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
+    most = None if drive is None else drive.max_linear_acceleration
+    return max(1.0, (most or usual) / usual)
+
+
+def _approach(limits: AxisLimits) -> MonitorPolygon:
+    """Return `approach` for a robot's brakes.
+
+    It lets the robot drive at d / T, d before an obstacle, which takes a deceleration of v / T.
+    """
+    braking = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
+    return replace(
+        FOOTPRINT_APPROACH,
+        time_before_collision=round(limits.max_velocity / braking + _REACTION_S, 2),
+        simulation_time_step=0.05,
+    )

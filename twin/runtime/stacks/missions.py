@@ -1,0 +1,218 @@
+"""The mission of a scenario as nodes on the bus."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from twin.bridge.action_types import (
+    BackUp,
+    DockRobot,
+    DriveOnHeading,
+    NavigateToPose,
+    Spin,
+    UndockRobot,
+    Wait,
+)
+from twin.bridge.bus import Bus
+from twin.bridge.msgs import Point, duration, new
+from twin.bridge.types import ActionType
+from twin.errors import ScenarioError
+from twin.geometry import Pose2, Pose3
+from twin.navigation.costmaps import footprint as footprints
+from twin.navigation.exploration.explorer import ExplorerConfig
+from twin.navigation.exploration.frontiers import FrontierConfig
+from twin.nodes.messages import pose_stamped
+from twin.nodes.missions.explore import ExploreMissionNode
+from twin.nodes.missions.random_goals import RandomGoalsConfig, RandomGoalsNode
+from twin.nodes.missions.simple import ActionSequenceNode, ActionStep, VelocityProfileNode
+from twin.nodes.navigation.exploration.explorer import ExplorerNode, ExplorerNodeConfig
+from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.runtime.defaults.navigation import overridden
+from twin.runtime.stacks.robot import RobotStack
+from twin.scenario import missions
+from twin.scenario.missions import (
+    Behaviors,
+    BehaviorStep,
+    Explore,
+    Idle,
+    Mission,
+    PickAndPlace,
+    R2D2StatePublisher,
+    RandomGoals,
+    VelocityProfile,
+)
+from twin.strict_yaml import StrictModel
+from twin.warehouse.arena import Arena
+from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+from twin.warehouse.skills import Station
+
+
+class MissionHandle(Protocol):
+    """What the runtime asks of a mission node."""
+
+    @property
+    def state(self) -> str:
+        """What it is doing."""
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended; a run ends with it."""
+
+    @property
+    def succeeded(self) -> bool | None:
+        """None until it has ended."""
+
+    @property
+    def reason(self) -> str:
+        """Why it failed."""
+
+
+class IdleMission:
+    """Nothing to do; the run lasts its whole duration."""
+
+    state = "idle"
+    done = False
+    succeeded: bool | None = None
+    reason = ""
+
+
+def build_mission(
+    bus: Bus,
+    mission: Mission,
+    stacks: Mapping[str, RobotStack],
+    arena: Arena | None,
+    namespaces: Mapping[str, str],
+    seed: int,
+    control_period_ns: int,
+) -> MissionHandle:
+    """Return the scenario's mission as a node on the bus."""
+    if isinstance(mission, Idle):
+        return IdleMission()
+    stack, namespace = stacks[mission.robot], namespaces[mission.robot]
+    match mission:
+        case PickAndPlace():
+            return _pick_and_place(bus, mission, stack, arena, namespace)
+        case Behaviors():
+            steps = [_behavior(step, stack) for step in mission.steps]
+            return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
+        case RandomGoals():
+            goals = RandomGoalsConfig(
+                distance=mission.distance,
+                clearance=mission.clearance,
+                min_goal_distance=mission.min_goal_distance,
+                max_failed=mission.max_failed,
+                retries=mission.retries,
+            )
+            return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
+        case VelocityProfile():
+            profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
+            return VelocityProfileNode(
+                bus, profile * mission.repeat, control_period_ns=control_period_ns, namespace=namespace
+            )
+        case Explore():
+            return _explore(bus, mission, stack, namespace)
+        case R2D2StatePublisher():
+            return R2D2StatePublisherNode(
+                bus,
+                radius=mission.radius,
+                rate_hz=mission.rate,
+                degrees_per_cycle=mission.degrees_per_cycle,
+                joints=tuple(stack.handle.description.commands),
+                move_base=lambda pose: stack.handle.set_kinematic_pose(
+                    Pose3.from_pose2(pose, stack.spawn_height)
+                ),
+                frames=stack.frames,
+                namespace=namespace,
+            )
+
+
+def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
+    """Return the action of one step of a behaviour mission."""
+    action, label, goal = _goal(step.config, stack)
+    if action is not NavigateToPose:
+        return ActionStep(label, action, step.kind, lambda: goal)
+    # A goal for a robot that nobody has localised yet is refused.
+    return ActionStep(label, action, step.kind, lambda: goal, lambda: stack.robot_pose.in_map() is not None)
+
+
+def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:
+    """Return the action of a step, how it is called in the mission's state, and its goal message."""
+    allowance = duration(120_000_000_000)
+    match step:
+        case missions.DriveOnHeading(distance=distance, speed=speed):
+            target = Point(x=distance, y=0.0, z=0.0)
+            goal = new(DriveOnHeading.Goal, target=target, speed=speed, time_allowance=allowance)
+            return DriveOnHeading, f"drive {distance:g} m", goal
+        case missions.BackUp(distance=distance, speed=speed):
+            target = Point(x=distance, y=0.0, z=0.0)
+            goal = new(BackUp.Goal, target=target, speed=speed, time_allowance=allowance)
+            return BackUp, f"back up {distance:g} m", goal
+        case missions.Spin(angle=angle):
+            goal = new(Spin.Goal, target_yaw=angle, time_allowance=allowance)
+            return Spin, f"spin {math.degrees(angle):.0f}°", goal
+        case missions.Wait(duration=seconds):
+            return Wait, f"wait {seconds:g} s", new(Wait.Goal, time=duration(round(seconds * 1e9)))
+        case missions.NavigateToPose(x=x, y=y, yaw=yaw):
+            pose = pose_stamped(Pose2(x, y, yaw), stack.frames.map, 0)
+            return NavigateToPose, f"navigate to ({x:g}, {y:g})", new(NavigateToPose.Goal, pose=pose)
+        case missions.DockRobot(dock=dock, max_staging_time=limit):
+            goal = new(DockRobot.Goal, use_dock_id=True, dock_id=dock, max_staging_time=limit)
+            return DockRobot, f"dock at {dock}", goal
+        case missions.UndockRobot(dock_type=dock_type):
+            return UndockRobot, "undock", new(UndockRobot.Goal, dock_type=dock_type)
+    raise TypeError(type(step).__name__)
+
+
+def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
+    overrides = mission.overrides()
+    inner, outer = footprints.radii(stack.footprint)
+    frontiers = overridden(FrontierConfig(robot_radius=outer, inscribed_radius=inner), overrides)
+    explorer = overridden(ExplorerConfig(frontiers=frontiers), overrides)
+    config = ExplorerNodeConfig(return_to_init=mission.return_to_init, explorer=explorer)
+    node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)
+    return ExploreMissionNode(bus, node, namespace=namespace)
+
+
+def _pick_and_place(
+    bus: Bus, mission: PickAndPlace, stack: RobotStack, arena: Arena | None, namespace: str
+) -> MissionHandle:
+    if arena is None:
+        raise ScenarioError("the mission pick_and_place needs an arena with totes; set world.arena")
+    if stack.manipulator is None or stack.navigator is None:
+        lacks = "arm with a grasp_frame" if stack.manipulator is None else "navigation"
+        raise ScenarioError(
+            f"the mission pick_and_place needs a robot with an {lacks}; '{stack.name}' has none"
+        )
+    taken: dict[str, int] = {}
+    tasks = []
+    for task in mission.tasks:
+        tote, zone = arena.tote(task.tote), arena.zone(task.to)
+        index = taken.setdefault(task.to, 0)
+        taken[task.to] += 1
+        if index >= len(zone.slots):
+            raise ScenarioError(
+                f"zone '{task.to}' has room for {len(zone.slots)} totes; the mission brings it more"
+            )
+        place = zone.slots[index]
+        depth, width, height = tote.size
+        tasks.append(
+            PickAndPlaceTask(
+                tote=task.tote,
+                tote_depth=depth,
+                tote_width=width,
+                tote_height=height,
+                pick=Station(name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height),
+                place=Station(name=place.name, face=place.approach(0.0), surface_z=place.height),
+            )
+        )
+    return PickAndPlaceNode(
+        bus,
+        tasks,
+        stack.manipulator.arm,
+        gripper_joint=stack.manipulator.gripper_joint,
+        gripper_open=stack.manipulator.gripper_open,
+        robot_pose=stack.robot_pose,
+        namespace=namespace,
+    )

@@ -1,0 +1,120 @@
+"""The nodes that drive a robot to a goal, in the order in which they run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.geometry import Array
+from twin.models.specs import DriveSpec, LidarSpec
+from twin.navigation.warm_up import warm_up_controller
+from twin.nodes.navigation.behavior_server import BehaviorServerNode
+from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.controller_server.server import ControllerServerNode
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
+from twin.nodes.navigation.docking.server import DockingServerNode
+from twin.nodes.navigation.planning.planner_server import PlannerServerNode
+from twin.nodes.navigation.planning.smoother_server import SmootherServerNode
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
+from twin.nodes.navigation.velocity.velocity_smoother import VelocitySmootherNode
+from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
+from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
+from twin.runtime.parameter_files.localisation import localisation_nodes
+from twin.runtime.parameter_files.nav2.parameters import monitor_with_file, with_file, with_plugins
+from twin.runtime.stacks.commands import build_commands
+from twin.runtime.stacks.context import StackContext
+from twin.runtime.stacks.zones import build_zones, with_filters
+from twin.scenario.navigation import NavigationConfig
+
+
+def build_navigation(
+    context: StackContext, config: NavigationConfig, pose: RobotPose, footprint: Array
+) -> BtNavigatorNode:
+    """Create the navigation nodes; return the navigator.
+
+    Args:
+        context: What the robot's nodes are built from.
+        config: What the scenario overrides.
+        pose: What the robot believes about its pose.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+    """
+    bus, namespace, drive = context.bus, context.namespace, context.handle.description.drive
+    assert drive is not None
+    config = with_plugins(config, namespace)
+    parameters = _defaults(context, config, drive, footprint, pose.frames)
+    parameters, not_understood = with_file(
+        parameters, config, namespace, localisation_nodes(context.config, namespace)
+    )
+    period_ns = context.control_period_ns
+    limits = _drive_limits(parameters.smoother, drive)
+    build_commands(context, monitor_with_file(config, namespace), pose, footprint, limits)
+    VelocitySmootherNode(bus, parameters.smoother, period_ns=period_ns, namespace=namespace)
+    build_zones(bus, config, pose.frames.map, namespace=namespace)
+    in_map = with_filters(parameters.global_costmap, config, speed=False)
+    global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
+    around = with_filters(parameters.local_costmap, config, speed=True)
+    local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
+    PlannerServerNode(
+        bus,
+        pose,
+        global_costmap,
+        config=parameters.planner,
+        server=parameters.planner_server,
+        commitment=parameters.commitment,
+        goal_access=parameters.goal_access,
+        namespace=namespace,
+    )
+    SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)
+    server = ControllerServerNode(
+        bus, pose, local_costmap, footprint, parameters.controller_server, namespace=namespace
+    )
+    for controller in server.controllers.values():
+        warm_up_controller(controller)
+    BehaviorServerNode(
+        bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
+    )
+    if _lidar(context) is not None:
+        DockingServerNode(
+            bus,
+            pose,
+            parameters.docking,
+            costmap=local_costmap,
+            footprint=footprint,
+            namespace=namespace,
+        )
+    navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
+    for sentence in not_understood:
+        navigator.node.get_logger().warn(sentence)
+    return navigator
+
+
+def _defaults(
+    context: StackContext, config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
+) -> NavigationParameters:
+    """Return the parameters without those of a file."""
+    localisation, lidar = context.config.localisation, _lidar(context)
+    return navigation_parameters(
+        config,
+        drive,
+        footprint,
+        frames,
+        mapping=localisation is not None and localisation.type == "slam",
+        scan_rate=None if lidar is None else lidar.rate_hz,
+    )
+
+
+def _lidar(context: StackContext) -> LidarSpec | None:
+    """Return the lidar that navigation looks at, if the robot has it."""
+    sensors = context.handle.description.sensors
+    return next((s for s in sensors if isinstance(s, LidarSpec) and s.topic == "scan"), None)
+
+
+def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:
+    """Return what people may ask for, too: the smoother's accelerations at the drive's own speeds."""
+    linear, angular = drive.max_linear_velocity, drive.max_angular_velocity
+    return replace(
+        smoother,
+        linear=replace(smoother.linear, max_velocity=linear or smoother.linear.max_velocity),
+        angular=replace(smoother.angular, max_velocity=angular or smoother.angular.max_velocity),
+    )

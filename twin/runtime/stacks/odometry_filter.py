@@ -1,0 +1,96 @@
+"""The filter that fuses wheels and IMU, if a scenario's `odometry` asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from twin.errors import ScenarioError
+from twin.models.specs import ImuSpec
+from twin.nodes.navigation.localisation.ekf import EkfNode, EkfNodeConfig, for_robot
+from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource
+from twin.nodes.navigation.robot_pose import Frames
+from twin.runtime.defaults.overrides import overridden
+from twin.runtime.parameter_files.ekf import ekf_with_file
+from twin.runtime.parameter_files.unpublished_topics import tell_unheard
+from twin.runtime.stacks.context import StackContext
+from twin.scenario.localisation_parameters import EkfParameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometryFilter:
+    """What `/ekf_filter_node` of one robot is built from."""
+
+    config: EkfNodeConfig
+    told: tuple[str, ...]
+    """What of its parameter file was not understood."""
+
+    def build(self, context: StackContext) -> EkfNode:
+        """Create the node."""
+        node = EkfNode(context.bus, self.config, namespace=context.namespace)
+        for sentence in self.told:
+            node.node.get_logger().warn(sentence)
+        return node
+
+
+def odometry_filter(context: StackContext, frames: Frames) -> OdometryFilter | None:
+    """Return the filter that the scenario asks for; None if the wheels alone tell odometry.
+
+    Raises:
+        ScenarioError: the robot has no drive, or no IMU where no parameter file names other sources.
+        NavigationError: the parameter file is wrong.
+    """
+    odometry = context.config.odometry
+    if odometry.type == "wheels":
+        return None
+    description = context.handle.description
+    imus = _imus(context)
+    default = for_robot(frames.odom, frames.base, context.control_period_ns, "imu", 1e-3)
+    if imus:
+        first = imus[0]
+        default = for_robot(
+            frames.odom, frames.base, context.control_period_ns, first.topic, first.gyro_bias_stddev
+        )
+    stddevs = {spec.topic: spec.gyro_bias_stddev for spec in imus}
+    config, told = ekf_with_file(default, context.config, context.namespace, stddevs)
+    lacks = "drive" if description.drive is None else "IMU" if not imus and config is default else ""
+    if lacks:
+        raise ScenarioError(
+            f"robot '{context.handle.name}' has no {lacks}; "
+            "odometry of type ekf needs both, type wheels needs no IMU"
+        )
+    return OdometryFilter(config=_with_overrides(config, odometry.parameters), told=tuple(told))
+
+
+def tell_unheard_sources(context: StackContext, node: EkfNode) -> None:
+    """Warn of sources that nobody publishes, once all nodes of the robot are there."""
+    own = {"odom", *(spec.topic for spec in _imus(context))}
+    tell_unheard(
+        node.node,
+        {
+            name: (source.topic, KINDS[name.rstrip("0123456789")])
+            for name, source in node.config.sources.items()
+            if source.topic not in own
+        },
+    )
+
+
+def _imus(context: StackContext) -> list[ImuSpec]:
+    return [spec for spec in context.handle.description.sensors if isinstance(spec, ImuSpec)]
+
+
+def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNodeConfig:
+    """Return a filter's config with the scenario's overrides, sources by name."""
+    sources = dict(config.sources)
+    for name, given in parameters.sources.items():
+        changes = {key: value for key, value in given.overrides().items() if value is not None}
+        try:
+            sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
+        except TypeError:
+            raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
+    overrides = parameters.overrides()
+    if parameters.frequency is not None:
+        overrides["period_ns"] = round(1e9 / parameters.frequency)
+    if parameters.transform_time_offset is not None:
+        overrides["transform_time_offset_ns"] = round(parameters.transform_time_offset * 1e9)
+    ekf = overridden(config.ekf, overrides)
+    return replace(overridden(config, {**overrides, "sources": None}), ekf=ekf, sources=sources)

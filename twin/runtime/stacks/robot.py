@@ -1,0 +1,117 @@
+"""The nodes of one robot, in the order in which they run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.controllers.drive_config import drive_config, odometry_noise
+from twin.models.description import RobotDescription
+from twin.navigation.recovery import BehaviorConfig
+from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
+from twin.nodes.gripper_controller import GripperControllerNode
+from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
+from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
+from twin.nodes.navigation.behavior_server import BehaviorServerNode
+from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
+from twin.nodes.position_controller import PositionControllerNode
+from twin.nodes.robot_state_publisher import RobotStatePublisherNode
+from twin.nodes.sensor_publishers import SensorPublisher
+from twin.nodes.tote_detector import ToteDetectorNode
+from twin.nodes.transforms import TransformListenerNode
+from twin.runtime.defaults import from_description as derive
+from twin.runtime.stacks.context import StackContext
+from twin.runtime.stacks.localisation import build_localisation
+from twin.runtime.stacks.navigation import build_navigation
+from twin.runtime.stacks.odometry_filter import odometry_filter, tell_unheard_sources
+
+
+class RobotStack:
+    """Builds and holds the nodes of one robot; what a robot lacks (drive, lidar, arm) is left out."""
+
+    def __init__(self, context: StackContext) -> None:
+        bus, handle, namespace = context.bus, context.handle, context.namespace
+        description = handle.description
+        self.name = handle.name
+        self.handle = handle
+        self._context = context
+        self.spawn_height = context.spawn_height
+        self.start = context.start
+        drive = description.drive
+        base_frame = drive.base_frame if drive else description.root
+        self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
+        self.sensors = [SensorPublisher(bus, sensor, namespace=namespace) for sensor in handle.sensors]
+        JointStateBroadcasterNode(
+            bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
+        )
+        fusion = odometry_filter(context, self.frames)
+        wheels_tell = fusion is None or not fusion.config.publish_tf
+        self.drive = self._build_drive(description, enable_odom_tf=wheels_tell)
+        fused = None if fusion is None else fusion.build(context)
+        RobotStatePublisherNode(bus, description, namespace=namespace)
+        listener = TransformListenerNode(bus, namespace=namespace)
+        self.robot_pose = RobotPose(listener.buffer, self.frames)
+        self.manipulator = derive.manipulator(description)
+        self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
+        self.navigator: BtNavigatorNode | None = None
+        self.slam = build_localisation(context, self.robot_pose)
+        if context.config.navigation is not None:
+            self.navigator = build_navigation(
+                context, context.config.navigation, self.robot_pose, self.footprint
+            )
+        elif drive is not None:
+            BehaviorServerNode(
+                bus,
+                self.robot_pose,
+                BehaviorConfig(),
+                cmd_vel="cmd_vel",
+                period_ns=context.control_period_ns,
+                namespace=namespace,
+            )
+        self._build_arm(description)
+        if fused is not None:
+            tell_unheard_sources(context, fused)
+
+    def _build_drive(
+        self, description: RobotDescription, *, enable_odom_tf: bool
+    ) -> DiffDriveControllerNode | None:
+        drive, context = description.drive, self._context
+        if drive is None:
+            return None
+        node = DiffDriveControllerNode(
+            context.bus,
+            self.handle.hardware,
+            DiffDriveNodeConfig(
+                drive=drive_config(drive, description, calibrated_ratio=context.track_ratio),
+                left_joints=drive.left_joints,
+                right_joints=drive.right_joints,
+                odom_frame=self.frames.odom,
+                base_frame=self.frames.base,
+                noise=odometry_noise(drive, description),
+                period_ns=context.control_period_ns,
+                use_imu=getattr(context.config.localisation, "use_imu", False),
+                enable_odom_tf=enable_odom_tf,
+            ),
+            namespace=context.namespace,
+        )
+        if drive.guessed:
+            node.node.get_logger().warn(
+                f"'{self.name}' has no drive plugin; by its wheels it is {drive.words}"
+            )
+        return node
+
+    def _build_arm(self, description: RobotDescription) -> None:
+        bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware
+        if self.manipulator is None:
+            if description.commands:
+                PositionControllerNode(bus, hardware, tuple(description.commands), namespace=namespace)
+            return
+        JointTrajectoryControllerNode(bus, hardware, self.manipulator.arm_joints, namespace=namespace)
+        GripperControllerNode(
+            bus,
+            hardware,
+            self.manipulator.gripper_joint,
+            period_ns=self._context.control_period_ns,
+            namespace=namespace,
+        )
+        ToteDetectorNode(bus, self.robot_pose, namespace=namespace)
