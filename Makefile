@@ -45,10 +45,10 @@ oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fide
 	$(BIN)/python -m tests.oracles.example_robots
 	$(PYTHON) -m venv build/wire_oracle
 	build/wire_oracle/bin/python -m pip install --quiet --disable-pip-version-check zenoh-ros2-sdk==0.1.8 pamoja-ros2==0.2.0
-	TWIN_WIRE_ORACLE=build/wire_oracle/bin/python $(BIN)/python -m pytest tests/bridge/test_wire_oracles.py
+	TWIN_WIRE_ORACLE=build/wire_oracle/bin/python $(BIN)/python -m pytest tests/bridge/wire/test_oracles.py
 	$(PYTHON) -m venv build/rclpy_oracle
-	build/rclpy_oracle/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/bridge/rclpy_requirements.txt
-	TWIN_RCLPY_ORACLE=build/rclpy_oracle/bin/python $(BIN)/python -m pytest tests/bridge/test_cdr_rclpy.py
+	build/rclpy_oracle/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/bridge/cdr/rclpy_requirements.txt
+	TWIN_RCLPY_ORACLE=build/rclpy_oracle/bin/python $(BIN)/python -m pytest tests/bridge/cdr/test_rclpy.py
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios

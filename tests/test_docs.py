@@ -54,7 +54,7 @@ NOT_RUN = {
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
     r"twin bench .*": "needs ../shared/data: tests/benchmarks_ has small ones",
-    r"twin bag (record|play) .*": "needs a graph beside it: tests/bridge/test_bag_commands.py has one",
+    r"twin bag (record|play) .*": "needs a graph beside it: tests/cli/ros/bag/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""
 

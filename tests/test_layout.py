@@ -188,6 +188,18 @@ def test_no_global_random_state() -> None:
     assert found == []
 
 
+def test_tests_mirror_the_package() -> None:
+    """A folder of tests is one of the package, but for a few that hold no tests of a package."""
+    others = {"benchmarks", "examples", "oracles", "data"}
+    folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("*.py")}
+    strangers = [
+        folder.as_posix()
+        for folder in sorted(folders)
+        if not others & set(folder.parts) and not (ROOT / "twin" / folder).is_dir()
+    ]
+    assert strangers == []
+
+
 def pins() -> dict[str, str]:
     lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
     return {canonicalize_name(name): version for name, _, version in (line.partition("==") for line in lines)}

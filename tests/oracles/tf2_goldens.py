@@ -1,4 +1,4 @@
-"""Look-ups answered by the real tf2, for tests/bridge/test_tf_oracle.py.
+"""Look-ups answered by the real tf2, for tests/bridge/tf/test_oracle.py.
 
 Needs tf2_py and rospy: Debian's python3-tf2-ros (tf2 0.7.6, the BufferCore of ROS 1 Noetic), run with the
 system's Python:

@@ -1,7 +1,7 @@
 """The transform tree over time with tf2's rules (geometry2, tf2/src/buffer_core.cpp).
 
 Interpolation, no extrapolation, static transforms always, another parent as time goes on, two times with a
-fixed frame. Compared with the real tf2 in tests/bridge/test_tf_oracle.py.
+fixed frame. Compared with the real tf2 in tests/bridge/tf/test_oracle.py.
 """
 
 from __future__ import annotations
