@@ -6,11 +6,11 @@ SCENARIO ?= scenarios/warehouse.yaml
 
 .PHONY: run test check bench soak fuzz oracle scenarios smoke docs clean
 
-$(VENV)/.ready: pyproject.toml constraints.txt
+$(VENV)/.ready: pyproject.toml constraints.txt benchmarks/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
 	@echo "Installing into $(VENV); the first time this takes some minutes."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]' --editable benchmarks
 	touch $@
 
 run: $(VENV)/.ready  ## the environment, then the warehouse scenario to its verdict
@@ -27,14 +27,14 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation, messages to a put
-	$(BIN)/python -m tests.benchmarks.convert_cost
-	$(BIN)/python -m tests.benchmarks.run_cost
-	$(BIN)/python -m tests.benchmarks.cdr_cost
-	$(BIN)/python -m tests.benchmarks.lockstep_cost
-	$(BIN)/python -m tests.benchmarks.tracking
+	$(BIN)/python -m benchmarks.measures.convert_cost
+	$(BIN)/python -m benchmarks.measures.run_cost
+	$(BIN)/python -m benchmarks.measures.cdr_cost
+	$(BIN)/python -m benchmarks.measures.lockstep_cost
+	$(BIN)/python -m benchmarks.measures.tracking
 
 soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory
-	$(BIN)/python -m tests.benchmarks.soak
+	$(BIN)/python -m benchmarks.measures.soak
 
 fuzz: $(VENV)/.ready  ## 10 000 broken and hostile mesh files, checked and converted: none takes 5 s of CPU or 500 MB
 	$(BIN)/python -m tests.oracles.mesh_fuzz

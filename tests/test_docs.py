@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+import typer
 import yaml
 from PIL import Image
 from typer.main import get_command
@@ -50,10 +51,10 @@ NOT_RUN = {
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
-    r"twin bench slam .*": "needs logs that are not shipped: tests/cli/bench has its own",
+    r"twin bench slam .*": "needs logs that are not shipped: tests/benchmarks/slam has its own",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
-    r"twin bench .*": "needs ../shared/data: tests/benchmarks_ has small ones",
+    r"twin bench .*": "needs ../shared/data: tests/benchmarks has small ones",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/cli/ros/bag/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""
@@ -201,7 +202,9 @@ def help_of(command: str) -> str:
 
 def all_commands(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the commands of a group and of the groups in it: 'run', 'topic list'."""
-    for name, command in group.commands.items():
+    context = typer.Context(group)
+    for name in group.list_commands(context):
+        _, command, _ = group.resolve_command(context, [name])
         if hasattr(command, "commands"):
             yield from all_commands(command, f"{prefix}{name} ")
         else:

@@ -15,7 +15,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-SOURCES = sorted((ROOT / "twin").rglob("*.py"))
+SOURCES = sorted(
+    path for home in ("twin", "benchmarks/twin_benchmarks") for path in (ROOT / home).rglob("*.py")
+)
 
 HEAVY = (
     "mujoco",
@@ -30,7 +32,7 @@ HEAVY = (
 )
 
 WALL_CLOCK = {
-    "twin/benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
+    "benchmarks/twin_benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
     "twin/runtime/pacing.py": {"perf_counter", "sleep"},  # how a paced run waits
     "twin/runtime/run.py": {"perf_counter", "process_time"},  # how long the run took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
@@ -42,9 +44,9 @@ WALL_CLOCK = {
     "twin/bridge/bags/recorder.py": {"time_ns", "monotonic"},  # when a message was received
     "twin/bridge/bags/asked_definitions.py": {"monotonic"},  # time-outs of other processes
     "twin/bridge/bags/player.py": {"monotonic_ns"},  # when a message is due
-    "twin/benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
-    "twin/benchmarks/grid_maps.py": {"perf_counter"},  # the same
-    "twin/benchmarks/slam/trial.py": {"perf_counter"},  # how many times faster than the robot drove
+    "benchmarks/twin_benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
+    "benchmarks/twin_benchmarks/grid_maps.py": {"perf_counter"},  # the same
+    "benchmarks/twin_benchmarks/slam/trial.py": {"perf_counter"},  # times faster than the robot drove
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""
@@ -80,7 +82,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 MACHINE_PATH = re.compile(r"(?<![\w.>})/-])/(home|root|work|tmp|opt|Users|mnt|workspace)/\w")
-ADDRESS = re.compile(r"(--index-url|--extra-index-url|--find-links|/simple\b|pypi\.|git\+)", re.IGNORECASE)
+ADDRESS = re.compile(r"(--index-url|--extra-index-url|--find-links|/simple\b(?!\.py)|pypi\.|git\+)", re.IGNORECASE)
 
 
 def test_no_file_knows_the_machine_it_was_written_on() -> None:
@@ -188,16 +190,17 @@ def test_no_global_random_state() -> None:
     assert found == []
 
 
+def subject(tests: Path) -> Path:
+    """Return the folder that a folder of tests is about."""
+    first, *rest = tests.relative_to(ROOT / "tests").parts or ("",)
+    if first == "benchmarks":
+        return ROOT.joinpath("benchmarks", "twin_benchmarks", *rest)
+    return ROOT.joinpath("" if first == "examples" else "twin", first, *rest)
+
+
 def test_tests_mirror_the_package() -> None:
-    """A folder of tests is one of the package, but for a few that hold no tests of a package."""
-    others = {"benchmarks", "examples", "oracles", "data"}
-    folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("*.py")}
-    strangers = [
-        folder.as_posix()
-        for folder in sorted(folders)
-        if not others & set(folder.parts) and not (ROOT / "twin" / folder).is_dir()
-    ]
-    assert strangers == []
+    folders = {path.parent for path in (ROOT / "tests").rglob("test_*.py")}
+    assert [folder.as_posix() for folder in sorted(folders) if not subject(folder).is_dir()] == []
 
 
 def pins() -> dict[str, str]:
@@ -212,8 +215,9 @@ def test_constraints_are_pins_and_nothing_else() -> None:
 
 
 def needed() -> Iterator[str]:
-    """Yield everything that `pip install .[dev]` installs, as far as it is installed here."""
-    todo = [("twin", frozenset({"", "dev"}))]
+    """Yield everything that `pip install .[dev] ./benchmarks` installs, as far as it is installed here."""
+    own = {"twin": frozenset({"", "dev"}), "twin-benchmarks": frozenset({""})}
+    todo = list(own.items())
     seen: set[tuple[str, frozenset[str]]] = set()
     while todo:
         name, extras = todo.pop()
@@ -224,7 +228,7 @@ def needed() -> Iterator[str]:
             requirements = metadata.requires(name) or ()
         except metadata.PackageNotFoundError:
             continue
-        if name != "twin":
+        if name not in own:
             yield name
         for text in requirements:
             requirement = Requirement(text)

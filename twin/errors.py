@@ -115,10 +115,6 @@ class SimulationError(TwinError):
     """The physics cannot go on."""
 
 
-class BenchmarkError(TwinError):
-    """A benchmark's file is wrong."""
-
-
 def nearest(word: str, valid: Iterable[str]) -> str:
     """Return the tail of an error message that lists valid names, of many only those nearest to a word.
 

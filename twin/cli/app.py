@@ -10,17 +10,18 @@ from typing import Annotated
 import typer
 
 from twin.cli import exec, play, run, schema
-from twin.cli.bench import app as bench_app
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
 from twin.cli.model import check, convert, graph, robots, tree, view
+from twin.cli.other_commands import Commands
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
 from twin.cli.run import batch
 from twin.errors import TwinError
 
 app = typer.Typer(
     name="twin",
+    cls=Commands,
     help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, ROS 2.",
     epilog="Example: [bold]twin run scenarios/warehouse.yaml[/bold]",
     no_args_is_help=True,
@@ -73,7 +74,6 @@ for _name, _group in _GROUPS:
     app.add_typer(_group, name=_name, rich_help_panel=_GRAPH)
 
 app.add_typer(map_app, name="map", rich_help_panel=_NAVIGATION)
-app.add_typer(bench_app, name="bench", rich_help_panel=_NAVIGATION)
 
 
 def _tell_version(asked: bool) -> None:

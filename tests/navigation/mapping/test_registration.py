@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from tests.navigation.mapping.worlds import ANGLES, LIDAR, WALLS, scan
-from twin.benchmarks.slam.log import load_log
-from twin.benchmarks.slam.relations import relations_of
-from twin.benchmarks.slam.trial import run_log
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
 from twin.navigation.mapping.registration import Registration, doubted
 from twin.navigation.mapping.scan import Scan
+from twin_benchmarks.slam.log import load_log
+from twin_benchmarks.slam.relations import relations_of
+from twin_benchmarks.slam.trial import run_log
 
 PRIOR = np.diag([0.01, 0.01, 0.001])
 CORRIDOR = np.array([(-40.0, -1.0, 40.0, -1.0), (-40.0, 1.0, 40.0, 1.0)])
