@@ -2,7 +2,8 @@
 
 Needs cmake, a C++17 compiler and the two sources, as cloned from their repositories:
 
-    python tests/oracles/behavior_trees/goldens.py --btcpp BehaviorTree.CPP --nav2 navigation2 --build build/bt
+    cd tests/oracles/behavior_trees
+    python goldens.py --btcpp BehaviorTree.CPP --nav2 navigation2 --build build
 
 builds the library without ZeroMQ and SQLite (a minute or two), `tracer.cpp` beside it, and writes
 `goldens.json`. The committed file is of BehaviorTree.CPP 4.10.0 and of Nav2's main branch at a3a97043ee93.
@@ -61,7 +62,8 @@ WRITTEN = (
     # The recoveries take turns, also over successes of what they rescue; a halt forgets whose turn it is.
     (
         '<RecoveryNode number_of_retries="6"><Leaf name="a" say="FRFFS"/><RoundRobin wrap_around="true">'
-        '<Leaf name="b" say="RS"/><Leaf name="c" say="S"/><Leaf name="d" say="FS"/></RoundRobin></RecoveryNode>',
+        '<Leaf name="b" say="RS"/><Leaf name="c" say="S"/><Leaf name="d" say="FS"/></RoundRobin>'
+        "</RecoveryNode>",
         "ttttttttthtttttt",
     ),
     (
