@@ -78,3 +78,11 @@ def test_nodes_of_one_program_follow_their_own_rules(bus: Bus) -> None:
     node = bus.create_node("n", "r", remappings={"chatter": "/talk", "~/x": "x"})
     assert node.create_publisher(String, "chatter").name == "/talk"
     assert node.resolve_name("~/x") == "/r/x"
+
+
+@pytest.mark.parametrize("name", ["{ns}", "{namespace}"])
+def test_the_namespace_of_the_root_is_a_slash(name: str) -> None:
+    """rcl substitutes '/', so '{ns}scan' is '/scan' and '{ns}/scan' no name."""
+    assert expand(f"{name}scan", "/", "amcl") == "/scan"
+    with pytest.raises(BridgeError, match="it becomes //scan, with //"):
+        expand(f"{name}/scan", "/", "amcl")

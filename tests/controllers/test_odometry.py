@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from twin.controllers.odometry import Odometry, OdometryConfig
+from twin.geometry import Pose2
 
 CONFIG = OdometryConfig(wheel_radius=0.05, track=0.3)
 
@@ -42,3 +43,27 @@ def test_covariance_grows_and_stays_symmetric_positive() -> None:
     assert np.trace(long) > np.trace(short) > 0.0
     np.testing.assert_allclose(long, long.T)
     assert np.linalg.eigvalsh(long).min() >= -1e-15
+
+
+def test_covariance_is_that_of_the_numerical_jacobian_of_the_motion() -> None:
+    """P = F P Fᵀ + Q over every step; F by differences of the pose, Q that of the step from a sure pose."""
+
+    def moved(pose: np.ndarray, steps: tuple[float, float]) -> Odometry:
+        one = Odometry(CONFIG)
+        one.update(0.0, 0.0, 0.1)
+        one.pose = Pose2(*pose.tolist())
+        one.update(*steps, 0.1)
+        return one
+
+    turn, straight, gentle = (-2.7, 2.7), (12.0, 12.0), (11.8, 12.2)  # 0.9 rad, 0.6 m, 0.07 rad over 0.6 m
+    odometry, P, left, right = Odometry(CONFIG), np.zeros((3, 3)), 0.0, 0.0
+    odometry.update(left, right, 0.1)
+    for steps in (turn, straight, straight, gentle, turn, straight, gentle):
+        pose = np.array(odometry.pose)
+        sides = ((moved(pose + d, steps).pose, moved(pose - d, steps).pose) for d in 1e-5 * np.eye(3))
+        F = np.column_stack([(np.array(after) - before) / 2e-5 for after, before in sides])
+        P = F @ P @ F.T + moved(pose, steps).covariance
+        left, right = left + steps[0], right + steps[1]
+        odometry.update(left, right, 0.1)
+        np.testing.assert_allclose(odometry.covariance, P, atol=2e-3 * np.abs(P).max())
+    assert abs(P[0, 1]) > 0.1 * P[0, 0], "the errors of x and y belong together"

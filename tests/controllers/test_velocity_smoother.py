@@ -57,3 +57,18 @@ def test_scaled_velocities_brake_on_the_commanded_curve() -> None:
     assert len(moving) > 40
     assert all(w / v == pytest.approx(1.5) for v, w in moving)
     assert speeds[-1] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("linear", "angular"), [(0.1, 0.0), (0.0, 0.1)])
+def test_each_axis_has_its_own_deadband(linear: float, angular: float) -> None:
+    """As nav2_velocity_smoother's deadband_velocity: what is too slow to move the robot is sent as zero."""
+    still = VelocitySmootherConfig(deadband_linear=linear, deadband_angular=angular)
+    smoother = VelocitySmoother(still)
+    smoother.set_command(0.05, 0.05)
+    for _ in range(20):
+        sent = smoother.update(0.02)
+    assert sent == (0.0 if linear else 0.05, 0.0 if angular else 0.05)
+    smoother.set_command(-0.05, -0.05)
+    for _ in range(20):
+        sent = smoother.update(0.02)
+    assert sent == (0.0 if linear else -0.05, 0.0 if angular else -0.05)

@@ -178,6 +178,26 @@ def test_mimic_with_offset_and_multiplier_follows() -> None:
     assert data.joint("follow").qpos[0] == pytest.approx(0.5 - 2 * 0.4, abs=1e-3)
 
 
+def test_a_mimic_of_a_mimic_moves_by_both_multipliers_and_its_inertia_counts_so() -> None:
+    joint = "<joint name='{0}' type='continuous'><parent link='base'/><child link='{1}'/>{2}</joint>"
+    links = "".join(f"<link name='{name}'>{INERTIAL}</link>" for name in ("base", "l", "f", "g"))
+    mimic = "<mimic joint='{}' multiplier='{}'/>"
+    text = (
+        f"<robot name='r'>{links}"
+        + joint.format("lead", "l", "")
+        + joint.format("follow", "f", mimic.format("lead", -2))
+        + joint.format("last", "g", mimic.format("follow", 1.5))
+        + f"{COMMAND}</robot>"
+    )
+    model = convert(parse_urdf(text, Path("r.urdf")), base="fixed").spec.compile()
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 0.1
+    mujoco.mj_step(model, data, 2000)
+    assert data.joint("last").qpos[0] == pytest.approx(-2 * 1.5 * 0.1, abs=1e-3)
+    moved = 1.0 + (-2) ** 2 + (-2 * 1.5) ** 2  # each link turns with 1 kg m²
+    assert model.actuator("lead").gainprm[0] == pytest.approx(moved * 100.0**2)
+
+
 def test_contact_parameters_of_wheels_casters_and_pads() -> None:
     model = convert(load("warehouse_bot")).spec.compile()
 

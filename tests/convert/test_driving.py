@@ -10,6 +10,7 @@ import mujoco
 import pytest
 
 from twin.convert import convert
+from twin.geometry import Pose3
 from twin.models import load
 from twin.models.description import RobotDescription
 
@@ -30,6 +31,16 @@ def with_flipped_axis(description: RobotDescription, joint: str) -> RobotDescrip
     x, y, z = description.joints[joint].axis
     flipped = replace(description.joints[joint], axis=(-x, -y, -z))
     return replace(description, joints={**description.joints, joint: flipped})
+
+
+def nose_heavy(robot: str) -> RobotDescription:
+    """Two thirds and more of the weight on the front wheels."""
+    description = load(robot)
+    base = description.links["base_link"]
+    assert base.inertial is not None
+    forward = Pose3.from_xyz_rpy((0.05, 0.0, 0.0)) @ base.inertial.T_link_com
+    heavy = replace(base, inertial=replace(base.inertial, T_link_com=forward))
+    return replace(description, name="nose_heavy", links={**description.links, "base_link": heavy})
 
 
 @pytest.mark.parametrize("robot", ["diff_bot", "warehouse_bot"])
@@ -69,10 +80,12 @@ def test_skid_steer_turns_as_coulomb_friction_says(speed: float, bare_world: Cal
 
 
 @pytest.mark.parametrize("timestep", [0.002, 0.005])
-@pytest.mark.parametrize("robot", ["diff_bot", "sp1s", "warehouse_bot"])
-def test_wheels_carry_the_robot_where_they_touch(robot: str, timestep: float) -> None:
+@pytest.mark.parametrize(
+    "robot", [load("diff_bot"), load("sp1s"), nose_heavy("sp1s"), load("warehouse_bot")], ids=lambda r: r.name
+)
+def test_wheels_carry_the_robot_where_they_touch(robot: RobotDescription, timestep: float) -> None:
     """A wheel that sinks in rolls with a smaller radius: 23 mm of 5 m were missing."""
-    conversion = convert(load(robot), timestep=timestep)
+    conversion = convert(robot, timestep=timestep)
     spec = mujoco.MjSpec()
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

@@ -40,3 +40,16 @@ def test_a_trajectory_passes_its_way_points_and_holds_its_ends() -> None:
     assert trajectory.sample(-1.0) == pytest.approx([0.0])
     assert trajectory.sample(1.0) == pytest.approx([2.0])
     assert trajectory.sample(9.0) == pytest.approx([1.0])
+
+
+def test_a_move_takes_no_longer_and_no_shorter_than_its_limits_allow() -> None:
+    """Where acceleration decides, its peak is the limit; where velocity does, that is."""
+    for span, of in ((0.05, "acceleration"), (1.0, "velocity")):
+        trajectory = plan_joint_move({"lift": 0.0}, {"lift": span}, LIMITS, step=0.001)
+        velocity = trajectory.velocities[:, 0]
+        acceleration = np.diff(velocity) / np.diff(trajectory.times)
+        peaks = {"velocity": velocity.max() / 0.4, "acceleration": np.abs(acceleration).max() / 0.5}
+        assert peaks[of] == pytest.approx(1.0, abs=2e-3)
+        assert max(peaks.values()) < 1.002
+    slow = plan_joint_move({"lift": 0.0}, {"lift": 1.0}, LIMITS, speed=0.5)
+    assert slow.velocities.max() == pytest.approx(0.2, rel=0.01)

@@ -56,6 +56,9 @@ class Robot:
         self.stalls = True
         self.log: list[str] = []
         self.at_closing: list[GraspPose] = []
+        self.gripping = False
+        self.haste: list[tuple[bool, float]] = []
+        """Of every longer move: whether it carried something, and its top speed as a share of the limit."""
         self.failures: dict[str, list[str]] = {}
         """Action -> reasons with which its next goals fail."""
         self.effort = 80.0
@@ -135,6 +138,10 @@ class Robot:
         return f"go {pose.x:.2f} {pose.y:.2f} {pose.yaw:.2f}"
 
     def _move(self, goal: Any) -> str:
+        rates = np.abs([point.velocities for point in goal.trajectory.points]).max(axis=0)
+        limits = [self.manipulator.arm.limits[name].max_velocity for name in goal.trajectory.joint_names]
+        if goal.trajectory.points[-1].time_from_start.sec >= 1:
+            self.haste.append((self.gripping, float(np.max(rates / limits))))
         target = dict(zip(goal.trajectory.joint_names, goal.trajectory.points[-1].positions, strict=True))
         self.positions |= {name: float(value) for name, value in target.items()}
         return "move"
@@ -148,6 +155,7 @@ class Robot:
         position = 0.12 if holds else wanted
         self.positions[self.manipulator.gripper_joint] = position
         self.log.append("close" if closing else "open")
+        self.gripping = holds
         return new(
             GripperCommand.Result,
             position=position,
@@ -201,6 +209,14 @@ def test_it_reaches_for_where_the_tote_is_seen_not_for_where_the_plan_says(robot
     assert at.x == pytest.approx(centre.x, abs=0.02)
     assert at.z == pytest.approx(0.8 + 0.09), "the middle of the tote's height"
     assert at.yaw == pytest.approx(TOTE_IN_BASE.yaw)
+
+
+def test_a_loaded_arm_moves_at_half_its_speed(robot: Robot) -> None:
+    robot.run()
+    loaded = [share for carries, share in robot.haste if carries]
+    free = [share for carries, share in robot.haste if not carries]
+    assert max(loaded) == pytest.approx(0.5, abs=0.02)
+    assert max(free) == pytest.approx(1.0, abs=0.02)
 
 
 def test_two_totes_come_one_after_the_other(robot: Robot) -> None:

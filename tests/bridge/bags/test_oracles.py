@@ -245,3 +245,26 @@ def test_messages_of_unknown_types_are_kept_or_counted(tmp_path: Path) -> None:
     done = convert(tmp_path / "bag", tmp_path / "a.bag", storage="rosbag1")
     assert done.messages == 0
     assert "1 messages on /odd are left out: the type unheard_of_msgs/msg/Odd is not known" in done.notices[0]
+
+
+def test_the_library_of_mcap_finds_old_messages_in_the_chunk_that_has_them(tmp_path: Path) -> None:
+    """Readers leave out chunks by their start and end: those must hold for messages that came late too."""
+    mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    times = [5, 3, 9, 600_000_000, 200, 900_000_000, 100]
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic(BagTopic(name="/scan", type="sensor_msgs/msg/LaserScan"))
+        for time in times:
+            writer.write(BagMessage("/scan", b"x" * 8, time, time))
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        reader = mcap_reader.make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert len(summary.chunk_indexes) > 1
+        assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (
+            3,
+            900_000_000,
+        )
+        assert [m.log_time for _, _, m in reader.iter_messages()] == sorted(times)
+        early = reader.iter_messages(ending_before=150)
+        assert [m.log_time for _, _, m in early] == [3, 5, 9, 100]
+        late = reader.iter_messages(starting_at=150)
+        assert [m.log_time for _, _, m in late] == [200, 600_000_000, 900_000_000]

@@ -275,3 +275,15 @@ def test_waiting() -> None:
     assert len(log) == 20
     assert log[-1].done
     assert all((step.v, step.w) == (0.0, 0.0) for step in log)
+
+
+def test_the_last_metre_is_not_slower_than_the_least_approach_speed() -> None:
+    """nav2_regulated_pure_pursuit, approachVelocityConstraint: min_approach_linear_velocity holds."""
+    for left, want in ((0.3, 0.25), (0.06, 0.08), (0.03, 0.08)):
+        controller = rpp(
+            max_robot_pose_search_dist=9.0, min_approach_linear_velocity=0.08, use_rotate_to_heading=False
+        )
+        controller.reset()
+        pose = Pose2(5.0 - left, 0.0, 0.0)
+        v, _ = controller.compute_velocity(pose, (0.5, 0.0), line(5.0), None, DT)
+        assert v == pytest.approx(want), left

@@ -269,3 +269,24 @@ def test_retargeting_moves_the_line() -> None:
     dock.retarget(Pose2(1.0, 0.03, 0.0))
     assert dock.errors(Pose2(0.0, 0.0, 0.0)) == pytest.approx((1.0, -0.03, 0.0))
     assert dock.update(Pose2(0.0, 0.0, 0.0), 0.05).w > 0.0
+
+
+@pytest.mark.parametrize(("x", "width"), [(2.0, 0.3), (1.6, 0.24), (2.0, 0.6)])
+def test_the_width_of_a_face_is_not_short_by_a_beam(x: float, width: float) -> None:
+    """From the first to the last hit is one beam less than the face, at 2 m 17 mm."""
+    found = []
+    for aside in np.linspace(-0.01, 0.01, 9):
+        scene = [*box(Pose2(x, aside, 0.0), width, 0.3), (3.0, -5.0, 3.0, 5.0)]
+        found += [face.width for face in find_box_faces(cast(scene), width) if face.pose.x < x + 0.1]
+    assert len(found) == 9
+    assert np.mean(found) == pytest.approx(width, abs=0.006)
+
+
+def test_a_charger_a_beam_too_narrow_is_another_thing() -> None:
+    """The plan's width is compared with the face's, not with the distance of its first and last hit."""
+    for width, is_it in ((0.6, True), (0.578, True), (0.563, False), (0.622, True), (0.637, False)):
+        config = DockEstimateConfig(width_tolerance=0.03)
+        dock = DockEstimate(Pose2(2.0, 0.0, 0.0), config, wants_tote=False, face_width=0.6)
+        for aside in np.linspace(-0.01, 0.01, 9):
+            dock.take_scan(cast([(2.0, aside - width / 2, 2.0, aside + width / 2)]), ORIGIN)
+        assert dock.seen == is_it, width

@@ -169,3 +169,14 @@ def test_what_is_not_known_of_a_gyroscopes_bias_makes_the_heading_unsure() -> No
     known = sum(bias.drift(0.02) for _ in range(500))
     assert known < 0.1 * unknown
     assert np.abs(bias.value - 8e-4).max() < 4.0 * np.sqrt(known) / 10.0
+
+
+def test_a_heading_is_taken_in_the_short_way_round() -> None:
+    """3.1 rad estimated, -3.1 rad measured: 0.083 rad apart; by equal trust the mean is ±pi."""
+    for estimated, measured in ((3.1, -3.1), (-3.1, 3.1), (0.1, 0.1 + 2.0 * math.pi)):
+        ekf = started(two_d=True)
+        ekf.state[YAW] = estimated
+        assert ekf.correct([YAW], [measured], [[0.1]], threshold=1.0), "near enough"
+        apart = math.remainder(measured - estimated, 2.0 * math.pi)
+        assert math.remainder(ekf.state[YAW] - estimated - apart / 2.0, 2.0 * math.pi) == pytest.approx(0.0)
+        assert ekf.covariance[YAW, YAW] == pytest.approx(0.05)

@@ -261,6 +261,27 @@ def test_any_angle_paths_go_through_no_corner() -> None:
     assert path[:, 1].min() == 0.5, "round the outside"
 
 
+@pytest.mark.parametrize("config", [EXACT, ThetaStarConfig(tolerance=0.0)], ids=["A*", "Theta*"])
+def test_no_path_touches_a_corner_of_what_is_in_the_way(config: PlannerConfig | ThetaStarConfig) -> None:
+    """Neither does it cross an obstacle, nor squeeze through the point between two cells if one is lethal."""
+    planned = 0
+    for seed in range(60):
+        free = np.random.default_rng(seed).random((9, 9)) > 0.25
+        free[0, 0] = free[8, 8] = True
+        costmap = Costmap(costs=np.where(free, 0, 254).astype(np.uint8), resolution=1.0)
+        try:
+            path = plan(costmap, centre(0, 0), centre(8, 8), config)[:, :2]
+        except NoValidPath:
+            continue
+        planned += 1
+        fine = np.linspace(path[:-1], path[1:], 64, axis=1)
+        # Nobody is nearer than 1e-3 to a blocked cell: all cells at the four corners of that box are free.
+        for dx, dy in itertools.product((-1e-3, 1e-3), repeat=2):
+            x, y = np.floor(fine + np.array([dx, dy])).astype(int).reshape(-1, 2).T
+            assert free[y, x].all(), f"seed {seed}"
+    assert planned > 20
+
+
 def test_a_planner_kept_for_many_maps_forgets_each_of_them() -> None:
     kept = Planner(config=EXACT)
     open_field, wall = grid("...", "...", "..."), grid("...", "@@.", "...")

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.msgs import Odometry
 from twin.errors import ScenarioError
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario, load
@@ -127,6 +129,36 @@ def test_a_kidnapped_robot_finds_itself_and_drives_to_its_goal(drive: Drive, at:
     run = drive(f"kidnapping: {{to: {to}, at: {at}}}")
     assert run.parts.mission.succeeded, run.parts.mission.reason
     assert off_goal(run) < 0.15
+
+
+JUMP = """
+name: jump
+seed: 1
+duration: 2 s
+robots: [{model: diff_bot}]
+mission: {type: velocity_profile, robot: diff_bot, steps: [{duration: 1 s, linear: 0 m/s}]}
+faults: [odometry_jump: {distance: 0.3 m, yaw: 40 deg, at: 0.5 s}]
+checks: [mission_succeeded: ]
+"""
+
+
+def test_odometry_jumps_ahead_and_to_the_left_by_what_the_fault_says(
+    scenario: Callable[[str], Scenario], make_run: Callable[..., Run]
+) -> None:
+    run = make_run(scenario(JUMP))
+    got: list[Odometry] = []
+    run.bus.create_node("listener").create_subscription(Odometry, "/odom", got.append)
+    while not run.over:
+        run.tick()
+    before, after = (pose2_from_pose(message.pose.pose) for message in (got[0], got[-1]))
+    jump = before.inverse() @ after
+    half = math.radians(20.0)
+    assert jump.yaw == pytest.approx(2.0 * half, abs=0.01)
+    chord = 0.3 * math.sin(half) / half
+    assert (jump.x, jump.y) == pytest.approx((chord * math.cos(half), chord * math.sin(half)), abs=0.005)
+    assert run.world.pose("diff_bot/base_link").xyz[:2] == pytest.approx([0.0, 0.0], abs=0.01), (
+        "nothing moved"
+    )
 
 
 @pytest.mark.slow

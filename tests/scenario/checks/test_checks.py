@@ -143,6 +143,9 @@ def test_no_collision() -> None:
         "hardest: bot/base_link hit rack_a with 80.0 N at 2.00 s"
     )
     assert not fold({"no_collision": None}, [at(1, contacts=[touch("wall", 1e-6)])]).passed
+    just = [at(1, contacts=[touch("wall", 5.0)]), at(2, moved={"bot"})]
+    assert fold(entry, just).passed, "up to max_force"
+    assert not fold(entry, [at(1, contacts=[touch("wall", 5.001)]), *just]).passed
     assert fold({"no_collision": {"robot": "other"}}, [*hard, at(4, moved={"walker"})]).passed
 
 

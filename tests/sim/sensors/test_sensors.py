@@ -27,6 +27,9 @@ def sample(
     return sensor.sample(world.time_ns)
 
 
+NOISY = replace(LIDAR, noise_stddev=0.02, samples=2000, angle_min=-1.0, angle_max=1.0)
+
+
 def walls_at(pose: Pose2, angles: np.ndarray) -> np.ndarray:
     """Distance from a point to the walls x = ±3, y = ±2 along each angle of its own frame."""
     with np.errstate(divide="ignore"):
@@ -83,6 +86,18 @@ def test_lidar_noise_has_the_stated_spread(room: Scene) -> None:
         sample(room, noisy, pose, seed=1).ranges, sample(room, noisy, pose, seed=1).ranges
     )
     assert not np.array_equal(sample(room, noisy, pose).ranges, sample(room, noisy, pose, seed=1).ranges)
+
+
+def test_the_noise_of_every_scan_is_another(room: Scene) -> None:
+    world = World.compose(room, [placed(Pose2(0.4, -0.3, 0.7), "kinematic", sensors=(NOISY,))])
+    (lidar,) = world.robots["cart"].sensors
+    truth = walls_at(Pose2(0.4, -0.3, 0.7) @ Pose2(0.05, 0.0, 0.0), np.linspace(-1.0, 1.0, 2000))
+    errors = []
+    for _ in range(3):
+        errors.append(lidar.sample(world.time_ns).ranges - truth)
+        world.step(50)
+    correlation = np.corrcoef(errors)[np.triu_indices(3, 1)]
+    assert np.abs(correlation).max() < 0.1
 
 
 def test_lidar_sees_collision_shapes_of_other_robots_not_their_visuals(room: Scene) -> None:

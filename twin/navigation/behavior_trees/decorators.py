@@ -54,7 +54,7 @@ class SubTree(_Map):
 
 
 class _Again(DecoratorNode):
-    """Runs its child again after one kind of end, up to so many times (-1: for ever); once a tick."""
+    """Runs its child again after one kind of end, up to so many times (-1: for ever)."""
 
     AGAIN: ClassVar[Status]
     LIMIT: ClassVar[str]
@@ -64,22 +64,24 @@ class _Again(DecoratorNode):
         self._count = 0
 
     def tick(self) -> Status:
-        """Tick the child."""
+        """Tick the child until it runs or ends in the other way."""
         self.set_status(Status.RUNNING)
         limit = self.get(self.LIMIT)
-        if limit != -1 and self._count >= limit:
-            return self._end(self.AGAIN)
-        status = self.child.execute_tick()
-        if status is Status.RUNNING:
-            return status
-        self.child.reset()
-        if status is Status.SKIPPED:
-            return status
-        if status is not self.AGAIN:
-            return self._end(status)
-        self._count += 1
-        # BehaviorTree.CPP too returns between two runs of a child, so that a halt can come between them.
-        return Status.RUNNING if limit == -1 or self._count < limit else self._end(status)
+        while limit == -1 or self._count < limit:
+            was_idle = self.child.status is Status.IDLE
+            status = self.child.execute_tick()
+            if status is Status.RUNNING:
+                return status
+            self.child.reset()
+            if status is Status.SKIPPED:
+                return status
+            if status is not self.AGAIN:
+                return self._end(status)
+            self._count += 1
+            if was_idle and (limit == -1 or self._count < limit):
+                self.context.woken = True  # so that a halt can come between two runs
+                return Status.RUNNING
+        return self._end(self.AGAIN)
 
     def halt(self) -> None:
         """Count from zero."""

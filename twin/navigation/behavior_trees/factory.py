@@ -22,6 +22,9 @@ from twin.navigation.behavior_trees.xml_file import Element, TreeFile, read_file
 _DEEPEST = 64
 """More levels than this are a mistake; BehaviorTree.CPP allows 256."""
 
+_MOST_WAKE_UPS = 1000
+"""In one tick. BehaviorTree.CPP never returns from a `Repeat` for ever of what succeeds at once."""
+
 Registry = Mapping[str, type[TreeNode]]
 """Type as the XML writes it -> class."""
 
@@ -77,12 +80,23 @@ class Tree:
         self.blackboard = blackboard
 
     def tick(self) -> Status:
-        """Tick from the root; its status."""
-        return self.root.execute_tick()
+        """Tick from the root, again while a node asks for it (BehaviorTree.CPP's tickOnce); its status."""
+        status, context = self.root.execute_tick(), self.root.context
+        for _ in range(_MOST_WAKE_UPS):
+            if status is not Status.RUNNING or not context.woken:
+                break
+            context.woken = False
+            status = self.root.execute_tick()
+        if status.is_completed:
+            self.root.set_status(Status.IDLE)
+        return status
 
     def halt(self) -> None:
-        """Stop whatever runs; the tree begins anew at the next tick."""
+        """Stop whatever runs, and have every node begin anew at the next tick (haltTree)."""
         self.root.reset()
+        for node in self.nodes():
+            if node.children:
+                node.halt()
 
     def nodes(self) -> Iterator[TreeNode]:
         """Iterate over all nodes, parents first."""

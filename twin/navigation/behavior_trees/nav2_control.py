@@ -32,7 +32,8 @@ class PipelineSequence(ControlNode):
         super().halt()
 
     def _end(self, status: Status) -> Status:
-        self.halt()
+        self._furthest = 0
+        self.reset_children()
         return status
 
 
@@ -108,17 +109,16 @@ class RoundRobin(ControlNode):
             if status is Status.RUNNING:
                 return status
             self._current += 1
-            is_last = self._current == count
-            if is_last and self.get("wrap_around"):
+            self._failed += status is Status.FAILURE
+            skipped += status is Status.SKIPPED
+            if self._current == count:
+                if not self.get("wrap_around"):
+                    break
                 self._current = 0
-            elif is_last:
-                break
             if status is Status.SUCCESS:
                 self._failed = 0
                 self.reset_children()
                 return status
-            self._failed += status is Status.FAILURE
-            skipped += status is Status.SKIPPED
         self.halt()
         return Status.SKIPPED if skipped == count else Status.FAILURE
 

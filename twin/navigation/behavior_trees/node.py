@@ -43,6 +43,8 @@ class TreeContext:
         """Told of every change of a node's status."""
         self.on_recovery: Callable[[str], None] = lambda name: None
         """Told when a `RoundRobin`, which holds the recoveries in Nav2's trees, starts one of them."""
+        self.woken = False
+        """A node that runs had no need to wait: the tree is to be ticked again at once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,8 +155,9 @@ class ControlNode(TreeNode):
     CHILDREN: ClassVar[tuple[int, int | None]] = (1, None)
 
     def halt(self) -> None:
-        """Reset the children."""
+        """Reset the children, and be idle."""
         self.reset_children()
+        self.set_status(Status.IDLE)
 
 
 class DecoratorNode(TreeNode):
@@ -176,8 +179,9 @@ class DecoratorNode(TreeNode):
         return status
 
     def halt(self) -> None:
-        """Reset the child."""
+        """Reset the child, and be idle."""
         self.child.reset()
+        self.set_status(Status.IDLE)
 
 
 class ConditionNode(TreeNode):

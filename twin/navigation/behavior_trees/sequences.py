@@ -12,6 +12,8 @@ class _InOrder(ControlNode):
 
     GO_ON: ClassVar[Status]
     STOP: ClassVar[Status]
+    INTERRUPTIBLE: ClassVar[bool] = False
+    """Whether the tree is ticked from its root between two children that end at once."""
 
     def __init__(self, setup: NodeSetup) -> None:
         super().__init__(setup)
@@ -24,7 +26,9 @@ class _InOrder(ControlNode):
             self._skipped = 0
         self.set_status(Status.RUNNING)
         while self._current < len(self.children):
-            status = self.children[self._current].execute_tick()
+            child = self.children[self._current]
+            was_idle = child.status is Status.IDLE
+            status = child.execute_tick()
             if status is Status.RUNNING:
                 return status
             if status is self.STOP:
@@ -32,6 +36,14 @@ class _InOrder(ControlNode):
                 return status
             self._skipped += status is Status.SKIPPED
             self._current += 1
+            if (
+                self.INTERRUPTIBLE
+                and was_idle
+                and status is self.GO_ON
+                and self._current < len(self.children)
+            ):
+                self.context.woken = True
+                return Status.RUNNING
         all_skipped = self._skipped == len(self.children)
         self.reset_children()
         self._current = self._skipped = 0
@@ -61,6 +73,8 @@ class Fallback(_InOrder):
 
 class SequenceWithMemory(Sequence):
     """A sequence that after a failure or a halt goes on with the child that was not done."""
+
+    INTERRUPTIBLE = True
 
     def _stopped(self) -> None:
         for child in self.children[self._current :]:

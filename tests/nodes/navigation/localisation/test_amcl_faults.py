@@ -16,9 +16,11 @@ from twin.bridge.msgs import (
     LaserScan,
     PoseWithCovariance,
     PoseWithCovarianceStamped,
+    TFMessage,
     Twist,
     header,
     new,
+    ns,
 )
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty, SetInitialPose
@@ -161,6 +163,17 @@ def test_an_update_without_motion_on_request(bench: Bench) -> None:
     bench.call(Empty, "request_nomotion_update", new(Empty.Request))
     bench.run(0.2)
     assert len(robot.poses) == count + 1
+
+
+def test_map_to_odom_is_stamped_ahead_by_the_tolerance(bench: Bench) -> None:
+    """As nav2_amcl does, so that a robot's place is known between two scans."""
+    robot = Localised(bench, config=AmclNodeConfig(transform_tolerance_ns=400_000_000))
+    sent = bench.listen(TFMessage, "/tf", 100)
+    robot.drive(1.0)
+    stamps = [ns(t.header.stamp) for m in sent for t in m.transforms if t.header.frame_id == "map"]
+    scans = {step * 100_000_000 - 20_000_000 + 400_000_000 for step in range(12)}
+    assert len(stamps) >= 8
+    assert set(stamps) <= scans
 
 
 def test_initial_poses_by_parameter_and_by_service(bench: Bench) -> None:

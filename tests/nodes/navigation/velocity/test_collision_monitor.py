@@ -50,6 +50,8 @@ def test_what_stop_slowdown_and_limit_do() -> None:
     assert monitor(slow).process(command, points(4)).velocity == pytest.approx((0.24, 0.3))
     assert monitor(limit).process(command, points(4)).velocity == pytest.approx((0.4, 0.5)), "same curvature"
     assert monitor(limit).process((0.1, 0.1), points(4)) == Action((0.1, 0.1))
+    assert monitor(limit).process((0.2, -2.0), points(4)).velocity == pytest.approx((0.05, -0.5)), "turning"
+    assert monitor(limit).process((0.0, 1.0), points(4)).velocity == pytest.approx((0.0, 0.5)), "on the spot"
     for one in (stop, slow, limit):
         assert monitor(one).process(command, points(3)) == Action(command), "too few points"
         assert monitor(one).process(command, points(9, x=0.7)) == Action(command), "outside"
