@@ -164,11 +164,14 @@ def read(path: Path, error: type[TwinError]) -> Document:
 def _from_here(value: Any) -> Any:
     """Return an override with the files that it names as seen from the current folder, where it was typed."""
     if isinstance(value, dict):
-        return {key: _from_here(item) for key, item in value.items()}
+        return {_from_here(key): _from_here(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_from_here(item) for item in value]
-    is_path = isinstance(value, str) and ("/" in value or "." in value) and os.path.isfile(value)
-    return os.path.abspath(value) if is_path else value
+    if not isinstance(value, str):
+        return value
+    file, colon, name = value.rpartition(":") if ".py:" in value else (value, "", "")
+    is_path = ("/" in file or "." in file) and os.path.isfile(file)
+    return f"{os.path.abspath(file)}{colon}{name}" if is_path else value
 
 
 def apply_override(document: Document, dotted: str, text: str) -> None:
