@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from twin.cli import examples, exec, play, run, schema
+from twin.cli import examples, exec, new, play, run, schema
 from twin.cli.bench import app as bench_app
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
@@ -37,6 +37,7 @@ _COMMANDS = (
     ("run", run.run, _SCENARIOS, "twin run warehouse --seed 7 --set robots.0.pose.x=1.5"),
     ("test", batch.run_batch, _SCENARIOS, "twin test scenarios --junit results.xml"),
     ("play", play.play, _SCENARIOS, "twin play runs/warehouse/20261121-101500"),
+    ("new", new.new, _SCENARIOS, "twin new my_robot"),
     ("scenarios", scenarios.scenarios, _SCENARIOS, "twin scenarios"),
     ("arenas", arenas.arenas, _SCENARIOS, "twin arenas"),
     ("examples", examples.examples, _SCENARIOS, "twin examples talker"),
@@ -62,7 +63,7 @@ _GROUPS = (
     ("bag", bag.app),
 )
 
-_NEED_ARGUMENTS = ("run", "exec", "play", "check", "tree", "graph", "convert", "view")
+_NEED_ARGUMENTS = ("run", "new", "exec", "play", "check", "tree", "graph", "convert", "view")
 
 for _name, _function, _panel, _example in _COMMANDS:
     app.command(
