@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -160,6 +161,19 @@ def read(path: Path, error: type[TwinError]) -> Document:
     return document
 
 
+def _from_here(value: Any) -> Any:
+    """Return an override with the files that it names as seen from the current folder, where it was typed."""
+    if isinstance(value, dict):
+        return {_from_here(key): _from_here(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_from_here(item) for item in value]
+    if not isinstance(value, str):
+        return value
+    file, colon, name = value.rpartition(":") if ".py:" in value else (value, "", "")
+    is_path = ("/" in file or "." in file) and os.path.isfile(file)
+    return f"{os.path.abspath(file)}{colon}{name}" if is_path else value
+
+
 def apply_override(document: Document, dotted: str, text: str) -> None:
     """Set one value; whether its keys exist is the schema's business, indices must exist here."""
     name = f"{dotted}={text}"
@@ -191,7 +205,7 @@ def apply_override(document: Document, dotted: str, text: str) -> None:
         if last:
             document.overrides[tuple(keys)] = name
             given = Document(document.file)
-            target[keys[-1]] = None if node is None else _construct(given, node, tuple(keys), ())
+            target[keys[-1]] = None if node is None else _from_here(_construct(given, node, tuple(keys), ()))
             document.problems += [Problem(f"override {name}: {p.message}") for p in given.problems]
             document.outsized += [Problem(f"override {name}: {p.message}") for p in given.outsized]
         else:

@@ -1,0 +1,1 @@
+"""What my_robot brings for twin."""
