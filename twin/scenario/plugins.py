@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema
 from twin.errors import PluginError
 from twin.plugins import Kind, Plugin
 from twin.scenario.fields import OneOf
-from twin.strict_yaml import Fault, Faults, StrictModel, findings
+from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
 
 
 class PluginUse(StrictModel):
@@ -53,24 +53,24 @@ def reference(kind: Kind[Any]) -> AfterValidator:
     return AfterValidator(lambda text, info: located(kind, text, info)[0])
 
 
-def located(kind: Kind[Any], text: str, info: ValidationInfo) -> tuple[str, Plugin[Any]]:
+def located(kind: Kind[Any], text: str, info: ValidationInfo, at: Loc = ()) -> tuple[str, Plugin[Any]]:
     """Return a name that holds everywhere and its plugin; runs nothing of it. Raises Faults."""
     folder = (info.context or {}).get("folder", Path())
     source, _, attribute = text.rpartition(":")
     try:
         return f"{folder / source}:{attribute}" if source.endswith(".py") else text, kind.find(text, folder)
     except PluginError as wrong:
-        raise Faults([Fault((), str(problem)) for problem in wrong.problems]) from None
+        raise Faults([Fault(at, str(problem)) for problem in wrong.problems]) from None
 
 
-def use(kind: Kind[Any], text: str, params: Any, info: ValidationInfo) -> PluginUse:
+def use(kind: Kind[Any], text: str, params: Any, info: ValidationInfo, *, named_at: Loc = ()) -> PluginUse:
     """Return the use of a plugin; its parameters are checked if the run is made: `info.context["execute"]`.
 
     Raises:
         Faults: there is no such plugin, or a parameter is wrong.
         PluginError: it was executed, and is wrong itself.
     """
-    full, plugin = located(kind, text, info)
+    full, plugin = located(kind, text, info, named_at)
     params = {} if params is None else params
     if not isinstance(params, Mapping):
         raise Faults([Fault((), f"the parameters of {plugin.title} must be a mapping (key: value)")])
