@@ -41,9 +41,10 @@ def _arena(name: str) -> Arena:
     from twin.errors import ScenarioError
     from twin.scenario import schema
     from twin.warehouse import arena
+    from twin.warehouse.catalogue import catalogue
 
     path = Path(name)
-    if name in arena.catalogue() or not path.is_file() or not _is_scenario(path):
+    if name in catalogue() or not path.is_file() or not _is_scenario(path):
         return arena.load(name)
     used = schema.load(path).world.arena
     if used is None:
