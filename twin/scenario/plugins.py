@@ -19,6 +19,7 @@ from pydantic import (
 from pydantic_core import CoreSchema
 
 from twin.errors import PluginError
+from twin.parameters.texts import texts_of
 from twin.plugins import Kind, Plugin
 from twin.scenario.fields import OneOf
 from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
@@ -121,7 +122,13 @@ def _schema(config: type) -> type[StrictModel]:
     for field in dataclasses.fields(config):
         if field.init:
             default = field.default if field.default_factory is dataclasses.MISSING else None
-            fields[field.name] = (hints[field.name], ... if default is dataclasses.MISSING else default)
+            fields[field.name] = (
+                hints[field.name],
+                Field(
+                    default=... if default is dataclasses.MISSING else default,
+                    description=texts_of(config).get(field.name),
+                ),
+            )
     return create_model(config.__name__, __base__=StrictModel, __doc__=config.__doc__, **fields)
 
 
