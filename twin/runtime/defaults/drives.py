@@ -7,7 +7,7 @@ from dataclasses import replace
 from twin.errors import Problem, ScenarioError
 from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.description import RobotDescription
-from twin.scenario.missions import Behaviors, Idle, Mission, R2D2StatePublisher
+from twin.scenario.missions import Behaviors, Idle, Mission, R2D2StatePublisher, UserMission
 from twin.scenario.robots import RobotConfig
 
 
@@ -31,7 +31,7 @@ def _task(robot: RobotConfig, mission: Mission) -> str:
     """Return what moves a robot, in words; empty: nothing does."""
     if robot.navigation is not None:
         return "its navigation"
-    if isinstance(mission, Idle | R2D2StatePublisher) or mission.robot != robot.id:
+    if isinstance(mission, Idle | R2D2StatePublisher | UserMission) or mission.robot != robot.id:
         return ""
     still = isinstance(mission, Behaviors) and all(step.kind == "wait" for step in mission.steps)
     return "" if still else f"the mission {mission.type}"

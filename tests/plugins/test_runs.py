@@ -1,0 +1,237 @@
+"""Plugins in a scenario: run by `twin run` alone; whatever they do wrong ends the run in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from twin import runtime
+from twin.errors import PluginError, ScenarioError
+from twin.scenario import schema
+from twin.scenario.schema import json_schema
+from twin.scenario.verdict import Verdict
+
+CHECK = """
+from dataclasses import dataclass
+from typing import Annotated
+from twin.parameters import Metres, Positive
+from twin.scenario.checks import Check, CheckResult
+
+class Mine(Check):
+    @dataclass(frozen=True, kw_only=True)
+    class Config:
+        size: Annotated[Metres, Positive]
+        count: int = 2
+
+    def observe(self, observation):
+        pass
+
+    def result(self):
+        return CheckResult(name=self.name, passed=self.config.size == 0.03, value=self.config.size)
+"""
+MISSION = """
+from twin.nodes.missions import MissionNode
+
+class Mine(MissionNode):
+    def __init__(self, context, config):
+        super().__init__(context.bus, namespace=context.namespace)
+        self.node.create_timer(100_000_000, self.tick)
+
+    def tick(self):
+        self.finish(succeeded=True)
+"""
+SENSOR = """
+from twin.bridge.msgs import Bool
+from twin.sensors import Sensor, SensorSpec
+
+class Mine(Sensor):
+    types = ("warmth",)
+    topic, rate_hz, message = "warm", 50.0, Bool
+
+    @classmethod
+    def read(cls, element, common, report):
+        return SensorSpec(**common)
+
+    def sample(self, time_ns):
+        return True
+
+    @classmethod
+    def to_message(cls, spec, header, reading):
+        return Bool(data=reading)
+"""
+ROBOT = """<robot name="stone"><link name="base_link"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
+<collision><geometry><sphere radius="0.2"/></geometry></collision></link>
+<gazebo reference="base_link"><sensor name="skin" type="warmth"/></gazebo></robot>
+"""
+SCENARIO = """name: tiny
+duration: 0.3 s
+robots:
+  - model: ./stone.urdf
+"""
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Return a function that writes a scenario and the plugin that it names: `mine.py`."""
+
+    def write(code: str, named: str, checks: str = "  - final_pose: {x: 0, y: 0}\n") -> Path:
+        (tmp_path / "mine.py").write_text(code)
+        (tmp_path / "stone.urdf").write_text(ROBOT)
+        file = tmp_path / "tiny.yaml"
+        file.write_text(f"{SCENARIO}{named}checks:\n{checks}")
+        return file
+
+    return write
+
+
+def run(file: Path) -> Verdict:
+    return runtime.run(schema.load(file, execute=True), record=False)
+
+
+AS_CHECK = "  - mine.py:Mine: {size: 3 cm}\n"
+AS_MISSION = "mission: {type: 'mine.py:Mine'}\n"
+AS_SENSOR = "sensors: ['mine.py:Mine']\n"
+NAMED = {"check": ("", AS_CHECK), "mission": (AS_MISSION,), "sensor": (AS_SENSOR,)}
+CODE = {"check": CHECK, "mission": MISSION, "sensor": SENSOR}
+
+
+@pytest.mark.parametrize("kind", NAMED)
+def test_a_file_of_each_kind_is_used_and_its_hash_kept(kind: str, write: Write) -> None:
+    verdict = run(write(CODE[kind], *NAMED[kind]))
+    assert verdict.verdict == "pass"
+    assert list(verdict.plugins) == ["mine.py:Mine"]
+    assert verdict.plugins["mine.py:Mine"].startswith("sha256:")
+
+
+@pytest.mark.parametrize("kind", NAMED)
+def test_reading_a_scenario_and_its_schema_run_nothing(kind: str, write: Write) -> None:
+    file = write(f"raise SystemExit('this was run')\n{CODE[kind]}", *NAMED[kind])
+    assert schema.load(file).name == "tiny"
+    json_schema()
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "message"),
+    [
+        (
+            "check",
+            "pass\n",
+            "raise KeyError('x')\n",
+            r"mine.py:14: check 'mine.py:Mine' fails: KeyError: 'x'",
+        ),
+        (
+            "check",
+            "value=self.config.size",
+            "value=float('nan')",
+            r"returns a value of nan; it must be a number",
+        ),
+        ("check", "return CheckResult", "return dict", r"mine.py:7: .* returns dict as its result"),
+        (
+            "check",
+            "passed=self.config.size == 0.03",
+            "passed=None",
+            r"returns passed=None; it must be True or",
+        ),
+        (
+            "check",
+            "    def observe",
+            "    def __init__(self, *_):\n        pass\n\n    def observe",
+            r"mine.py:7: check 'mine.py:Mine' does not call super\(\).__init__\(name, config, context\)",
+        ),
+        (
+            "check",
+            "observe(self, observation)",
+            "observe(self)",
+            r"mine.py:13: .* has observe\(self\), which must",
+        ),
+        ("check", "    def result", "    def results", r"mine.py:7: check 'mine.py:Mine' lacks result\(\)"),
+        (
+            "mission",
+            "self.finish(succeeded=True)",
+            "1 / 0",
+            r"mine.py:10: mission 'mine.py:Mine' fails: ZeroDiv",
+        ),
+        (
+            "mission",
+            "super().__init__",
+            "print",
+            r"mine.py:7: mission 'mine.py:Mine' fails: (TypeError|Attribute)",
+        ),
+        (
+            "mission",
+            "(MissionNode)",
+            "",
+            r"mine.py:4: mission 'mine.py:Mine' is no MissionNode; derive it from",
+        ),
+        ("sensor", "return True", "return [][0]", r"mine.py:14: sensor 'mine.py:Mine' fails: IndexError"),
+        ("sensor", "Bool(data=reading)", "3", r"mine.py:5: sensor 'mine.py:Mine' makes a int, not a "),
+        ("sensor", "data=reading", "data='yes', x=1", r"mine.py:18: sensor 'mine.py:Mine' fails: TypeError"),
+        (
+            "sensor",
+            "return SensorSpec(**common)",
+            "pass",
+            r"mine.py:5: .* reads a NoneType from its <sensor>",
+        ),
+        ("sensor", '    types = ("warmth",)\n', "", r"mine.py:5: .* names no `types`"),
+        ("sensor", "    def sample", "    def simple", r"mine.py:5: .* lacks sample\(time_ns\)"),
+    ],
+)
+def test_what_is_wrong_names_the_plugin_and_its_line(
+    kind: str, old: str, new: str, message: str, write: Write
+) -> None:
+    assert old in CODE[kind]
+    file = write(CODE[kind].replace(old, new), *NAMED[kind])
+    with pytest.raises(PluginError, match=message) as raised:
+        run(file)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ("{size: -1}", r"tiny.yaml:6: size: must be greater than 0, not -1"),
+        ("{size: 3 kg}", r"tiny.yaml:6: size: must have a unit of length"),
+        ("{}", r"tiny.yaml:6: missing key 'size'"),
+        ("{size: 1, cuont: 3}", r"tiny.yaml:6: unknown key 'cuont'; did you mean 'count'"),
+        ("{size: 1, count: many}", r"tiny.yaml:6: count: must be a whole number"),
+        ("3", r"tiny.yaml:6: the parameters of check 'mine.py:Mine' must be a mapping"),
+    ],
+)
+def test_parameters_are_checked_by_what_the_plugin_declares(params: str, message: str, write: Write) -> None:
+    file = write(CHECK, "", f"  - mine.py:Mine: {params}\n")
+    with pytest.raises(ScenarioError, match=message):
+        run(file)
+
+
+@pytest.mark.parametrize(
+    ("named", "checks", "message"),
+    [
+        (
+            "",
+            "  - mine.py:Mien:\n",
+            r"tiny.yaml:6: .*mine.py: check 'mine.py:Mien': there is no 'Mien' in it; did",
+        ),
+        ("", "  - gone.py:Mine:\n", r"tiny.yaml:6: .*gone.py: check 'gone.py:Mine': there is no such file"),
+        (
+            "",
+            "  - no_colision:\n",
+            r"tiny.yaml:6: unknown key 'no_colision' in checks.0; did you mean 'no_coll",
+        ),
+        (
+            "mission: {type: 'gone:Mine'}\n",
+            AS_CHECK,
+            r"tiny.yaml:5: mission 'gone:Mine': there is no module 'gone'",
+        ),
+        ("sensors: ['gone:Mine']\n", AS_CHECK, r"tiny.yaml:5: .*there is no module 'gone'"),
+        ("sensors: [warmth]\n", AS_CHECK, r"tiny.yaml:5: .*there is no sensor 'warmth'"),
+    ],
+)
+def test_what_cannot_be_found_is_told_with_the_scenario_s_line(
+    named: str, checks: str, message: str, write: Write
+) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        schema.load(write(CHECK, named, checks))
