@@ -1,4 +1,4 @@
-"""Where is what the laser sees? `python examples/tf_listener.py` beside the two broadcasters."""
+"""Where in the map is what the laser sees: `python examples/tf_listener.py` beside the two broadcasters."""
 
 import math
 

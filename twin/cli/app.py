@@ -9,20 +9,21 @@ from typing import Annotated
 
 import typer
 
-from twin.cli import exec, play, run, schema
+from twin.cli import examples, exec, play, run, schema
 from twin.cli.bench import app as bench_app
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
+from twin.cli.map import arenas
 from twin.cli.model import check, convert, graph, robots, tree, view
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
-from twin.cli.run import batch
+from twin.cli.run import batch, scenarios
 from twin.errors import TwinError
 
 app = typer.Typer(
     name="twin",
     help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, ROS 2.",
-    epilog="Example: [bold]twin run scenarios/warehouse.yaml[/bold]",
+    epilog="Example: [bold]twin run warehouse[/bold]",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -33,9 +34,12 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SCENARIOS, _ROBOTS, _GRAPH, _NAVIGATION = "Scenarios", "Robot files", "ROS 2 graph", "Navigation"
 
 _COMMANDS = (
-    ("run", run.run, _SCENARIOS, "twin run scenarios/warehouse.yaml --seed 7 --set robots.0.pose.x=1.5"),
+    ("run", run.run, _SCENARIOS, "twin run warehouse --seed 7 --set robots.0.pose.x=1.5"),
     ("test", batch.run_batch, _SCENARIOS, "twin test scenarios --junit results.xml"),
     ("play", play.play, _SCENARIOS, "twin play runs/warehouse/20261121-101500"),
+    ("scenarios", scenarios.scenarios, _SCENARIOS, "twin scenarios"),
+    ("arenas", arenas.arenas, _SCENARIOS, "twin arenas"),
+    ("examples", examples.examples, _SCENARIOS, "twin examples talker"),
     ("schema", schema.schema, _SCENARIOS, "twin schema -o scenario.schema.json"),
     ("robots", robots.robots, _ROBOTS, "twin robots"),
     ("check", check.check, _ROBOTS, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),

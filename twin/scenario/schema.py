@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from twin.errors import ScenarioError
 from twin.parameters import NotNegative, Positive, Seconds
-from twin.scenario import consistency
+from twin.scenario import catalogue, consistency
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName
@@ -79,13 +79,17 @@ class Scenario(StrictModel):
         return tuple(entry.build(context) for entry in self.checks)
 
 
-def load(path: Path, overrides: Mapping[str, str] = MappingProxyType({})) -> Scenario:
-    """Read a scenario file; `overrides` maps dotted paths to YAML text (`{"robots.0.pose.x": "2 m"}`).
+def load(name_or_path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> Scenario:
+    """Read a scenario.
+
+    Args:
+        name_or_path: A name of `twin scenarios`, or a file.
+        overrides: Dotted paths to YAML text: `{"robots.0.pose.x": "2 m"}`.
 
     Raises:
         ScenarioError: With every problem of the file and of the overrides.
     """
-    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides)
+    return load_yaml(catalogue.resolve(name_or_path), Scenario, error=ScenarioError, overrides=overrides)
 
 
 def json_schema() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from twin.parameters import Hertz, Kilograms, Metres, MetresPerSecond, NotNegative, Positive, Seconds
 from twin.scenario.fields import NameOrPath, PoseConfig, RosName, known
 from twin.strict_yaml import Fault, Faults, StrictModel
-from twin.warehouse.arena import catalogue
+from twin.warehouse.catalogue import catalogue
 
 Length = Annotated[Metres, Positive]
 
@@ -65,7 +65,7 @@ class WorldConfig(StrictModel):
     """What surrounds the robots."""
 
     arena: Annotated[NameOrPath, known("arena", catalogue)] | None = None
-    """Name of a shipped arena, or path of an arena file; absent: an empty floor."""
+    """Name of an arena (`twin arenas`), or path of an arena file; absent: an empty floor."""
     obstacles: tuple[Obstacle, ...] = ()
     """Boxes added to the arena, on no map."""
     goods: tuple[GoodOverride, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -160,6 +161,16 @@ def read(path: Path, error: type[TwinError]) -> Document:
     return document
 
 
+def _from_here(value: Any) -> Any:
+    """Return an override with the files that it names as seen from the current folder, where it was typed."""
+    if isinstance(value, dict):
+        return {key: _from_here(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_from_here(item) for item in value]
+    is_path = isinstance(value, str) and ("/" in value or "." in value) and os.path.isfile(value)
+    return os.path.abspath(value) if is_path else value
+
+
 def apply_override(document: Document, dotted: str, text: str) -> None:
     """Set one value; whether its keys exist is the schema's business, indices must exist here."""
     name = f"{dotted}={text}"
@@ -191,7 +202,7 @@ def apply_override(document: Document, dotted: str, text: str) -> None:
         if last:
             document.overrides[tuple(keys)] = name
             given = Document(document.file)
-            target[keys[-1]] = None if node is None else _construct(given, node, tuple(keys), ())
+            target[keys[-1]] = None if node is None else _from_here(_construct(given, node, tuple(keys), ()))
             document.problems += [Problem(f"override {name}: {p.message}") for p in given.problems]
             document.outsized += [Problem(f"override {name}: {p.message}") for p in given.outsized]
         else:

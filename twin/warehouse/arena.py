@@ -14,27 +14,21 @@ from twin.geometry import Pose2
 from twin.sim.scene import Scene, StaticBody
 from twin.warehouse.arena_file import ArenaFile, TableEntry, slot_count
 from twin.warehouse.arena_scene import PALETTE, goods, structure
+from twin.warehouse.catalogue import catalogue
 from twin.warehouse.footprint import Rectangle
 from twin.warehouse.shelf import Shelf, Slot, Tote, Zone
 
 T = TypeVar("T")
 
-_ARENAS = Path(__file__).parent / "arenas"
-
 TOTE_JITTER = (0.015, 0.03)
 """Largest error of a tote's placement along x and y [m] and in yaw [rad]."""
-
-
-def catalogue() -> Mapping[str, Path]:
-    """Return the arenas that come with twin, by name."""
-    return {path.stem: path for path in sorted(_ARENAS.glob("*.yaml"))}
 
 
 def load(name_or_path: str | Path) -> Arena:
     """Read an arena.
 
     Args:
-        name_or_path: A name of `catalogue()`, or a file.
+        name_or_path: A name of `twin arenas`, or a file.
 
     Raises:
         ScenarioError: With every problem of the file, each with its line.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli import completion
 from twin.cli.map.map_files import Format, told, yaml_path
 from twin.files.reading import read_text
 
@@ -16,7 +17,12 @@ if TYPE_CHECKING:
 
 def render(
     name: Annotated[
-        str, typer.Argument(metavar="ARENA|SCENARIO", help="A shipped arena, an arena file or a scenario.")
+        str,
+        typer.Argument(
+            metavar="ARENA|SCENARIO",
+            help="A shipped arena, an arena file or a scenario.",
+            autocompletion=completion.arenas,
+        ),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="YAML file to write.", show_default=False)
@@ -41,9 +47,10 @@ def _arena(name: str) -> Arena:
     from twin.errors import ScenarioError
     from twin.scenario import schema
     from twin.warehouse import arena
+    from twin.warehouse.catalogue import catalogue
 
     path = Path(name)
-    if name in arena.catalogue() or not path.is_file() or not _is_scenario(path):
+    if name in catalogue() or not path.is_file() or not _is_scenario(path):
         return arena.load(name)
     used = schema.load(path).world.arena
     if used is None:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from twin.cli import completion
 from twin.cli.option_groups import takes
 from twin.errors import ModelError
 from twin.models.options import ReadOptions
@@ -16,7 +17,10 @@ from twin.models.options import ReadOptions
 RobotFile = Annotated[
     str,
     typer.Argument(
-        metavar="FILE", help="A URDF or xacro file, or a robot of `twin robots`.", show_default=False
+        metavar="FILE",
+        help="A URDF or xacro file, or a robot of `twin robots`.",
+        show_default=False,
+        autocompletion=completion.robots,
     ),
 ]
 

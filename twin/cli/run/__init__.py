@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from twin.bridge.wire import Wire
+from twin.cli import completion
 from twin.cli.run.options import RunOptions, parse_overrides, parse_pace
 
 _OTHERS = "Other processes"
@@ -15,7 +16,13 @@ _OTHERS = "Other processes"
 
 def run(
     scenario: Annotated[
-        Path, typer.Argument(metavar="SCENARIO", help="The scenario file.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="SCENARIO",
+            help="A scenario of `twin scenarios`, or a file.",
+            show_default=False,
+            autocompletion=completion.scenarios,
+        ),
     ],
     sets: Annotated[
         list[str] | None,

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from twin.cli import completion
 from twin.errors import ScenarioError
 from twin.files.reading import absence
 
@@ -17,7 +18,10 @@ def run_batch(
     paths: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="SCENARIO", help="Scenario files, or folders of them.", show_default="scenarios"
+            metavar="SCENARIO",
+            help="Names of scenarios, files, or folders of them.",
+            show_default="the folder scenarios",
+            autocompletion=completion.scenarios,
         ),
     ] = None,
     junit: Annotated[
@@ -41,7 +45,7 @@ def run_batch(
     from twin.cli.run.verdict_table import many_report
     from twin.files.writing import check_file, write_whole
 
-    files = scenario_files(paths or [Path("scenarios")])
+    files = scenario_files(paths or [own_scenarios()])
     if junit is not None:
         check_file(junit, "--junit")
     verdicts: list[dict[str, Any]] = []
@@ -61,11 +65,24 @@ def run_batch(
     raise typer.Exit(max({"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]] for verdict in verdicts))
 
 
+def own_scenarios() -> Path:
+    """Return the folder that is tested if none is named; raises ScenarioError if there is none."""
+    from twin.scenario.catalogue import FOLDER
+
+    if not FOLDER.is_dir():
+        raise ScenarioError(
+            "there is no folder 'scenarios' here; name scenarios (`twin scenarios`), files or folders of them"
+        )
+    return FOLDER
+
+
 def scenario_files(paths: list[Path]) -> list[Path]:
-    """Return the scenario files among `paths`, folders opened one level deep, each file once."""
+    """Return the files of `paths`, which may be names, folders opened one level deep, each file once."""
+    from twin.scenario.catalogue import resolve
+
     files: dict[Path, None] = {}
     for path in paths:
-        found = sorted(path.glob("*.yaml")) if path.is_dir() else [path]
+        found = sorted(path.glob("*.yaml")) if path.is_dir() else [resolve(path)]
         if not found:
             raise ScenarioError(
                 f"{path}: the folder holds no scenario (*.yaml); name files or a folder of them"
