@@ -29,14 +29,20 @@ def load_arena(name_or_path: str | Path) -> Arena:
 
 
 def load_scenario(
-    scenario: Scenario | str | Path, overrides: Mapping[str, Any] = MappingProxyType({})
+    scenario: Scenario | str | Path,
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    execute: bool = False,
 ) -> Scenario:
     """Read a scenario.
 
     Args:
-        scenario: A file; a scenario that is one already is returned as it is, if nothing is to be changed.
+        scenario: Name of one that ships with twin or is in the folder `scenarios`, or a file; what was read
+            already is returned as it is, if nothing is to be changed.
         overrides: Dotted keys of the file -> values that go before its own, as in
             `{"robots.0.pose.x": 1.5, "duration": "2 min", "checks.0.energy": {"max": "3 J"}}`.
+        execute: Whether the plugins that it names are executed, to check their parameters; else they are
+            found by reading, and a run executes them.
 
     Raises:
         ScenarioError: With every problem of the file and of the overrides, each with its line.
@@ -51,7 +57,8 @@ def load_scenario(
                 "or the file instead of the scenario"
             )
         return scenario
-    return schema.load(Path(scenario), {key: _as_yaml(value) for key, value in overrides.items()})
+    texts = {key: _as_yaml(value) for key, value in overrides.items()}
+    return schema.load(scenario, texts, execute=execute)
 
 
 def _as_yaml(value: Any) -> str:

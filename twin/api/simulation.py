@@ -16,6 +16,7 @@ from twin.api.participant import Participant
 from twin.api.truth import Truth
 from twin.errors import RecordingError, SimulationError, TwinError
 from twin.files.writing import check_file, make_folder, written_alone
+from twin.plugins import Execution
 from twin.scenario.outside import Outside
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class Simulation(Participant):
         wait_for: Sequence[str] = (),
         wait_timeout: float = 10.0,
         free: bool = False,
+        on_execute: Callable[[str], None] | None = None,
     ) -> None:
         """Prepare a run; nothing is read or opened yet.
 
@@ -77,6 +79,7 @@ class Simulation(Participant):
             wait_for: Nodes and topics of other processes with which the run is in lock-step.
             wait_timeout: How long to wait for their answers [s] of wall time.
             free: Whether others take part at their own pace; not deterministic.
+            on_execute: Called with the name of each file or module of a user's plugins before it is executed.
 
         Raises:
             SimulationError: A bag without a folder.
@@ -96,6 +99,7 @@ class Simulation(Participant):
         self._outside = partial(
             Outside, nodes=tuple(nodes), wait_for=tuple(wait_for), wait_timeout_s=wait_timeout, free=free
         )
+        self._executed = Execution(on_execute)
         self._name, self._seed = Path(str(scenario)).stem, 0
         self._clock: ClockMode = "inproc"
         self._run: OpenRun | None = None
@@ -114,7 +118,7 @@ class Simulation(Participant):
             TwinError: The run cannot be made.
         """
         if self._run is None and self._verdict is None:
-            with self._told():
+            with self._told(), self._executed.going_on():
                 self._start()
         return self
 
@@ -248,7 +252,7 @@ class Simulation(Participant):
             self._hold(Path(self._out))
         outside = self._outside()
         self._clock = outside.clock(self._network is not None or bool(self._listen))
-        scenario = load_scenario(self._given, self._overrides)
+        scenario = load_scenario(self._given, self._overrides, execute=True)
         if self._params_file is not None:
             scenario = scenario.with_params_file(Path(self._params_file).resolve())
         self._name, self._seed = scenario.name, scenario.seed
@@ -296,7 +300,13 @@ class Simulation(Participant):
     def _end_with(self, error: str) -> None:
         from twin.scenario.verdict import Verdict
 
-        verdict = Verdict(scenario=self._name, seed=self._seed, error=error, clock=self._clock)
+        verdict = Verdict(
+            scenario=self._name,
+            seed=self._seed,
+            error=error,
+            clock=self._clock,
+            plugins=self._executed.versions,
+        )
         with suppress(RecordingError):  # the error that ended the run is what its user is to see
             self._close(verdict)
         if self.folder is not None:

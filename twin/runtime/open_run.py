@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from twin.bridge.bags.tap import BagTap
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
+from twin.plugins import execution
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
@@ -88,14 +89,14 @@ class OpenRun:
         self._wall_s = self._cpu_s = 0.0
         bag_tap = None if bag is None else BagTap(bag, hidden=bag_hidden_topics)
         taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
-        parts = build(
-            scenario,
-            taps=[self._digest.on_sample, *taps],
-            network=network or SessionConfig(listen=outside.endpoints(listen)),
-            outside=outside,
-            crash_folder=out,
-        )
-        with ExitStack() as ending:
+        with execution() as self._executed, ExitStack() as ending:
+            parts = build(
+                scenario,
+                taps=[self._digest.on_sample, *taps],
+                network=network or SessionConfig(listen=outside.endpoints(listen)),
+                outside=outside,
+                crash_folder=out,
+            )
             ending.callback(parts.bus.close)
             if bag_tap is not None:
                 ending.callback(bag_tap.close)
@@ -129,10 +130,10 @@ class OpenRun:
             TwinError: The run cannot go on.
         """
         run = self.run
-        wall, cpu = time.perf_counter(), time.process_time()  # pacing is the only other use of the clock
-        shown = wall
+        shown = time.perf_counter()
+        began = shown - self._wall_s
         guard.take_again()
-        try:
+        with self._executed.going_on(), self._timed():
             while not run.over:
                 run.tick()
                 if until is not None and until():
@@ -147,11 +148,18 @@ class OpenRun:
                         Progress(
                             time_s=simulated,
                             duration_s=run.scenario.duration,
-                            real_time_factor=simulated / (self._wall_s + now - wall),
+                            real_time_factor=simulated / (now - began),
                             mission_state=run.parts.mission.state,
                         )
                     )
             return False
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """Add the time of the block to what the run took; pacing is the only other use of the clock."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        try:
+            yield
         finally:
             self._wall_s += time.perf_counter() - wall
             self._cpu_s += time.process_time() - cpu
@@ -211,6 +219,7 @@ class OpenRun:
             deterministic=clock != "free" and not (run.lockstep and run.lockstep.surplus),
             clock=clock,
             versions=versions(),
+            plugins=self._executed.versions,
             cpu=cpu_class(),
         )
 

@@ -37,7 +37,7 @@ class Run:
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
-        if any(entry.energy is not None for entry in scenario.checks):
+        if any(check.measures_work for check in self.checks):
             self.world.measure_work()
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)

@@ -79,17 +79,23 @@ class Scenario(StrictModel):
         return tuple(entry.build(context) for entry in self.checks)
 
 
-def load(name_or_path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> Scenario:
+def load(
+    name_or_path: str | Path, overrides: Mapping[str, str] = MappingProxyType({}), *, execute: bool = False
+) -> Scenario:
     """Read a scenario.
 
     Args:
         name_or_path: A name of `twin scenarios`, or a file.
         overrides: Dotted paths to YAML text: `{"robots.0.pose.x": "2 m"}`.
+        execute: Whether the plugins that it names are executed, and their parameters checked by what they
+            declare; without it they are found by reading.
 
     Raises:
         ScenarioError: With every problem of the file and of the overrides.
+        PluginError: A plugin that was executed is wrong.
     """
-    return load_yaml(catalogue.resolve(name_or_path), Scenario, error=ScenarioError, overrides=overrides)
+    file = catalogue.resolve(name_or_path)
+    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
 
 
 def json_schema() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
-from twin.cli.console import print_error, stdout
+from twin.cli.console import print_error, stderr, stdout
 from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import run_folder
 from twin.cli.run.options import RunOptions
@@ -41,6 +41,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         wait_for=options.wait_for,
         wait_timeout=options.wait_timeout,
         free=options.free,
+        on_execute=lambda file: stderr().print(f"executes {file}"),
     )
     fault = None
     try:
