@@ -125,7 +125,7 @@ def drive(controller: Controller, costmap: Costmap, path: np.ndarray) -> Result:
 def results() -> dict[str, Result]:
     """Drive with every plugin."""
     costmap = hall()
-    plan = Planner(config=PlannerConfig()).plan(costmap, START, GOAL)
+    plan = Planner(config=PlannerConfig()).create_plan(costmap, START, GOAL)
     path = SimpleSmoother().smooth(plan, costmap)
     found = {}
     for plugin in ("regulated_pure_pursuit", "dwb", "mppi"):

@@ -52,6 +52,7 @@ class RotationShimConfig:
 class RotationShim(Controller):
     """Wraps any controller."""
 
+    Config = RotationShimConfig
     config: RotationShimConfig
 
     def __init__(
@@ -89,13 +90,22 @@ class RotationShim(Controller):
     def _build(self) -> None:
         self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
 
+    def set_plan(self, path: Array) -> None:
+        """Follow another path; see `Controller.set_plan`."""
+        same = self.path is not None and len(self.path) > 0 and np.array_equal(self.path[-1], path[-1])
+        self._handler.accept(path)
+        super().set_plan(path)
+        self.primary.set_plan(path)
+        self._aligned &= same and self.config.rotate_to_heading_once
+        self._turning = self._at_goal = False
+
     def reset(self) -> None:
         """Forget the path."""
+        super().reset()
         self.primary.reset()
         self._handler.reset()
         self._turning = self._aligned = self._at_goal = self._driving = False
         self._last_w: float | None = None
-        self.carrot = None
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Pass the limit [m/s] on."""
@@ -110,19 +120,15 @@ class RotationShim(Controller):
         """Leave it to the primary controller."""
         return self.primary.cancel()
 
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
-        before = self._handler.path
-        if self._handler.accept(now.path):
-            same = before is not None and len(before) > 0 and np.array_equal(before[-1], now.path[-1])
-            self._aligned &= same and self.config.rotate_to_heading_once
-            self._turning = self._at_goal = False
-        angle = self._angle(now.pose, now.path)
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity_commands`."""
+        assert self.path is not None
+        angle = self._angle(now.pose, self.path)
         w = 0.0 if angle is None else self._turn_rate(angle, now.velocity[1], now.dt)
         # Where there is no room to turn the primary controller may know a way, as in Nav2.
         if angle is None or self._collides(now, w, angle):
             self._turning = False
-            command = self.primary.command(now)
+            command = self.primary.compute_velocity_commands(now)
             self.carrot, self._driving = self.primary.carrot, True
         else:
             command, self._driving = (0.0, w), False

@@ -14,6 +14,7 @@ from twin.navigation.control.goal_checker import GoalChecker
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.plugins import create_goal_checker, create_progress_checker
 from twin.navigation.control.progress_checker import ProgressChecker
+from twin.navigation.failures import ControlFailure
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 
@@ -89,6 +90,10 @@ def follow_goal(
     handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
     handler.accept(path)
     controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
+    try:
+        controller.set_plan(path)
+    except ControlFailure as failure:
+        raise Abort(failure.error_code, str(failure)) from failure
     return FollowGoal(
         path=path,
         controller=controller,
