@@ -7,6 +7,7 @@ TwinError
 ├── MapError          a map file is wrong
 ├── NavigationError   a behaviour tree or a file of Nav2 parameters is wrong
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
+├── PluginError       a user's plugin lacks something, cannot be found, or fails while it runs
 ├── RecordingError    a recording cannot be written or read
 └── SimulationError   the physics cannot go on (diverged)
 
@@ -105,6 +106,10 @@ class BridgeError(TwinError):
 
 class NobodyAnswersError(BridgeError):
     """Nobody listens at the endpoints of a client."""
+
+
+class PluginError(TwinError):
+    """A user's plugin lacks something, cannot be found, or fails while it runs."""
 
 
 class RecordingError(TwinError):

@@ -1,0 +1,102 @@
+"""Run a plugin's file, and keep which ones a run has executed."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from twin.plugins.installed import version_of
+
+if TYPE_CHECKING:
+    from twin.plugins.places import Place
+
+
+class Execution:
+    """The plugins that one run has executed."""
+
+    def __init__(self, tell: Callable[[str], None] | None = None) -> None:
+        """Take who is told of each file, before it is executed."""
+        self.versions: dict[str, str] = {}
+        """By the plugin's name: its package and version, or the hash of its file."""
+        self._tell, self._told = tell, set[str]()
+
+    def add(self, name: str, place: Place, version: str | None) -> None:
+        """Take a plugin that is about to be executed."""
+        version = version or version_for(place)
+        if self.versions.setdefault(name, version) != version:  # files of one name in two folders
+            self.versions[f"{place.file}:{place.attribute}"] = version
+        where = str(place.file or place.module)
+        if self._tell is not None and where not in self._told:
+            self._told.add(where)
+            self._tell(where)
+
+
+_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
+
+
+@contextmanager
+def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
+    """Keep what is executed inside of the block; blocks inside of each other keep it for the outer one."""
+    current = _CURRENT.get()
+    if current is not None:
+        yield current
+        return
+    token = _CURRENT.set(current := Execution(tell))
+    try:
+        yield current
+    finally:
+        _CURRENT.reset(token)
+
+
+def run(name: str, place: Place, version: str | None, *, kept: bool) -> Any:
+    """Import a plugin, and return what its name stands for; `kept`: whether the run tells of it."""
+    if kept and (current := _CURRENT.get()) is not None:
+        current.add(name, place, version)
+    if place.module is not None:
+        module = importlib.import_module(place.module)
+    else:
+        assert place.file is not None
+        module = _run_file(place.file)
+    found: Any = module
+    for part in place.attribute.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def version_for(place: Place) -> str:
+    """Return a package and its version, or the hash of a file's content."""
+    owner = None if place.module is None else version_of(place.module)
+    if owner is not None or place.file is None:
+        return owner or "unknown"
+    return f"sha256:{hashlib.sha256(place.file.read_bytes()).hexdigest()}"
+
+
+def _run_file(file: Path) -> ModuleType:
+    """Run a file as a module of its own; once, as long as its content stays."""
+    file = file.resolve()
+    code = hashlib.sha256(str(file).encode() + file.read_bytes()).hexdigest()[:12]
+    name = f"{file.stem}_{code}"  # a name of its own: nobody's random.py stands in for Python's
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(file.parent))  # as Python does for a script
+    try:
+        sys.modules[name] = module  # dataclasses look their module up
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    finally:
+        sys.path.remove(str(file.parent))
+    return module

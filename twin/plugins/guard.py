@@ -1,0 +1,63 @@
+"""What a plugin does wrong while it runs becomes one sentence with its name and line."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from twin.errors import PluginError, Problem, TwinError
+
+if TYPE_CHECKING:
+    from twin.plugins.plugin import Plugin
+
+
+class Guard:
+    """Around every call of a plugin: an exception becomes a `PluginError`; a `TwinError` stays what it is."""
+
+    __slots__ = ("_plugin",)
+
+    def __init__(self, plugin: Plugin[object]) -> None:
+        self._plugin = plugin
+
+    def __enter__(self) -> None:
+        """Begin a call."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it; what ships is not guarded: its faults are bugs of ours."""
+        if isinstance(error, Exception) and not isinstance(error, TwinError) and not self._plugin.ships:
+            raise blame(self._plugin, error) from error
+
+
+def blame(plugin: Plugin[object], error: BaseException) -> PluginError:
+    """Return the error as one sentence, at the last line of the plugin's own code that was running."""
+    what = f"{plugin.title} fails: {type(error).__name__}"
+    if isinstance(error, SyntaxError) and error.filename:
+        return PluginError(Problem(f"{what}: {error.msg}", Path(error.filename), error.lineno))
+    text = " ".join(str(error).split())
+    file, line = plugin.place.file, plugin.place.line
+    if file is not None:
+        mine = file.resolve()
+        for frame in traceback.extract_tb(error.__traceback__):
+            # Of a package, its other modules count as well; twin's own frames lie in between.
+            at = Path(frame.filename).resolve()
+            if at == mine or (plugin.place.module is not None and mine.parent in at.parents):
+                file, line = (file if at == mine else at), frame.lineno
+    return PluginError(Problem(f"{what}: {text}" if text else what, file, line))
+
+
+def require_finite(plugin: Plugin[object], what: str, values: Iterable[float]) -> None:
+    """Refuse numbers of a plugin that are none.
+
+    Raises:
+        PluginError: one is NaN or infinite.
+    """
+    numbers = [float(value) for value in values]
+    if not all(map(math.isfinite, numbers)):
+        shown = ", ".join(f"{value:g}" for value in numbers[:6])
+        raise plugin.error(f"returns {what} of ({shown}); it must be finite")

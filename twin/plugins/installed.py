@@ -1,0 +1,59 @@
+"""Plugins of installed packages: entry points, read from their metadata; nothing is imported."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import metadata
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class EntryPoint:
+    """One line of a package's metadata: `name = "module:Class"` in a group."""
+
+    name: str
+    value: str
+    package: str
+    version: str
+
+    @property
+    def told(self) -> str:
+        """The package, for messages and verdicts."""
+        return f"{self.package} {self.version}"
+
+
+def installed(group: str) -> Mapping[str, tuple[EntryPoint, ...]]:
+    """Return the entry points of a group by name; a name that several packages take has several."""
+    return _by_name(group, tuple(sys.path))
+
+
+def version_of(module: str) -> str | None:
+    """Return `package version` of the installed package that has a module."""
+    packages = _packages(tuple(sys.path)).get(module.partition(".")[0], ())
+    return f"{packages[0]} {metadata.version(packages[0])}" if packages else None
+
+
+@lru_cache
+def _packages(_path: tuple[str, ...]) -> Mapping[str, list[str]]:
+    return MappingProxyType(dict(metadata.packages_distributions()))
+
+
+@lru_cache
+def _by_name(group: str, _path: tuple[str, ...]) -> Mapping[str, tuple[EntryPoint, ...]]:
+    found: dict[str, dict[tuple[str, str], EntryPoint]] = {}
+    for point in metadata.entry_points(group=group):
+        owner = point.dist
+        package, version = (owner.name, owner.version) if owner is not None else ("?", "?")
+        # A package that is on the path twice is one package: the first one counts, as for imports.
+        found.setdefault(point.name, {}).setdefault(
+            (package, point.value), EntryPoint(point.name, point.value, package, version)
+        )
+    return MappingProxyType(
+        {
+            name: tuple(sorted(points.values(), key=lambda point: point.package))
+            for name, points in sorted(found.items())
+        }
+    )
