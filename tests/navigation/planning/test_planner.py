@@ -266,7 +266,9 @@ def test_a_planner_kept_for_many_maps_forgets_each_of_them() -> None:
     open_field, wall = grid("...", "...", "..."), grid("...", "@@.", "...")
     for costmap in (open_field, wall, grid(".....", "@@@@.", "....."), wall, open_field):
         goal = centre(0, costmap.costs.shape[0] - 1)
-        assert np.array_equal(kept.create_plan(costmap, centre(0, 0), goal), plan(costmap, centre(0, 0), goal))
+        assert np.array_equal(
+            kept.create_plan(costmap, centre(0, 0), goal), plan(costmap, centre(0, 0), goal)
+        )
     with pytest.raises(NoValidPath):
         kept.create_plan(grid("...", "@@@", "..."), centre(0, 0), centre(0, 2))
 

@@ -46,8 +46,8 @@ class Situation:
 class Controller(ABC):
     """Follows one path at a time.
 
-    A controller has a `max_speed` and makes commands; it has the path in `path`, and its parameters, an object
-    of its `Config`, in `config`. What depends on them alone is made in `_build`, what on the path in `set_plan`.
+    The path is in `path`, its parameters, an object of its `Config`, are in `config`. What depends on them
+    alone is made in `_build`, what on the path in `set_plan`.
     """
 
     Config: ClassVar[type | None] = None

@@ -8,19 +8,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from twin.geometry import Pose2, wrap_angle
+from twin.navigation.configured import Configured
 
 _AT_REST = (0.0, 0.0)
 
 
-class GoalChecker(ABC):
+class GoalChecker(Configured, ABC):
     """Asked once per control period; made anew for every goal."""
 
-    Config: ClassVar[type | None] = None
-    """Frozen dataclass of its parameters; None: it has none."""
-
     def __init__(self, *, config: Any = None) -> None:
-        """Take an object of its `Config`; without one its defaults."""
-        self.config = config or (self.Config and self.Config())
+        super().__init__(config=config)
         self.reset()
 
     @property

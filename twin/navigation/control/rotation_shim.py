@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.controller import Controller, Situation
-from twin.navigation.control.dwb.config import DWBConfig
-from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, footprint_cost
+from twin.navigation.plugins import CONTROLLERS, create
 
 
 @dataclass(frozen=True, kw_only=True)
 class RotationShimConfig:
     """Parameters; names and defaults are those of nav2_rotation_shim_controller."""
 
-    primary_controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig = field(
-        default_factory=RegulatedPurePursuitConfig
-    )
+    primary_controller: Any = field(default_factory=RegulatedPurePursuitConfig)
     """Of what drives."""
     angular_dist_threshold: float = 0.785
     """Farther off the path's direction than this the robot turns in place [rad]."""
@@ -55,10 +53,8 @@ class RotationShim(Controller):
     Config = RotationShimConfig
     config: RotationShimConfig
 
-    def __init__(
-        self, *, config: RotationShimConfig, primary: Controller, footprint: Array | None = None
-    ) -> None:
-        self.primary = primary
+    def __init__(self, *, config: RotationShimConfig, footprint: Array | None = None) -> None:
+        self.primary = create(CONTROLLERS, config.primary_controller, footprint=footprint)
         super().__init__(config=config, footprint=footprint)
         self._tolerance = 0.0
 
@@ -92,7 +88,7 @@ class RotationShim(Controller):
 
     def set_plan(self, path: Array) -> None:
         """Follow another path; see `Controller.set_plan`."""
-        same = self.path is not None and len(self.path) > 0 and np.array_equal(self.path[-1], path[-1])
+        same = self.path is not None and bool(np.array_equal(self.path[-1], path[-1]))
         self._handler.accept(path)
         super().set_plan(path)
         self.primary.set_plan(path)
@@ -104,7 +100,8 @@ class RotationShim(Controller):
         super().reset()
         self.primary.reset()
         self._handler.reset()
-        self._turning = self._aligned = self._at_goal = self._driving = False
+        self._aligned = False
+        self._turning = self._at_goal = self._driving = False
         self._last_w: float | None = None
 
     def set_speed_limit(self, limit: float | None) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.geometry import Array, Pose2
+from twin.navigation.configured import Configured
 from twin.navigation.costmaps.costmap import (
     INSCRIBED_INFLATED_OBSTACLE,
     LETHAL_OBSTACLE,
@@ -28,11 +29,9 @@ from twin.navigation.failures import (
 from twin.navigation.planning.grid_search import GridSearch
 
 
-class GlobalPlanner(ABC):
+class GlobalPlanner(Configured, ABC):
     """What plans a path over a costmap (nav2_core::GlobalPlanner)."""
 
-    Config: ClassVar[type | None] = None
-    """Frozen dataclass of its parameters; None: it has none."""
     drivable: ClassVar[bool] = False
     """Whether its paths are followed as they are; others are smoothed."""
 
@@ -46,7 +45,7 @@ class GlobalPlanner(ABC):
             footprint: Corners in the base frame, shape (n, 2) [m]; one alone leaves it to the inscribed zone.
             inflation_radius: Of the costmap [m].
         """
-        self.config = config or (self.Config and self.Config())
+        super().__init__(config=config)
         self.footprint = np.array(footprint, dtype=np.float64, order="C")
         self.inflation_radius = inflation_radius
 
@@ -109,7 +108,7 @@ class ThetaStarConfig:
 class Planner(GlobalPlanner):
     """A* (Hart, Nilsson, Raphael 1968), 8-connected, or with any angle Theta*; never cuts a corner."""
 
-    Config: ClassVar = PlannerConfig
+    Config: ClassVar[type] = PlannerConfig
 
     def __init__(self, **setup: Any) -> None:
         super().__init__(**setup)

@@ -9,27 +9,21 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array, wrap_angles
 from twin.navigation._jit import jit
+from twin.navigation.configured import Configured
 from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
 from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
 
 
-class Smoother(ABC):
+class Smoother(Configured, ABC):
     """Makes a path smoother (nav2_core::Smoother)."""
-
-    Config: ClassVar[type | None] = None
-    """Frozen dataclass of its parameters; None: it has none."""
-
-    def __init__(self, *, config: Any = None) -> None:
-        """Take an object of its `Config`; without one its defaults."""
-        self.config = config or (self.Config and self.Config())
 
     @abstractmethod
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:

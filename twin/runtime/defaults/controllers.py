@@ -20,7 +20,6 @@ from twin.navigation.control.mppi.config import (
     MPPIConfig,
     PathAlignCriticConfig,
 )
-from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
@@ -69,9 +68,7 @@ def controller_server_config(
     )
 
 
-def _controller(
-    parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float
-) -> ControllerConfig:
+def _controller(parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float) -> Any:
     overrides = parameters.overrides()
     controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig
     if parameters.chosen == "mppi":

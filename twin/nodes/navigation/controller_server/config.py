@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
+from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
-from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 
@@ -16,13 +16,13 @@ from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPureP
 class ControllerServerConfig:
     """Parameters of the server and of its plugins by name; the first of a kind is taken unless named."""
 
-    controllers: Mapping[str, ControllerConfig] = field(
+    controllers: Mapping[str, Any] = field(
         default_factory=lambda: {"FollowPath": RegulatedPurePursuitConfig()}
     )
-    goal_checkers: Mapping[str, PositionGoalCheckerConfig] = field(
+    goal_checkers: Mapping[str, Any] = field(
         default_factory=lambda: {"general_goal_checker": GoalCheckerConfig()}
     )
-    progress_checkers: Mapping[str, ProgressCheckerConfig] = field(
+    progress_checkers: Mapping[str, Any] = field(
         default_factory=lambda: {"progress_checker": ProgressCheckerConfig()}
     )
     controller_period_ns: int = 60_000_000

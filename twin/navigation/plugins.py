@@ -1,0 +1,170 @@
+"""What of navigation can come from a user's package or file; what ships is registered in the same way.
+
+A plugin is found by its parameters: their class is the plugin's `Config`. That of a user's plugin is derived
+from what he wrote, and so knows whose it is, also where two plugins share their parameters.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from twin.navigation.failures import NavigationFailure
+from twin.plugins import Kind, Plugin, require_finite
+
+if TYPE_CHECKING:
+    from twin.navigation.control.controller import Controller
+    from twin.navigation.control.goal_checker import GoalChecker
+    from twin.navigation.control.progress_checker import ProgressChecker
+    from twin.navigation.planning.planner import GlobalPlanner
+    from twin.navigation.planning.smoother import Smoother
+
+T = TypeVar("T")
+
+CONTROLLERS: Kind[Controller] = Kind(
+    "controller", base="twin.navigation.control.controller:Controller", group="twin.controllers"
+)
+CONTROLLERS.register(
+    "regulated_pure_pursuit",
+    "twin.navigation.control.regulated_pure_pursuit.controller:RegulatedPurePursuit",
+)
+CONTROLLERS.register("dwb", "twin.navigation.control.dwb.controller:DWB")
+CONTROLLERS.register("mppi", "twin.navigation.control.mppi.controller:MPPI")
+CONTROLLERS.register("rotation_shim", "twin.navigation.control.rotation_shim:RotationShim")
+
+GOAL_CHECKERS: Kind[GoalChecker] = Kind(
+    "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
+)
+GOAL_CHECKERS.register("simple", "twin.navigation.control.goal_checker:SimpleGoalChecker")
+GOAL_CHECKERS.register("stopped", "twin.navigation.control.goal_checker:StoppedGoalChecker")
+GOAL_CHECKERS.register("position", "twin.navigation.control.goal_checker:PositionGoalChecker")
+
+PROGRESS_CHECKERS: Kind[ProgressChecker] = Kind(
+    "progress checker",
+    base="twin.navigation.control.progress_checker:ProgressChecker",
+    group="twin.progress_checkers",
+)
+PROGRESS_CHECKERS.register("simple", "twin.navigation.control.progress_checker:SimpleProgressChecker")
+PROGRESS_CHECKERS.register("pose", "twin.navigation.control.progress_checker:PoseProgressChecker")
+
+PLANNERS: Kind[GlobalPlanner] = Kind(
+    "planner", base="twin.navigation.planning.planner:GlobalPlanner", group="twin.planners"
+)
+PLANNERS.register("grid_based", "twin.navigation.planning.planner:Planner")
+PLANNERS.register("theta_star", "twin.navigation.planning.planner:ThetaStar")
+PLANNERS.register("smac_hybrid", "twin.navigation.planning.hybrid:HybridPlanner")
+
+SMOOTHERS: Kind[Smoother] = Kind(
+    "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
+)
+SMOOTHERS.register("simple_smoother", "twin.navigation.planning.smoother:SimpleSmoother")
+SMOOTHERS.register("savitzky_golay", "twin.navigation.planning.smoother:SavitzkyGolaySmoother")
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """Those of a plugin that has none."""
+
+
+def config_of(plugin: Plugin[Any]) -> type:
+    """Return the class of a plugin's parameters, by which `create` finds it."""
+    loaded: Any = plugin.load()
+    return (loaded.Config or NoParameters) if plugin.ships else _bound(plugin, loaded)
+
+
+@functools.cache
+def _bound(plugin: Plugin[Any], loaded: Any) -> type:
+    """Return the class of a user's plugin's parameters, for the class as it was loaded."""
+    written = getattr(loaded, "Config", None) or NoParameters
+    return type(written.__name__, (written,), {"plugin": plugin, "__module__": written.__module__})
+
+
+def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
+    """Return the plugin that parameters are of."""
+    found: Plugin[T] | None = getattr(config, "plugin", None)
+    if found is not None:
+        return found
+    shipped = map(kind.find, kind.shipped)
+    return next(plugin for plugin in shipped if plugin.config is type(config))
+
+
+def create(kind: Kind[T], config: Any, **setup: Any) -> T:
+    """Return the object that parameters are of, made with further arguments; a user's is guarded."""
+    plugin = plugin_of(kind, config)
+    return guarded(plugin)(config=config, **setup)
+
+
+def guarded(plugin: Plugin[T]) -> Callable[..., T]:
+    """Return a plugin's class; of a user's one that names the plugin where it raises, or answers nonsense."""
+    loaded = plugin.load()
+    if plugin.ships:
+        return loaded
+    base = next(cls for cls in loaded.__mro__ if f"{cls.__module__}:{cls.__name__}" == plugin.kind.base)
+    members: dict[str, Any] = {"__module__": loaded.__module__}
+    for name in ("__init__", *(name for name in dir(base) if not name.startswith("_"))):
+        member = inspect.getattr_static(loaded, name)
+        if inspect.isfunction(member):
+            members[name] = _guard(plugin, name, member)
+        elif isinstance(member, property) and member.fget is not None:
+            members[name] = property(_guard(plugin, name, member.fget))
+    return type(loaded.__name__, (loaded,), members)
+
+
+def _guard(plugin: Plugin[Any], name: str, method: Callable[..., Any]) -> Any:
+    answer: Callable[..., Any] = _ANSWERS.get(name, _anything)
+
+    @functools.wraps(method)
+    def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        with plugin.guard:
+            try:
+                return answer(plugin, method(self, *args, **kwargs), *args)
+            except NavigationFailure as failure:  # the robot's answer, no fault of the plugin's
+                why = failure
+        raise why
+
+    return call
+
+
+def _anything(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
+    return answer
+
+
+def _command(plugin: Plugin[Any], answer: Any, *_: Any) -> tuple[float, float]:
+    try:
+        v, w = map(float, answer)
+    except (TypeError, ValueError):
+        raise plugin.error(f"returns {answer!r} as a command; it must be (v [m/s], w [rad/s])") from None
+    require_finite(plugin, "a command", (v, w))
+    return v, w
+
+
+def _path(plugin: Plugin[Any], answer: Any, *_: Any) -> np.ndarray:
+    path = np.array(answer, dtype=np.float64, order="C")
+    if path.ndim != 2 or path.shape[1] != 3 or not len(path):
+        raise plugin.error(f"returns a path of shape {path.shape}; it must be (n, 3): x, y, yaw")
+    require_finite(plugin, "a path", path[~np.isfinite(path).all(axis=1)].ravel())
+    return path
+
+
+def _truth(plugin: Plugin[Any], answer: Any, *_: Any) -> bool:
+    if not isinstance(answer, bool | np.bool_):
+        raise plugin.error(f"answers {answer!r}; it must be True or False")
+    return bool(answer)
+
+
+_ANSWERS: Mapping[str, Callable[..., Any]] = MappingProxyType(
+    {
+        "compute_velocity_commands": _command,
+        "create_plan": _path,
+        "smooth": _path,
+        "is_goal_reached": _truth,
+        "check": _truth,
+    }
+)
+"""What methods must return: takes the plugin, the answer and the method's arguments; returns the answer."""
