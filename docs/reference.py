@@ -146,7 +146,7 @@ def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     if units is not None:
         number = next(choice for choice in choices if "pattern" not in choice)
         return QUANTITIES[units] + _bounds(number)
-    (choice,) = choices
+    choice = choices[0]  # of a union, what ships; the rest is a user's
     if "prefixItems" in choice:
         return "list of " + ", ".join(_value(schema, part) for part in choice["prefixItems"])
     if "enum" in choice:
@@ -156,7 +156,9 @@ def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     if choice.get("type") == "array":
         return f"list of {_value(schema, choice['items'])}"
     if "discriminator" in choice:
-        return "mapping with `type`: " + ", ".join(f"`{kind}`" for kind in choice["discriminator"]["mapping"])
+        kinds = [f"`{kind}`" for kind in choice["discriminator"]["mapping"]]
+        own = ", or [your own](plugins.md)" if len(choices) > 1 else ""
+        return f"mapping with `type`: {', '.join(kinds)}{own}"
     if "additionalProperties" in choice and isinstance(choice["additionalProperties"], Mapping):
         return f"mapping of name to {_value(schema, choice['additionalProperties'])}"
     words = {"string": "text", "integer": "whole number", "number": "number", "boolean": "`true`, `false`"}

@@ -6,7 +6,7 @@ import gc
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
+from twin.plugins import execution
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
@@ -64,7 +65,7 @@ class Run:
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
-        if any(entry.energy is not None for entry in scenario.checks):
+        if any(check.measures_work for check in self.checks):
             self.world.measure_work()
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
@@ -195,14 +196,14 @@ def run(
     digest = RunDigest()
     sink = _recording(scenario, out) if record else None
     bag_tap = None if bag is None else BagTap(bag, hidden=bag_hidden_topics)
-    parts = build(
-        scenario,
-        taps=[digest.on_sample, *(tap.on_sample for tap in (sink, bag_tap) if tap is not None)],
-        network=network or SessionConfig(listen=outside.endpoints(listen)),
-        outside=outside,
-        crash_folder=out,
-    )
-    with ExitStack() as ending:
+    with execution() as executed, ExitStack() as ending:
+        parts = build(
+            scenario,
+            taps=[digest.on_sample, *(tap.on_sample for tap in (sink, bag_tap) if tap is not None)],
+            network=network or SessionConfig(listen=outside.endpoints(listen)),
+            outside=outside,
+            crash_folder=out,
+        )
         ending.callback(parts.bus.close)
         if bag_tap is not None:
             ending.callback(bag_tap.close)
@@ -220,6 +221,7 @@ def run(
         keeper = None if pace is None else Pace(pace)
         wall, cpu = _loop(simulation, keeper, progress, watch)
         verdict = _verdict(simulation, digest, wall, cpu, keeper, outside.clock(parts.bus.networked))
+        verdict = replace(verdict, plugins=executed.versions)
         if out is not None:
             save_maps(parts.stacks, out)
         if sink is not None:

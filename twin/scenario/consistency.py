@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.periods import period_of
-from twin.scenario.checks.check import CheckConfig
 from twin.scenario.faults import RobotFault
 from twin.scenario.missions import (
     Behaviors,
@@ -98,7 +97,7 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(scenario.mission, PickAndPlace):
         yield Fault(("mission",), f"pick_and_place {message}")
     for i, entry in enumerate(scenario.checks):
-        if entry.delivered is not None:
+        if entry.kind == "delivered":
             yield Fault(("checks", i), f"delivered {message}")
     for i, fault in enumerate(scenario.faults):
         if fault.displacement is not None:
@@ -110,6 +109,10 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, Idle):
         return
     robots = [robot.id for robot in scenario.robots]
+    if mission.robot is None:
+        if len(robots) > 1:
+            yield Fault(("mission",), f"the mission must name its robot; valid: {', '.join(robots)}")
+        return
     if mission.robot not in robots:
         yield Fault(
             ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"
@@ -167,9 +170,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     mission = scenario.mission
     totes = [task.tote for task in mission.tasks] if isinstance(mission, PickAndPlace) else []
     for i, entry in enumerate(scenario.checks):
-        config, loc = entry.config, ("checks", i, entry.kind)
-        assert isinstance(config, CheckConfig)
-        subjects = config.subjects()
+        loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
         if robot is not None and robot not in robots:
             yield Fault((*loc, "robot"), f"unknown robot '{robot}'; {nearest(robot, robots)}")
@@ -188,7 +189,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
 
 def _lacking(entry: CheckEntry, robot: RobotConfig, loc: Loc) -> Iterator[Fault]:
     """Yield what a robot has not got that a check is about."""
-    if entry.recoveries is not None and robot.navigation is None:
+    if entry.kind == "recoveries" and robot.navigation is None:
         yield Fault(loc, f"recoveries needs a navigation of robot '{robot.id}'")
     slam = robot.localisation is not None and robot.localisation.type == "slam"
     if entry.kind in ("map_accuracy", "map_coverage") and not slam:

@@ -79,13 +79,22 @@ class Scenario(StrictModel):
         return tuple(entry.build(context) for entry in self.checks)
 
 
-def load(path: Path, overrides: Mapping[str, str] = MappingProxyType({})) -> Scenario:
-    """Read a scenario file; `overrides` maps dotted paths to YAML text (`{"robots.0.pose.x": "2 m"}`).
+def load(
+    path: Path, overrides: Mapping[str, str] = MappingProxyType({}), *, execute: bool = False
+) -> Scenario:
+    """Read a scenario file.
+
+    Args:
+        path: The file.
+        overrides: Dotted path to YAML text (`{"robots.0.pose.x": "2 m"}`).
+        execute: Whether the plugins that it names are executed, and their parameters checked by what they
+            declare; without it they are found by reading.
 
     Raises:
         ScenarioError: With every problem of the file and of the overrides.
+        PluginError: A plugin that was executed is wrong.
     """
-    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides)
+    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
 
 
 def json_schema() -> dict[str, Any]:

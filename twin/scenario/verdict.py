@@ -33,6 +33,8 @@ class Verdict:
     clock: Literal["inproc", "lockstep", "free"] = "inproc"
     """Whose time counted: the run's alone, the run's with others that it waited for, everybody's own."""
     versions: Mapping[str, str] = field(default_factory=dict)
+    plugins: Mapping[str, str] = field(default_factory=dict)
+    """What users brought, by name: a package and its version, or the hash of a file."""
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
     error: str | None = None
@@ -63,6 +65,7 @@ class Verdict:
             "deterministic": self.deterministic,
             "clock": self.clock,
             "versions": dict(self.versions),
+            "plugins": dict(self.plugins),
             "cpu": self.cpu,
         }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -18,6 +18,7 @@ from twin.strict_yaml.document import Loc as Loc
 from twin.strict_yaml.document import apply_override, read
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults
+from twin.strict_yaml.validate import findings as findings
 from twin.strict_yaml.validate import validate
 
 M = TypeVar("M", bound=BaseModel)
@@ -37,6 +38,7 @@ def load(
     *,
     error: type[TwinError],
     overrides: Mapping[str, str] = MappingProxyType({}),
+    context: Mapping[str, Any] = MappingProxyType({}),
 ) -> M:
     """Read a YAML file into `schema`.
 
@@ -46,6 +48,7 @@ def load(
             folder as `info.context["folder"]`.
         error: What to raise.
         overrides: Dotted path to YAML text, e.g. `{"robots.0.pose.yaw": "90 deg"}`.
+        context: What else validators find in `info.context`.
 
     Raises:
         TwinError: As `error`, with every problem of the file and of the overrides, in file order.
@@ -53,7 +56,7 @@ def load(
     document = read(path, error)
     for dotted, text in overrides.items():
         apply_override(document, dotted, text)
-    model = validate(schema, document)
+    model = validate(schema, document, context)
     if model is None or document.problems:
         raise error(sorted(document.problems, key=lambda p: (p.line is None, p.line or 0)))
     return model

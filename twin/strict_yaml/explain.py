@@ -21,6 +21,8 @@ class Fault(NamedTuple):
     """Keys and indices from the model that raises to the value at fault."""
     message: str
     """What is wrong and what would be valid."""
+    valid: tuple[str, ...] = ()
+    """Of an unknown key, instead of a message: the names that are valid."""
 
 
 class Faults(ValueError):
@@ -109,9 +111,7 @@ def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Ite
     at = _data_loc(data, loc)
     name = ".".join(map(str, at)) or "the file"
     if kind == "extra_forbidden":
-        valid = _valid_keys(schema, loc[:-1])
-        text = f"unknown key '{loc[-1]}'{within(at[:-1])}; {nearest(str(loc[-1]), valid)}"
-        yield Finding(at, text, "unknown key", _closest(str(loc[-1]), valid))
+        yield _unknown(at, str(loc[-1]), _valid_keys(schema, loc[:-1]))
     elif kind == "missing" and isinstance(loc[-1], int):
         yield Finding(at, f"{name}: must have at least {loc[-1] + 1} items")
     elif kind in ("missing", "union_tag_not_found"):
@@ -125,12 +125,19 @@ def explain(schema: type[BaseModel], data: Any, fault: Mapping[str, Any]) -> Ite
         yield Finding(where, text, "unknown value", _closest(word, valid))
     elif isinstance(context.get("error"), Faults):
         for inner in context["error"].faults:
-            yield Finding((*at, *inner.loc), inner.message)
+            place = (*at, *inner.loc)
+            known = not inner.valid
+            yield Finding(place, inner.message) if known else _unknown(place, str(place[-1]), inner.valid)
     elif isinstance(context.get("error"), ValueError):
         yield Finding(at, f"{name}: {context['error']}, not {shown(fault['input'])}")
     else:
         words = _WORDS.get(kind, fault["msg"][:1].lower() + fault["msg"][1:]).format(**context)
         yield Finding(at, f"{name}: {words}, not {shown(fault['input'])}")
+
+
+def _unknown(at: Loc, key: str, valid: Sequence[str]) -> Finding:
+    text = f"unknown key '{key}'{within(at[:-1])}; {nearest(key, valid)}"
+    return Finding(at, text, "unknown key", _closest(key, valid))
 
 
 def _closest(word: str, valid: Sequence[str]) -> str | None:

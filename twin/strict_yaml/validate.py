@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -20,17 +20,17 @@ from twin.strict_yaml.explain import Finding, explain
 M = TypeVar("M", bound=BaseModel)
 
 
-def validate(schema: type[M], document: Document) -> M | None:
+def validate(schema: type[M], document: Document, more: Mapping[str, Any] = MappingProxyType({})) -> M | None:
     """Return the model, or None after adding every fault to the document's problems."""
     if document.outsized:
         document.problems += document.outsized
         return None
-    context = {"folder": document.file.parent}
-    model, first = _findings(schema, document.data, context)
+    context = {"folder": document.file.parent, **more}
+    model, first = findings(schema, document.data, context)
     if model is not None:
         return model
     data, meant = _corrected(document, first)
-    _, second = _findings(schema, data, context)
+    _, second = findings(schema, data, context)
     found = [finding for finding in first if finding.kind != "missing key" or finding.loc not in meant]
     known = {finding.loc for finding in found}
     found += [finding for finding in second if not any(_above(finding.loc, loc) for loc in known)]
@@ -38,7 +38,8 @@ def validate(schema: type[M], document: Document) -> M | None:
     return None
 
 
-def _findings(schema: type[M], data: Any, context: Mapping[str, Path]) -> tuple[M | None, list[Finding]]:
+def findings(schema: type[M], data: Any, context: Mapping[str, Any]) -> tuple[M | None, list[Finding]]:
+    """Return the model, or None and what is wrong with the data."""
     try:
         return schema.model_validate_json(to_json(data), strict=True, context=dict(context)), []
     except ValidationError as invalid:

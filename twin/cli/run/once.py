@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from twin.cli.console import print_error, stdout
+from twin.cli.console import print_error, stderr, stdout
 from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import make_folder, results_folder
 from twin.cli.run.options import RunOptions
@@ -17,16 +17,26 @@ from twin.errors import TwinError
 from twin.files.writing import check_file, written_alone
 
 if TYPE_CHECKING:
+    from twin.plugins import Execution
     from twin.scenario.outside import ClockMode
 
 
 def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
     """Run, write the verdict, print it, and return the exit code."""
-    with ExitStack() as held:
-        return _run_once(options, out, held, as_json=as_json)
+    from twin.plugins import execution
+
+    with ExitStack() as held, execution(_tell) as executed:
+        return _run_once(options, out, held, executed, as_json=as_json)
 
 
-def _run_once(options: RunOptions, out: Path | None, held: ExitStack, *, as_json: bool) -> int:
+def _tell(file: str) -> None:
+    """Say which file of a user is about to be executed."""
+    stderr().print(f"executes {file}")
+
+
+def _run_once(
+    options: RunOptions, out: Path | None, held: ExitStack, executed: Execution, *, as_json: bool
+) -> int:
     from twin.bridge.programs.console_log import show_warnings
     from twin.scenario import schema
     from twin.scenario.outside import Outside
@@ -45,7 +55,7 @@ def _run_once(options: RunOptions, out: Path | None, held: ExitStack, *, as_json
             free=options.free,
         )
         clock = outside.clock(options.network is not None)
-        scenario = schema.load(options.scenario, options.overrides)
+        scenario = schema.load(options.scenario, options.overrides, execute=True)
         if options.params_file is not None:
             scenario = scenario.with_params_file(options.params_file.resolve())
         name, seed = scenario.name, scenario.seed
@@ -75,7 +85,7 @@ def _run_once(options: RunOptions, out: Path | None, held: ExitStack, *, as_json
             )
     except TwinError as fault:
         print_error(fault)
-        verdict = Verdict(scenario=name, seed=seed, error=str(fault), clock=clock)
+        verdict = Verdict(scenario=name, seed=seed, error=str(fault), clock=clock, plugins=executed.versions)
         if folder is not None:
             verdict.write(folder)
         if as_json:

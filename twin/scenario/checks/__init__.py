@@ -1,61 +1,58 @@
-"""The checks of a scenario: `CheckEntry` is one item of its list, `Check` the fold that it builds."""
+"""The checks of a scenario: `CHECKS` are all kinds, `CheckEntry` is one item of the file's list."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from twin.plugins import Kind
 from twin.scenario.checks.check import Check as Check
-from twin.scenario.checks.check import CheckConfig
 from twin.scenario.checks.check import CheckResult as CheckResult
-from twin.scenario.checks.delivered import DeliveredConfig
-from twin.scenario.checks.localisation import LocalisationErrorConfig, OdometryDriftConfig
-from twin.scenario.checks.map_quality import MapAccuracyConfig, MapCoverageConfig
-from twin.scenario.checks.mission import MissionFailedConfig, MissionSucceededConfig, TimeLimitConfig
-from twin.scenario.checks.no_collision import NoCollisionConfig
-from twin.scenario.checks.path import ClosedLoopConfig, FinalPoseConfig, PathOnCircleConfig
-from twin.scenario.checks.recoveries import RecoveriesConfig
-from twin.scenario.checks.totals import DrivenDistanceConfig, EnergyConfig
-from twin.scenario.checks.tote_slip import ToteSlipConfig
-from twin.scenario.fields import OneOf
+from twin.scenario.checks.guarded import GuardedCheck
 from twin.scenario.observation import CheckContext
+from twin.scenario.plugins import OneOfKind, PluginUse, model_of
+
+CHECKS: Kind[Check] = Kind("check", base="twin.scenario.checks:Check", group="twin.checks")
+
+CHECKS.register("mission_succeeded", "twin.scenario.checks.mission:MissionSucceeded")
+CHECKS.register("mission_failed", "twin.scenario.checks.mission:MissionFailed")
+CHECKS.register("delivered", "twin.scenario.checks.delivered:Delivered")
+CHECKS.register("time_limit", "twin.scenario.checks.mission:TimeLimit")
+CHECKS.register("no_collision", "twin.scenario.checks.no_collision:NoCollision")
+CHECKS.register("tote_slip", "twin.scenario.checks.tote_slip:ToteSlip")
+CHECKS.register("localisation_error", "twin.scenario.checks.localisation:LocalisationError")
+CHECKS.register("odometry_drift", "twin.scenario.checks.localisation:OdometryDrift")
+CHECKS.register("driven_distance", "twin.scenario.checks.totals:DrivenDistance")
+CHECKS.register("recoveries", "twin.scenario.checks.recoveries:Recoveries")
+CHECKS.register("map_accuracy", "twin.scenario.checks.map_quality:MapAccuracy")
+CHECKS.register("map_coverage", "twin.scenario.checks.map_quality:MapCoverage")
+CHECKS.register("energy", "twin.scenario.checks.totals:Energy")
+CHECKS.register("final_pose", "twin.scenario.checks.path:FinalPose")
+CHECKS.register("path_on_circle", "twin.scenario.checks.path:PathOnCircle")
+CHECKS.register("closed_loop", "twin.scenario.checks.path:ClosedLoop")
 
 
-class CheckEntry(OneOf):
-    """One check: exactly one of these keys."""
+class AnyCheck(OneOfKind):
+    """One check: exactly one of these keys, or the name of a check of a user."""
 
-    mission_succeeded: MissionSucceededConfig | None = None
-    """The mission ends and succeeded."""
-    mission_failed: MissionFailedConfig | None = None
-    """The mission gives up, and says why: for scenarios in which it must."""
-    delivered: DeliveredConfig | None = None
-    """A tote stands in a zone, upright, released and at rest."""
-    time_limit: TimeLimitConfig | None = None
-    """The mission is done in time."""
-    no_collision: NoCollisionConfig | None = None
-    """Robots touch only what they may."""
-    tote_slip: ToteSlipConfig | None = None
-    """Carried totes do not slip in the gripper."""
-    localisation_error: LocalisationErrorConfig | None = None
-    """The estimated pose stays near the true one."""
-    odometry_drift: OdometryDriftConfig | None = None
-    """Dead reckoning is off by no more than this at the end."""
-    driven_distance: DrivenDistanceConfig | None = None
-    """The length of the path lies between two bounds."""
-    recoveries: RecoveriesConfig | None = None
-    """The navigator recovers as often as expected."""
-    map_accuracy: MapAccuracyConfig | None = None
-    """The walls of the map that the robot made are where the true ones are."""
-    map_coverage: MapCoverageConfig | None = None
-    """What the robot can get to is on its map."""
-    energy: EnergyConfig | None = None
-    """The actuators use no more than this."""
-    final_pose: FinalPoseConfig | None = None
-    """The run ends with the robot at a pose."""
-    path_on_circle: PathOnCircleConfig | None = None
-    """The robot stays on a circle."""
-    closed_loop: ClosedLoopConfig | None = None
-    """The robot comes back to its start."""
+    of = CHECKS
+
+    def subjects(self) -> dict[str, str | None]:
+        """Return the names that the check refers to, by field: `robot`, `tote`, `zone`."""
+        given = self.config.params if isinstance(self.config, PluginUse) else vars(self.config)
+        return {field: given[field] for field in ("robot", "tote", "zone") if field in given}
 
     def build(self, context: CheckContext) -> Check:
-        """Return a fresh fold."""
-        config = self.config
-        assert isinstance(config, CheckConfig)
-        return config.build(self.kind, context)
+        """Return a fresh fold; runs the file of a user's check."""
+        use = self.config
+        plugin = CHECKS.find(use.reference if isinstance(use, PluginUse) else self.kind)
+        config = use.config(plugin) if isinstance(use, PluginUse) else use
+        subject = getattr(config, "tote", None) or getattr(config, "robot", None)
+        name = plugin.name if subject is None else f"{plugin.name}({subject})"
+        check = plugin.create(name, config, context)
+        return check if plugin.ships else GuardedCheck(plugin, check)
+
+
+if TYPE_CHECKING:
+    CheckEntry = AnyCheck
+else:
+    CheckEntry = model_of("CheckEntry", AnyCheck)

@@ -1,9 +1,10 @@
-"""The interface of a check: a frozen config in the file, which builds a fold over observations."""
+"""What a check is: its parameters in the file, and a fold over observations."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from twin.geometry import Pose2, Pose3, wrap_angle
 from twin.scenario.observation import CheckContext, Observation
@@ -22,22 +23,32 @@ class CheckResult:
     name: str
     """Kind, with its subject if the file names one: `delivered(tote_a)`."""
     passed: bool
-    value: float | bool | None
+    value: float | bool | None = None
     """What was measured; None if there was nothing to measure."""
-    limit: float | bool | None
+    limit: float | bool | None = None
     """What it was held against."""
-    unit: str
-    at_s: float | None
+    unit: str = ""
+    at_s: float | None = None
     """Simulated time at which it was decided [s]; None if there was no observation."""
-    reason: str
+    reason: str = ""
     """Why it failed; empty when it passed."""
 
 
-class Check(ABC):
-    """A fold over the observations of a run; `observe` must see all of them, in order."""
+class CheckConfig(StrictModel):
+    """The parameters of a check, as a scenario file gives them."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+
+class Check(ABC):
+    """A fold over the observations of a run; `observe` sees all of them, in order."""
+
+    Config: ClassVar[type | None] = None
+    """The class of its parameters: a frozen dataclass, or a `CheckConfig`; None: it has none."""
+    measures_work: bool = False
+    """Whether it looks at `RobotObservation.work_J`, which is summed up in every physics step."""
+
+    def __init__(self, name: str, config: Any, context: CheckContext) -> None:
+        """Take its name in the verdict, an object of its `Config`, and what is known beforehand."""
+        self.name, self.config, self.context = name, config, context
 
     @abstractmethod
     def observe(self, observation: Observation) -> None:
@@ -46,18 +57,6 @@ class Check(ABC):
     @abstractmethod
     def result(self) -> CheckResult:
         """Return the outcome so far."""
-
-
-class CheckConfig(StrictModel, ABC):
-    """One check as a scenario file describes it."""
-
-    @abstractmethod
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return a fresh fold; `kind` is the check's key in the file."""
-
-    def subjects(self) -> dict[str, str | None]:
-        """Return the names the check refers to, by field: `robot`, `tote`, `zone`."""
-        return {field: getattr(self, field) for field in ("robot", "tote", "zone") if hasattr(self, field)}
 
 
 class BaseMotion:
@@ -81,7 +80,3 @@ class RobotCheckConfig(CheckConfig):
 
     robot: str | None = None
     """Name of the robot; may be left out if there is only one."""
-
-    def label(self, kind: str) -> str:
-        """Return the check's name in the verdict."""
-        return kind if self.robot is None else f"{kind}({self.robot})"

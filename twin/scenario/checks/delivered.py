@@ -27,18 +27,16 @@ class DeliveredConfig(CheckConfig):
     rest_speed: Annotated[MetresPerSecond, Positive] = 0.01
     """Speed below which it is at rest [m/s]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        zone, bottom = context.zone(self.zone), context.good_bottom(self.tote)
-        return Delivered(f"{kind}({self.tote})", self, zone, bottom)
-
 
 class Delivered(Check):
     """Judges each tick; the last one counts, and its time is the start of the last unbroken success."""
 
-    def __init__(self, name: str, config: DeliveredConfig, zone: Zone, bottom: float) -> None:
-        super().__init__(name)
-        self._config, self._zone, self._bottom = config, zone, bottom
+    Config = DeliveredConfig
+
+    def __init__(self, name: str, config: DeliveredConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config = config
+        self._zone, self._bottom = context.zone(config.zone), context.good_bottom(config.tote)
         self._previous: tuple[float, Pose3] | None = None
         self._outside: float | None = None
         self._reason = f"{config.tote} was never seen"

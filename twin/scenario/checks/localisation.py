@@ -29,17 +29,15 @@ class LocalisationErrorConfig(RobotCheckConfig):
             raise ValueError("must have at least one of the keys rms, max")
         return self
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return LocalisationError(self.label(kind), self, context.robot(self.robot))
-
 
 class LocalisationError(Check):
     """Sums squares and keeps the worst."""
 
-    def __init__(self, name: str, config: LocalisationErrorConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    Config = LocalisationErrorConfig
+
+    def __init__(self, name: str, config: LocalisationErrorConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._squares = 0.0
         self._count = 0
         self._estimated = False
@@ -101,17 +99,15 @@ class OdometryDriftConfig(RobotCheckConfig):
     max: Annotated[Metres, Positive]
     """Largest distance of the odometry's end from the true one, seen from the start [m]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return OdometryDrift(self.label(kind), self, context.robot(self.robot))
-
 
 class OdometryDrift(Check):
     """Keeps the first and the last pair of true and odometric pose."""
 
-    def __init__(self, name: str, config: OdometryDriftConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    Config = OdometryDriftConfig
+
+    def __init__(self, name: str, config: OdometryDriftConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._motion = BaseMotion()
         self._start: tuple[Pose2, Pose2] | None = None
         self._end: tuple[Pose2, Pose2] | None = None

@@ -37,10 +37,6 @@ class MapAccuracyConfig(RobotCheckConfig):
             raise ValueError("must have at least one of the keys mean, p95")
         return self
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return MapAccuracy(self.label(kind), self, context, context.robot(self.robot))
-
 
 class MapCoverageConfig(RobotCheckConfig):
     """Nothing is missing on the map of what the robot can get to."""
@@ -58,19 +54,16 @@ class MapCoverageConfig(RobotCheckConfig):
             raise ValueError("must have at least one of the keys floor, walls")
         return self
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return MapCoverage(self.label(kind), self, context, context.robot(self.robot))
-
 
 class _MapCheck(Check):
     """Keeps the last map, and holds it against the truth at the end."""
 
     unit = ""
 
-    def __init__(self, name: str, context: CheckContext, robot: str) -> None:
-        super().__init__(name)
-        self._surroundings, self._robot = context.surroundings.get(robot), robot
+    def __init__(self, name: str, config: RobotCheckConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._robot = context.robot(config.robot)
+        self._surroundings = context.surroundings.get(self._robot)
         self._map: OccupancyMap | None = None
         self._at_s: float | None = None
 
@@ -110,10 +103,11 @@ class _MapCheck(Check):
 class MapAccuracy(_MapCheck):
     """Measures distances between occupied cells and true surfaces, both ways."""
 
+    Config = MapAccuracyConfig
     unit = "m"
 
-    def __init__(self, name: str, config: MapAccuracyConfig, context: CheckContext, robot: str) -> None:
-        super().__init__(name, context, robot)
+    def __init__(self, name: str, config: MapAccuracyConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._config = config
 
     def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
@@ -130,8 +124,10 @@ class MapAccuracy(_MapCheck):
 class MapCoverage(_MapCheck):
     """Measures which part of the reachable floor and of its walls is on the map."""
 
-    def __init__(self, name: str, config: MapCoverageConfig, context: CheckContext, robot: str) -> None:
-        super().__init__(name, context, robot)
+    Config = MapCoverageConfig
+
+    def __init__(self, name: str, config: MapCoverageConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._config = config
 
     def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:

@@ -13,8 +13,8 @@ from twin.scenario.observation import CheckContext, Observation
 class _MissionCheck(Check):
     """Keeps the first tick at which the mission is done."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, config: CheckConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._last: Observation | None = None
 
     def observe(self, observation: Observation) -> None:
@@ -34,13 +34,11 @@ class _MissionCheck(Check):
 class MissionSucceededConfig(CheckConfig):
     """The mission ends, and says that it succeeded."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return MissionSucceeded(kind)
-
 
 class MissionSucceeded(_MissionCheck):
     """Passes if it says that it succeeded."""
+
+    Config = MissionSucceededConfig
 
     def result(self) -> CheckResult:
         """Return the outcome so far."""
@@ -60,16 +58,14 @@ class MissionFailedConfig(CheckConfig):
     reason: str = "*"
     """What its reason must look like; `*` stands for any text."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return MissionFailed(kind, self)
-
 
 class MissionFailed(_MissionCheck):
     """Passes if it says that it failed, for the reason that is asked for."""
 
-    def __init__(self, name: str, config: MissionFailedConfig) -> None:
-        super().__init__(name)
+    Config = MissionFailedConfig
+
+    def __init__(self, name: str, config: MissionFailedConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._pattern = config.reason
 
     def result(self) -> CheckResult:
@@ -92,16 +88,14 @@ class TimeLimitConfig(CheckConfig):
     limit: Annotated[Seconds, Positive]
     """Longest simulated time [s]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return TimeLimit(kind, self)
-
 
 class TimeLimit(_MissionCheck):
     """Passes if it is done in time."""
 
-    def __init__(self, name: str, config: TimeLimitConfig) -> None:
-        super().__init__(name)
+    Config = TimeLimitConfig
+
+    def __init__(self, name: str, config: TimeLimitConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._limit = config.limit
 
     def result(self) -> CheckResult:

@@ -39,18 +39,15 @@ class NoCollisionConfig(CheckConfig):
     allowed: Sequence[AllowedContact] = ()
     """Contacts that are no collision, however hard."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        name = kind if self.robot is None else f"{kind}({self.robot})"
-        return NoCollision(name, self, context.robots)
-
 
 class NoCollision(Check):
     """Keeps the first collision and the hardest one."""
 
-    def __init__(self, name: str, config: NoCollisionConfig, robots: Sequence[str]) -> None:
-        super().__init__(name)
-        self._config, self._robots = config, robots
+    Config = NoCollisionConfig
+
+    def __init__(self, name: str, config: NoCollisionConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robots = config, context.robots
         self._first: tuple[float, ContactObservation] | None = None
         self._hardest: tuple[float, ContactObservation] | None = None
         self._force = 0.0

@@ -25,12 +25,6 @@ class FinalPoseConfig(RobotCheckConfig):
     yaw_tolerance: Annotated[Radians, Positive] = math.radians(10.0)
     """Largest heading error [rad]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        goal = Pose2(self.x, self.y, 0.0 if self.yaw is None else self.yaw)
-        yaw_tolerance = None if self.yaw is None else self.yaw_tolerance
-        return EndsAt(self.label(kind), context.robot(self.robot), self.tolerance, yaw_tolerance, goal)
-
 
 class ClosedLoopConfig(RobotCheckConfig):
     """The robot leaves its start by more than the tolerance and comes back to it."""
@@ -40,20 +34,20 @@ class ClosedLoopConfig(RobotCheckConfig):
     yaw_tolerance: Annotated[Radians, Positive] | None = None
     """Largest heading error [rad]; absent: any heading."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        robot = context.robot(self.robot)
-        return EndsAt(self.label(kind), robot, self.tolerance, self.yaw_tolerance, goal=None)
 
-
-class EndsAt(Check):
+class _EndsAt(Check):
     """Compares the last true pose with a goal, or with the first pose if `goal` is None."""
 
     def __init__(
-        self, name: str, robot: str, tolerance: float, yaw_tolerance: float | None, goal: Pose2 | None
+        self,
+        name: str,
+        config: FinalPoseConfig | ClosedLoopConfig,
+        context: CheckContext,
+        goal: Pose2 | None = None,
     ) -> None:
-        super().__init__(name)
-        self._robot, self._tolerance, self._yaw_tolerance = robot, tolerance, yaw_tolerance
+        super().__init__(name, config, context)
+        self._robot, self._tolerance = context.robot(config.robot), config.tolerance
+        self._yaw_tolerance = config.yaw_tolerance
         self._must_leave = goal is None
         self._goal = goal
         self._farthest = 0.0
@@ -97,6 +91,23 @@ class EndsAt(Check):
         return ""
 
 
+class FinalPose(_EndsAt):
+    """Compares with the goal."""
+
+    Config = FinalPoseConfig
+
+    def __init__(self, name: str, config: FinalPoseConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context, Pose2(config.x, config.y, config.yaw or 0.0))
+        if config.yaw is None:
+            self._yaw_tolerance = None
+
+
+class ClosedLoop(_EndsAt):
+    """Compares with the start."""
+
+    Config = ClosedLoopConfig
+
+
 class PathOnCircleConfig(RobotCheckConfig):
     """The base stays on a circle the whole time."""
 
@@ -107,17 +118,15 @@ class PathOnCircleConfig(RobotCheckConfig):
     tolerance: Annotated[Metres, Positive]
     """Largest distance from the circle [m]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return PathOnCircle(self.label(kind), self, context.robot(self.robot))
-
 
 class PathOnCircle(Check):
     """Keeps the largest distance from the circle."""
 
-    def __init__(self, name: str, config: PathOnCircleConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    Config = PathOnCircleConfig
+
+    def __init__(self, name: str, config: PathOnCircleConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._motion = BaseMotion()
         self._worst: float | None = None
         self._at_s: float | None = None

@@ -30,17 +30,15 @@ class RecoveriesConfig(RobotCheckConfig):
             raise ValueError(f"max ({self.max}) must not be less than min ({self.min})")
         return self
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return Recoveries(self.label(kind), self, context.robot(self.robot))
-
 
 class Recoveries(Check):
     """Keeps the last count, when it last changed, and how far the robot has driven."""
 
-    def __init__(self, name: str, config: RecoveriesConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    Config = RecoveriesConfig
+
+    def __init__(self, name: str, config: RecoveriesConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._count = self._goals = 0
         self._driven = 0.0
         self._last: tuple[float, float] | None = None

@@ -29,17 +29,15 @@ class DrivenDistanceConfig(RobotCheckConfig):
             raise ValueError(f"min ({self.min:g} m) must not exceed max ({self.max:g} m)")
         return self
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return DrivenDistance(self.label(kind), self, context.robot(self.robot))
-
 
 class DrivenDistance(Check):
     """Adds up the steps of the base on the floor plane."""
 
-    def __init__(self, name: str, config: DrivenDistanceConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    Config = DrivenDistanceConfig
+
+    def __init__(self, name: str, config: DrivenDistanceConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._distance = 0.0
         self._motion = BaseMotion()
         self._previous: Array | None = None
@@ -87,17 +85,17 @@ class EnergyConfig(RobotCheckConfig):
     max: Annotated[Joules, Positive]
     """Largest work [J]."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return Energy(self.label(kind), self, context.robot(self.robot))
-
 
 class Energy(Check):
     """Keeps the work done so far, and since when it is too much."""
 
-    def __init__(self, name: str, config: EnergyConfig, robot: str) -> None:
-        super().__init__(name)
-        self._config, self._robot = config, robot
+    measures_work = True
+
+    Config = EnergyConfig
+
+    def __init__(self, name: str, config: EnergyConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._config, self._robot = config, context.robot(config.robot)
         self._energy = 0.0
         self._moved = self._seen = False
         self._at_s: float | None = None

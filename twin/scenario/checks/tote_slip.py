@@ -23,10 +23,6 @@ class ToteSlipConfig(CheckConfig):
     tote: str | None = None
     """Name of the tote; absent: every tote that is carried."""
 
-    def build(self, kind: str, context: CheckContext) -> Check:
-        """Return the fold."""
-        return ToteSlip(kind if self.tote is None else f"{kind}({self.tote})", self)
-
 
 @dataclass
 class _Grasp:
@@ -42,8 +38,10 @@ class _Grasp:
 class ToteSlip(Check):
     """Compares with the pose at the first tick of each grasp."""
 
-    def __init__(self, name: str, config: ToteSlipConfig) -> None:
-        super().__init__(name)
+    Config = ToteSlipConfig
+
+    def __init__(self, name: str, config: ToteSlipConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
         self._config = config
         self._grasps: dict[str, _Grasp] = {}
         self._worst: float | None = None

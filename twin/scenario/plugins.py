@@ -1,0 +1,163 @@
+"""Where scenario files name plugins: found when the file is read, executed when a run is made of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, get_type_hints
+
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
+from pydantic_core import CoreSchema
+
+from twin.errors import PluginError
+from twin.plugins import Kind, Plugin
+from twin.scenario.fields import OneOf
+from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
+
+
+class PluginUse(StrictModel):
+    """A plugin that a scenario names, with its parameters as they stand there."""
+
+    reference: str
+    """Name, `module:Class` or `path/FILE.py:Class`."""
+    params: Mapping[str, Any] = {}
+
+    def config(self, plugin: Plugin[Any]) -> Any:
+        """Return the plugin's own config; runs its file.
+
+        Raises:
+            PluginError: a parameter is wrong.
+        """
+        try:
+            return configured(plugin, self.params)
+        except Faults as wrong:
+            raise PluginError(
+                [
+                    plugin.error(f"has a wrong parameter: {fault.message}").problems[0]
+                    for fault in wrong.faults
+                ]
+            ) from None
+
+
+def reference(kind: Kind[Any]) -> AfterValidator:
+    """Return the validator of a plugin's name; a path becomes one that starts at the file's folder."""
+    return AfterValidator(lambda text, info: located(kind, text, info)[0])
+
+
+def located(kind: Kind[Any], text: str, info: ValidationInfo, at: Loc = ()) -> tuple[str, Plugin[Any]]:
+    """Return a name that holds everywhere and its plugin; runs nothing of it. Raises Faults."""
+    folder = (info.context or {}).get("folder", Path())
+    source, _, attribute = text.rpartition(":")
+    try:
+        return f"{folder / source}:{attribute}" if source.endswith(".py") else text, kind.find(text, folder)
+    except PluginError as wrong:
+        raise Faults([Fault(at, str(problem)) for problem in wrong.problems]) from None
+
+
+def use(kind: Kind[Any], text: str, params: Any, info: ValidationInfo, *, named_at: Loc = ()) -> PluginUse:
+    """Return the use of a plugin; its parameters are checked if the run is made: `info.context["execute"]`.
+
+    Raises:
+        Faults: there is no such plugin, or a parameter is wrong.
+        PluginError: it was executed, and is wrong itself.
+    """
+    full, plugin = located(kind, text, info, named_at)
+    params = {} if params is None else params
+    if not isinstance(params, Mapping):
+        raise Faults([Fault((), f"the parameters of {plugin.title} must be a mapping (key: value)")])
+    if (info.context or {}).get("execute"):
+        configured(plugin, params)
+    return PluginUse(reference=full, params=params)
+
+
+def configured(plugin: Plugin[Any], params: Mapping[str, Any]) -> Any:
+    """Return a plugin's `Config` with the given values; None if it has none. Raises Faults."""
+    config = plugin.config
+    if config is None:
+        if params:
+            raise Faults([Fault((key,), f"{plugin.title} takes no parameters") for key in params])
+        return None
+    if issubclass(config, StrictModel):
+        schema = config
+    elif dataclasses.is_dataclass(config):
+        schema = _schema(config)
+    else:
+        raise plugin.error("has a Config that is no dataclass")
+    model, found = findings(schema, dict(params), {})
+    if model is None:
+        raise Faults([Fault(finding.loc, finding.message) for finding in found])
+    if schema is config:
+        return model
+    try:
+        return config(**{name: getattr(model, name) for name in model.model_fields_set})
+    except ValueError as wrong:  # of its own __post_init__
+        raise Faults([Fault((), f"{plugin.title}: {wrong}")]) from None
+
+
+def _schema(config: type) -> type[StrictModel]:
+    """Return the schema of a frozen dataclass: units and bounds are in its annotations."""
+    hints = get_type_hints(config, include_extras=True)
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(config):
+        if field.init:
+            default = field.default if field.default_factory is dataclasses.MISSING else None
+            fields[field.name] = (hints[field.name], ... if default is dataclasses.MISSING else default)
+    return create_model(config.__name__, __base__=StrictModel, **fields)
+
+
+class OneOfKind(OneOf):
+    """A mapping with exactly one key: the name of something that ships, or of a user's plugin."""
+
+    model_config = ConfigDict(extra="allow")
+    of: ClassVar[Kind[Any]]
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        reference = handler(core)
+        schema = handler.resolve_ref_schema(reference)
+        params = {"type": ["object", "null"]}
+        for name in cls.of.names():
+            schema["properties"].setdefault(name, params)
+        schema |= {"patternProperties": {":": params}, "additionalProperties": False}
+        return reference
+
+    @model_validator(mode="before")
+    @classmethod
+    def _user_plugins(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        faults: list[Fault] = []
+        found: dict[str, Any] = {}
+        for key, value in data.items():
+            found[key] = value
+            if ":" not in key and key not in cls.of.names():
+                faults.append(Fault((key,), "", cls.of.names()))
+            elif key not in cls.model_fields:
+                try:
+                    found[key] = use(cls.of, key, value, info)
+                except Faults as wrong:
+                    faults += [Fault((key, *fault.loc), fault.message) for fault in wrong.faults]
+        if faults:
+            raise Faults(faults)
+        return found
+
+
+def model_of(name: str, base: type[OneOfKind]) -> type[OneOfKind]:
+    """Return the schema of a `OneOfKind`, with a field for each thing that ships, and any other name."""
+    kind = base.of
+    fields: dict[str, Any] = {}
+    for shipped in kind.shipped:
+        config = kind.find(shipped).config
+        assert config is not None
+        summary = (config.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+        fields[shipped] = (Annotated[config | None, Field(description=summary)], None)
+    return create_model(name, __base__=base, __doc__=base.__doc__, **fields)
