@@ -7,15 +7,13 @@ from what he wrote, and so knows whose it is, also where two plugins share their
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from twin.navigation.failures import NavigationFailure
 from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
@@ -85,6 +83,15 @@ def _bound(plugin: Plugin[Any], loaded: Any) -> type:
     return type(written.__name__, (written,), {"plugin": plugin, "__module__": written.__module__})
 
 
+def bound(plugin: Plugin[Any], config: Any) -> Any:
+    """Return parameters as an object by which `create` finds the plugin; None: there are none."""
+    kind = config_of(plugin)
+    if config is not None and not is_dataclass(config):
+        raise plugin.error("has a Config that is no dataclass")
+    given = () if config is None else (field.name for field in fields(config) if field.init)
+    return kind(**{name: getattr(config, name) for name in given})
+
+
 def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
     """Return the plugin that parameters are of."""
     found: Plugin[T] | None = getattr(config, "plugin", None)
@@ -95,56 +102,50 @@ def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
 
 
 def create(kind: Kind[T], config: Any, **setup: Any) -> T:
-    """Return the object that parameters are of, made with further arguments; a user's is guarded."""
+    """Return the object that parameters are of, made with further arguments.
+
+    Raises:
+        PluginError: a user's plugin cannot be made; also later, when it answers nonsense.
+    """
     plugin = plugin_of(kind, config)
-    return guarded(plugin)(config=config, **setup)
+    made = _checked(plugin)
+    with plugin.guard:
+        return made(config=config, **setup)
 
 
-def guarded(plugin: Plugin[T]) -> Callable[..., T]:
-    """Return a plugin's class; of a user's one that names the plugin where it raises, or answers nonsense."""
+def _checked(plugin: Plugin[T]) -> Callable[..., T]:
+    """Return a plugin's class; of a user's one that looks at what its methods answer."""
     loaded = plugin.load()
     if plugin.ships:
         return loaded
     base = next(cls for cls in loaded.__mro__ if f"{cls.__module__}:{cls.__name__}" == plugin.kind.base)
-    members: dict[str, Any] = {"__module__": loaded.__module__}
-    for name in ("__init__", *(name for name in dir(base) if not name.startswith("_"))):
-        member = inspect.getattr_static(loaded, name)
-        if inspect.isfunction(member):
-            members[name] = _guard(plugin, name, member)
-        elif isinstance(member, property) and member.fget is not None:
-            members[name] = property(_guard(plugin, name, member.fget))
-    return type(loaded.__name__, (loaded,), members)
+    members: dict[str, Any] = {
+        name: _answering(plugin, getattr(loaded, name), answer)
+        for name, answer in _ANSWERS.items()
+        if hasattr(base, name)
+    }
+    return type(loaded.__name__, (loaded,), {**members, "__module__": loaded.__module__})
 
 
-def _guard(plugin: Plugin[Any], name: str, method: Callable[..., Any]) -> Any:
-    answer: Callable[..., Any] = _ANSWERS.get(name, _anything)
-
+def _answering(plugin: Plugin[Any], method: Callable[..., Any], answer: Callable[..., Any]) -> Any:
     @functools.wraps(method)
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
-        with plugin.guard:
-            try:
-                return answer(plugin, method(self, *args, **kwargs), *args)
-            except NavigationFailure as failure:  # the robot's answer, no fault of the plugin's
-                why = failure
-        raise why
+        said = method(self, *args, **kwargs)
+        try:
+            return answer(plugin, said)
+        except (TypeError, ValueError):
+            raise plugin.error(f"answers {method.__name__} with {said!r:.200}") from None
 
     return call
 
 
-def _anything(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
-    return answer
-
-
-def _command(plugin: Plugin[Any], answer: Any, *_: Any) -> tuple[float, float]:
-    try:
-        v, w = map(float, answer)
-    except (TypeError, ValueError):
-        raise plugin.error(f"returns {answer!r} as a command; it must be (v [m/s], w [rad/s])") from None
+def _command(plugin: Plugin[Any], answer: Any) -> tuple[float, float]:
+    v, w = map(float, answer)
     require_finite(plugin, "a command", (v, w))
     return v, w
 
 
-def _path(plugin: Plugin[Any], answer: Any, *_: Any) -> np.ndarray:
+def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
     path = np.array(answer, dtype=np.float64, order="C")
     if path.ndim != 2 or path.shape[1] != 3 or not len(path):
         raise plugin.error(f"returns a path of shape {path.shape}; it must be (n, 3): x, y, yaw")
@@ -152,9 +153,9 @@ def _path(plugin: Plugin[Any], answer: Any, *_: Any) -> np.ndarray:
     return path
 
 
-def _truth(plugin: Plugin[Any], answer: Any, *_: Any) -> bool:
+def _truth(plugin: Plugin[Any], answer: Any) -> bool:
     if not isinstance(answer, bool | np.bool_):
-        raise plugin.error(f"answers {answer!r}; it must be True or False")
+        raise TypeError
     return bool(answer)
 
 
@@ -167,4 +168,4 @@ _ANSWERS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "check": _truth,
     }
 )
-"""What methods must return: takes the plugin, the answer and the method's arguments; returns the answer."""
+"""What methods must return: functions of the plugin and its answer, which they return."""
