@@ -120,21 +120,24 @@ def _checked(plugin: Plugin[T]) -> Callable[..., T]:
         return loaded
     base = next(cls for cls in loaded.__mro__ if f"{cls.__module__}:{cls.__name__}" == plugin.kind.base)
     members: dict[str, Any] = {
-        name: _answering(plugin, getattr(loaded, name), answer)
+        name: _answering(plugin, getattr(loaded, name), *answer)
         for name, answer in _ANSWERS.items()
         if hasattr(base, name)
     }
     return type(loaded.__name__, (loaded,), {**members, "__module__": loaded.__module__})
 
 
-def _answering(plugin: Plugin[Any], method: Callable[..., Any], answer: Callable[..., Any]) -> Any:
+def _answering(
+    plugin: Plugin[Any], method: Callable[..., Any], answer: Callable[..., Any], valid: str
+) -> Any:
     @functools.wraps(method)
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
         said = method(self, *args, **kwargs)
         try:
             return answer(plugin, said)
         except (TypeError, ValueError):
-            raise plugin.error(f"answers {method.__name__} with {said!r:.200}") from None
+            shown = f"answers {method.__name__} with {said!r:.200}"
+            raise plugin.error(f"{shown}; it must return {valid}") from None
 
     return call
 
@@ -148,7 +151,7 @@ def _command(plugin: Plugin[Any], answer: Any) -> tuple[float, float]:
 def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
     path = np.array(answer, dtype=np.float64, order="C")
     if path.ndim != 2 or path.shape[1] != 3 or not len(path):
-        raise plugin.error(f"returns a path of shape {path.shape}; it must be (n, 3): x, y, yaw")
+        raise ValueError
     require_finite(plugin, "a path", path[~np.isfinite(path).all(axis=1)].ravel())
     return path
 
@@ -159,13 +162,15 @@ def _truth(plugin: Plugin[Any], answer: Any) -> bool:
     return bool(answer)
 
 
-_ANSWERS: Mapping[str, Callable[..., Any]] = MappingProxyType(
+_A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
+_A_TRUTH = (_truth, "True or False")
+_ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
     {
-        "compute_velocity_commands": _command,
-        "create_plan": _path,
-        "smooth": _path,
-        "is_goal_reached": _truth,
-        "check": _truth,
+        "compute_velocity_commands": (_command, "(v [m/s], w [rad/s])"),
+        "create_plan": _A_PATH,
+        "smooth": _A_PATH,
+        "is_goal_reached": _A_TRUTH,
+        "check": _A_TRUTH,
     }
 )
-"""What methods must return: functions of the plugin and its answer, which they return."""
+"""What methods must return: what reads the answer of a plugin, and raises a ValueError; in words."""
