@@ -17,10 +17,10 @@ import mujoco
 import numpy as np
 
 from twin import runtime
-from twin.models.specs import LidarSpec
 from twin.periods import next_due
 from twin.runtime.build import build
 from twin.scenario.schema import Scenario, load
+from twin.sensors.lidar import LidarSpec
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 

@@ -17,9 +17,9 @@ from twin.geometry import Pose2, Pose3, rotate_wxyz
 from twin.models import load
 from twin.models.description import RobotDescription
 from twin.models.shapes import Box
+from twin.sensors.lidar import Lidar
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Scene, Shape, StaticBody
-from twin.sim.sensors import Lidar
 from twin.sim.world import World
 
 WALL_X = 2.0

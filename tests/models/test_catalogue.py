@@ -13,8 +13,11 @@ from twin.geometry import matrix_from_quat_wxyz
 from twin.models import catalogue, link_poses, load
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_positions
-from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 from twin.runtime.defaults.from_description import footprint
+from twin.sensors.contact import ContactSpec
+from twin.sensors.imu import ImuSpec
+from twin.sensors.lidar import LidarSpec
+from twin.sensors.range import RangeSpec
 
 ROBOTS = ("diff_bot", "jackal", "r2d2", "sp1s", "test_robot", "warehouse_bot")
 

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from twin.models.loader import parse_urdf
-from twin.models.specs import DriveSpec, LidarSpec, RangeSpec
+from twin.models.specs import DriveSpec
+from twin.sensors.lidar import LidarSpec
+from twin.sensors.range import RangeSpec
 
 WHEELS = ("fl", "fr", "bl", "br")
 

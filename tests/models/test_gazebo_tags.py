@@ -11,7 +11,8 @@ from twin.models.checks import check
 from twin.models.description import RobotDescription, Spring
 from twin.models.loader import parse_urdf
 from twin.models.shapes import Visual
-from twin.models.specs import ImuSpec, RangeSpec
+from twin.sensors.imu import ImuSpec
+from twin.sensors.range import RangeSpec
 
 BOX = "<geometry><box size='1 1 1'/></geometry>"
 CHAIN = (

@@ -29,7 +29,6 @@ from twin.bridge.srvs import Empty
 from twin.geometry import Pose2
 from twin.models import load
 from twin.models.kinematics import link_poses
-from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.localisation.static import StaticLocalisationNode
@@ -38,6 +37,10 @@ from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.nodes.transforms import TransformListenerNode
+from twin.sensors.contact import ContactSpec
+from twin.sensors.imu import ImuSpec
+from twin.sensors.lidar import LidarSpec
+from twin.sensors.range import RangeSpec
 
 # robot_state_publisher
 

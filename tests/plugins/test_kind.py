@@ -69,8 +69,8 @@ def test_a_file_beside_the_one_that_names_it_is_found_and_run_only_when_it_is_cr
 
     told: list[str] = []
     with execution(told.append) as executed:
-        assert plugin.create("a").result() == "calm"
-        assert checks.find("calm.py:Calm", tmp_path / "mine").create("b").name == "b"
+        assert plugin.create("a", None, None).result() == "calm"
+        assert checks.find("calm.py:Calm", tmp_path / "mine").create("b", None, None).name == "b"
     assert told == [str(file)]
     assert list(executed.versions) == ["calm.py:Calm"]
     assert executed.versions["calm.py:Calm"].startswith("sha256:")
@@ -81,7 +81,7 @@ def test_an_edited_file_is_run_again(checks: Kind[Check], tmp_path: Path) -> Non
     write(tmp_path, "calm.py", GOOD)
     old = checks.find("calm.py:Calm", tmp_path).load()
     write(tmp_path, "calm.py", GOOD.replace("calm", "serene"))
-    assert checks.find("calm.py:Calm", tmp_path).create("a").result() == "serene"
+    assert checks.find("calm.py:Calm", tmp_path).create("a", None, None).result() == "serene"
     assert checks.find("calm.py:Calm", tmp_path).load() is not old
 
 
@@ -100,7 +100,7 @@ def test_entry_points_are_names_with_a_version(checks: Kind[Check], path: Path) 
     assert "calm" in checks.names()
     assert "their_calm" not in sys.modules
     with execution() as executed:
-        assert checks.find("calm").create("x").result() == "calm"
+        assert checks.find("calm").create("x", None, None).result() == "calm"
     assert executed.versions == {"calm": "their 1.5"}
 
 
@@ -114,7 +114,7 @@ def test_two_packages_with_one_name_are_named(checks: Kind[Check], path: Path) -
     ):
         checks.find("calm")
     checks.register("rough", "their_calm:Calm")  # others are not harmed
-    assert checks.find("rough").create("x").result() == "calm"
+    assert checks.find("rough").create("x", None, None).result() == "calm"
     with pytest.raises(PluginError, match="two plugins are called 'rough'"):
         checks.register("rough", "their_calm:Other")
 
@@ -134,7 +134,7 @@ def test_a_class_of_a_running_program_can_be_registered(checks: Kind[Check]) -> 
         pytest.raises(PluginError, match=rf"{__file__}:\d+: check 'mine' fails: ValueError: not today"),
         plugin.guard,
     ):
-        plugin.create("m").observe(None)  # type: ignore[arg-type]
+        plugin.create("m", None, None).observe(None)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ HEAD = "from twin.scenario.checks import Check\n"
             r"calm.py:3: .* fails: ZeroDivisionError",
         ),
         (
-            "class Calm(Check):\n    def __init__(self):\n        [].pop()\n"
+            "class Calm(Check):\n    def __init__(self, *_):\n        [].pop()\n"
             "    def result(self): ...\n    def observe(self, o): ...",
             r"calm.py:4: check 'calm.py:Calm' fails: IndexError: pop from empty list",
         ),
@@ -206,13 +206,13 @@ def test_a_class_that_does_not_fit_is_one_sentence_with_its_line(
     write(tmp_path, "calm.py", HEAD + code)
     plugin = checks.find("calm.py:Calm", tmp_path)
     with pytest.raises(PluginError, match=message):
-        plugin.create()
+        plugin.create("a", None, None)
 
 
 def test_a_call_that_raises_names_the_line_of_the_plugin(checks: Kind[Check], tmp_path: Path) -> None:
     write(tmp_path, "calm.py", GOOD)
     plugin = checks.find("calm.py:Calm", tmp_path)
-    check = plugin.create("a")
+    check = plugin.create("a", None, None)
     with (
         pytest.raises(PluginError, match=r"calm.py:6: check 'calm.py:Calm' fails: ZeroDivisionError"),
         plugin.guard,

@@ -14,11 +14,11 @@ from twin.bridge.clock import Clock
 from twin.geometry import Pose3, rotate_wxyz
 from twin.models import load as load_robot
 from twin.models.description import RobotDescription
-from twin.models.specs import ContactSpec
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.runtime.run import Run
 from twin.runtime.sensing import SensorSchedule
 from twin.scenario.schema import Scenario
+from twin.sensors.contact import ContactSpec
 
 STEP_NS = 2_000_000
 RATES = {200.0: (200, 1), 62.0: (62, 1), 30.0: (30, 1), 7.0: (7, 1), 33.3: (333, 10), 499.0: (499, 1)}

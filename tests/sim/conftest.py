@@ -13,7 +13,11 @@ from twin.convert.conversion import Conversion
 from twin.geometry import Pose2, Pose3
 from twin.models.description import Joint, Link, RobotDescription
 from twin.models.shapes import Box, Visual
-from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+from twin.models.specs import SensorSpec
+from twin.sensors.contact import ContactSpec
+from twin.sensors.imu import ImuSpec
+from twin.sensors.lidar import LidarSpec
+from twin.sensors.range import RangeSpec
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
 

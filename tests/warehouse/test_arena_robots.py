@@ -8,7 +8,7 @@ import pytest
 from twin.convert import convert
 from twin.geometry import Pose2
 from twin.models import load
-from twin.models.specs import LidarSpec
+from twin.sensors.lidar import LidarSpec
 from twin.sim.robot import RobotPlacement
 from twin.sim.world import World
 from twin.warehouse import arena as arenas

@@ -1,4 +1,4 @@
-"""The robots that ship with twin."""
+"""The robots that have a name: those that ship with twin, and those of installed packages."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from pathlib import Path
 
 from twin.errors import ModelError, Problem, nearest
 from twin.files.reading import refusal
+from twin.plugins import Files
 
 ROBOTS = Path(__file__).parent / "robots"
 """A ROS package (`$(find twin_robots)`) with one folder per robot."""
 
 
 def catalogue() -> Mapping[str, Path]:
-    """Return the file of every robot that ships with twin, by name, in alphabetical order."""
-    return {path.parent.name: path for path in sorted(ROBOTS.glob("*/*.urdf.xacro")) if _is_robot(path)}
+    """Return the file of every robot that has a name, in alphabetical order."""
+    shipped = {path.parent.name: path for path in sorted(ROBOTS.glob("*/*.urdf.xacro")) if _is_robot(path)}
+    return Files("robot", shipped, group="twin.robots", endings=(".urdf.xacro", ".xacro", ".urdf"))
 
 
 def resolve(name_or_path: str | Path) -> Path:

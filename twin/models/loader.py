@@ -105,7 +105,7 @@ def parse_urdf(
         drive=read_drive(root, joints, report),
         commands=read_transmissions(root, joints, report, read_commands(root, joints, report)),
         states=read_states(root, joints),
-        sensors=(sensors := read_sensors(root, links, report)),
+        sensors=(sensors := read_sensors(root, links, report, options)),
         cameras=read_cameras(root, links, report, taken=[sensor.name for sensor in sensors]),
         springs=read_springs(root, joints),
         static=read_static(root),

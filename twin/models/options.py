@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+
+from twin.plugins import Plugin
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +26,10 @@ class ReadOptions:
     """`skip`: a shape whose mesh is missing or unreadable is left out, with a warning."""
     apply_up_axis: bool = True
     """Turn COLLADA meshes as their `<up_axis>` says, which RViz and Gazebo ignore."""
+    sensors: tuple[Plugin[Any], ...] = ()
+    """Sensors of a user, beside those that ship; they are executed."""
+    execute: bool = False
+    """Whether sensors of installed packages are executed; else a robot is read without them."""
     repair: bool = False
     """Take the nearest physical inertia for a moving part whose own is impossible, with a warning."""
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from twin.geometry import Pose3
 from twin.periods import Period, period_of
+from twin.plugins import Plugin
 
 Interface = Literal["position", "velocity", "effort"]
 """Of ros2_control: [rad or m], [rad/s or m/s], [Nm or N]."""
@@ -64,6 +65,8 @@ class CommandSpec:
 class SensorSpec:
     """Common part of all sensors, from `<gazebo reference="link"><sensor>`."""
 
+    kind: ClassVar[str] = ""
+    """The name in `twin.models.sensors.SENSORS` of what it is read by; a user's has a `plugin`."""
     name: str
     link: str
     """The frame in which it measures and that stamps its messages."""
@@ -73,59 +76,13 @@ class SensorSpec:
     T_link_sensor: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
     """From the sensor's `<pose>`; `twin.sim` samples at the link's origin."""
     line: int = 0
+    plugin: Plugin[Any] | None = field(default=None, repr=False, compare=False)
+    """What reads, simulates and converts it, if it is a user's."""
 
     @property
     def period(self) -> Period:
         """Time between two samples [ns]."""
         return period_of(self.rate_hz)
-
-
-@dataclass(frozen=True, kw_only=True)
-class LidarSpec(SensorSpec):
-    """A planar lidar: `samples` rays from angle_min to angle_max, both included."""
-
-    angle_min: float
-    """[rad]"""
-    angle_max: float
-    """[rad]"""
-    samples: int
-    range_min: float
-    """[m]"""
-    range_max: float
-    """[m]"""
-    noise_stddev: float = 0.0
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeSpec(SensorSpec):
-    """An ultrasonic ranger: the nearest echo in a cone about +x (REP-103)."""
-
-    field_of_view: float
-    """Full angle of the cone [rad]."""
-    range_min: float
-    """[m]"""
-    range_max: float
-    """[m]"""
-    noise_stddev: float = 0.0
-    """[m]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImuSpec(SensorSpec):
-    """Gyroscope and accelerometer."""
-
-    gyro_noise_stddev: float = 0.0
-    """[rad/s]"""
-    gyro_bias_stddev: float = 0.0
-    """Of the constant bias, drawn once a run [rad/s]."""
-    accel_noise_stddev: float = 0.0
-    """[m/s²]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactSpec(SensorSpec):
-    """A bumper: tells whether its link touches anything."""
 
 
 @dataclass(frozen=True, kw_only=True)

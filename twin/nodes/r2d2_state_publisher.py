@@ -11,7 +11,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Float64MultiArray, MultiArrayLayout
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
-from twin.nodes.missions.simple import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.robot_pose import Frames
 from twin.periods import period_of
 

@@ -13,10 +13,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from twin.errors import PluginError, TwinError
+from twin.plugins.guard import blame, depth_of
 from twin.plugins.installed import version_of
 
 if TYPE_CHECKING:
     from twin.plugins.places import Place
+    from twin.plugins.plugin import Plugin
+
+
+_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
 
 
 class Execution:
@@ -27,10 +33,13 @@ class Execution:
         self.versions: dict[str, str] = {}
         """By the plugin's name: its package and version, or the hash of its file."""
         self._tell, self._told = tell, set[str]()
+        self._plugins: list[Plugin[object]] = []
 
-    def add(self, name: str, place: Place, version: str | None) -> None:
+    def add(self, plugin: Plugin[object]) -> None:
         """Take a plugin that is about to be executed."""
-        version = version or version_for(place)
+        name, place = plugin.name, plugin.place
+        self._plugins.append(plugin)
+        version = plugin.version or version_for(place)
         if self.versions.setdefault(name, version) != version:  # files of one name in two folders
             self.versions[f"{place.file}:{place.attribute}"] = version
         where = str(place.file or place.module)
@@ -38,8 +47,28 @@ class Execution:
             self._told.add(where)
             self._tell(where)
 
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Keep what is executed inside of the block, too: a run need not be one block.
 
-_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
+        An exception that came through a plugin's code leaves as a `PluginError` with its line.
+        """
+        token = _CURRENT.set(self)
+        try:
+            yield
+        except Exception as error:
+            blamed = None if isinstance(error, TwinError) else self.blamed(error)
+            if blamed is None:
+                raise
+            raise blamed from error
+        finally:
+            _CURRENT.reset(token)
+
+    def blamed(self, error: Exception) -> PluginError | None:
+        """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
+        faults = [(depth_of(plugin, error), plugin) for plugin in self._plugins]
+        depth, plugin = max(faults, key=lambda fault: fault[0], default=(0, None))
+        return blame(plugin, error) if plugin is not None and depth else None
 
 
 @contextmanager
@@ -49,17 +78,16 @@ def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
     if current is not None:
         yield current
         return
-    token = _CURRENT.set(current := Execution(tell))
-    try:
+    current = Execution(tell)
+    with current.going_on():
         yield current
-    finally:
-        _CURRENT.reset(token)
 
 
-def run(name: str, place: Place, version: str | None, *, kept: bool) -> Any:
-    """Import a plugin, and return what its name stands for; `kept`: whether the run tells of it."""
-    if kept and (current := _CURRENT.get()) is not None:
-        current.add(name, place, version)
+def run(plugin: Plugin[object]) -> Any:
+    """Import a plugin, and return what its name stands for; raises what it raises."""
+    place = plugin.place
+    if not plugin.ships and (current := _CURRENT.get()) is not None:
+        current.add(plugin)
     if place.module is not None:
         module = importlib.import_module(place.module)
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -41,14 +41,26 @@ def blame(plugin: Plugin[object], error: BaseException) -> PluginError:
         return PluginError(Problem(f"{what}: {error.msg}", Path(error.filename), error.lineno))
     text = " ".join(str(error).split())
     file, line = plugin.place.file, plugin.place.line
-    if file is not None:
-        mine = file.resolve()
-        for frame in traceback.extract_tb(error.__traceback__):
-            # Of a package, its other modules count as well; twin's own frames lie in between.
-            at = Path(frame.filename).resolve()
-            if at == mine or (plugin.place.module is not None and mine.parent in at.parents):
-                file, line = (file if at == mine else at), frame.lineno
+    for _, file, line in _own_frames(plugin, error):  # noqa: B007  (the innermost one)
+        pass
     return PluginError(Problem(f"{what}: {text}" if text else what, file, line))
+
+
+def depth_of(plugin: Plugin[object], error: BaseException) -> int:
+    """Return how deep in the calls that an exception ended the plugin's code was; 0: not in them."""
+    return max((depth for depth, _, _ in _own_frames(plugin, error)), default=0)
+
+
+def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int | None]]:
+    """Yield depth, file and line of the plugin's code, outermost first; of a package, all modules count."""
+    file = plugin.place.file
+    if file is None:
+        return
+    mine = file.resolve()
+    for depth, frame in enumerate(traceback.extract_tb(error.__traceback__), 1):
+        at = Path(frame.filename).resolve()
+        if at == mine or (plugin.place.module is not None and mine.parent in at.parents):
+            yield depth, (file if at == mine else at), frame.lineno
 
 
 def require_finite(plugin: Plugin[object], what: str, values: Iterable[float]) -> None:

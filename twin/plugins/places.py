@@ -96,12 +96,15 @@ def _line_of(file: Path, attribute: str, what: str) -> int | None:
     except (OSError, ValueError) as fault:
         raise PluginError(Problem(f"{what}: cannot be read: {fault}", file)) from None
     names = dict(_names(tree.body))
+    own = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
     outer = attribute.partition(".")[0]
     if outer in names:
         return names[outer]
     if "*" in names:
         return None
-    raise PluginError(Problem(f"{what}: there is no '{attribute}' in it; {nearest(attribute, names)}", file))
+    raise PluginError(
+        Problem(f"{what}: there is no '{attribute}' in it; {nearest(attribute, own or names)}", file)
+    )
 
 
 def _names(body: list[ast.stmt]) -> Iterator[tuple[str, int]]:

@@ -58,7 +58,7 @@ class Plugin(Generic[T]):
         found = self.known
         if found is None:
             try:
-                found = run(self.name, self.place, self.version, kept=not self.ships)
+                found = run(self)
             except Exception as error:
                 if self.ships:
                     raise

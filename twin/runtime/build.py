@@ -20,6 +20,7 @@ from twin.convert import convert
 from twin.errors import MapError, ScenarioError
 from twin.geometry import Pose2
 from twin.models import ReadOptions, load
+from twin.models.sensors import SENSORS
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.runtime.defaults.drives import with_drive
@@ -91,9 +92,10 @@ def build(
     arena = arenas.load(scenario.world.arena) if scenario.world.arena is not None else None
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
+    reading = ReadOptions(sensors=tuple(map(SENSORS.find, scenario.sensors)), execute=True)
     placements, heights, ratios = [], {}, {}
     for robot in scenario.robots:
-        described = load(robot.model, ReadOptions(args=robot.args))
+        described = load(robot.model, replace(reading, args=robot.args))
         description = with_drive(described, robot, scenario.mission)
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from twin.models.kinematics import link_poses
 from twin.models.shapes import Box
-from twin.models.specs import LidarSpec
 from twin.navigation.costmaps.footprint import radii
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import Surroundings
+from twin.sensors.lidar import LidarSpec
 from twin.sim.scene import Scene
 from twin.warehouse.footprint import Rectangle
 

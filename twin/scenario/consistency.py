@@ -109,6 +109,10 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, Idle):
         return
     robots = [robot.id for robot in scenario.robots]
+    if mission.robot is None:
+        if len(robots) > 1:
+            yield Fault(("mission",), f"the mission must name its robot; valid: {', '.join(robots)}")
+        return
     if mission.robot not in robots:
         yield Fault(
             ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"

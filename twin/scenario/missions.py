@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import (
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+)
+from pydantic_core import CoreSchema, core_schema, to_json
 
 from twin.parameters import (
     Hertz,
@@ -16,8 +26,13 @@ from twin.parameters import (
     RadiansPerSecond,
     Seconds,
 )
+from twin.plugins import Kind
 from twin.scenario.fields import OneOf
+from twin.scenario.plugins import PluginUse, use
 from twin.strict_yaml import StrictModel
+
+if TYPE_CHECKING:
+    from twin.nodes.missions import MissionNode
 
 
 class PickAndPlaceTask(StrictModel):
@@ -222,7 +237,71 @@ class Idle(StrictModel):
     """`idle`"""
 
 
-Mission = Annotated[
+MISSIONS: Kind[MissionNode] = Kind("mission", base="twin.nodes.missions:MissionNode", group="twin.missions")
+
+MISSIONS.register("pick_and_place", "twin.runtime.stacks.missions:pick_and_place")
+MISSIONS.register("behaviors", "twin.runtime.stacks.missions:behaviors")
+MISSIONS.register("random_goals", "twin.runtime.stacks.missions:random_goals")
+MISSIONS.register("velocity_profile", "twin.runtime.stacks.missions:velocity_profile")
+MISSIONS.register("r2d2_state_publisher", "twin.runtime.stacks.missions:r2d2_state_publisher")
+MISSIONS.register("explore", "twin.runtime.stacks.missions:explore")
+MISSIONS.register("idle", "twin.runtime.stacks.missions:idle")
+
+
+class UserMission(StrictModel):
+    """A mission of your own; its other keys are its parameters."""
+
+    model_config = ConfigDict(extra="allow")
+    type: str
+    """`FILE.py:Class`, `module:Class`, or the name of an installed package's mission."""
+    robot: str | None = None
+    """Name of the robot; may be left out if there is only one."""
+
+    @property
+    def use(self) -> PluginUse:
+        """The plugin and its parameters."""
+        return PluginUse(reference=self.type, params=self.model_extra or {})
+
+
+class _OrAUsers:
+    """Metadata of `Mission`: a type that does not ship is a plugin's."""
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        shipped = handler.generate_schema(_Shipped)
+        return core_schema.with_info_wrap_validator_function(self._validate, shipped)
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [handler(core), UserMission.model_json_schema()]}
+
+    def _validate(self, data: Any, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        if isinstance(data, StrictModel):
+            return data
+        name = data.get("type") if isinstance(data, Mapping) else None
+        if (
+            not isinstance(name, str)
+            or not (":" in name or name in MISSIONS.names())
+            or name in MISSIONS.shipped
+        ):
+            # Through JSON again: what comes to a validator is Python's, whose lists are strictly no tuples.
+            return _SHIPPED.validate_json(to_json(data), strict=True, context=info.context)
+        params = {key: value for key, value in data.items() if key not in ("type", "robot")}
+        used = use(MISSIONS, name, params, info, named_at=("type",))
+        return UserMission.model_validate({**data, "type": used.reference}, strict=True)
+
+
+_Shipped = Annotated[
     PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle,
     Field(discriminator="type"),
+]
+_SHIPPED: TypeAdapter[Any] = TypeAdapter(_Shipped)
+Mission = Annotated[
+    PickAndPlace
+    | Behaviors
+    | RandomGoals
+    | VelocityProfile
+    | R2D2StatePublisher
+    | Explore
+    | Idle
+    | UserMission,
+    _OrAUsers(),
 ]

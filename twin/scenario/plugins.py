@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema
 from twin.errors import PluginError
 from twin.plugins import Kind, Plugin
 from twin.scenario.fields import OneOf
-from twin.strict_yaml import Fault, Faults, StrictModel, findings
+from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
 
 
 class PluginUse(StrictModel):
@@ -50,27 +50,34 @@ class PluginUse(StrictModel):
 
 def reference(kind: Kind[Any]) -> AfterValidator:
     """Return the validator of a plugin's name; a path becomes one that starts at the file's folder."""
-    return AfterValidator(lambda text, info: located(kind, text, info)[0])
+
+    def validate(text: str, info: ValidationInfo) -> str:
+        full, plugin = located(kind, text, info)
+        if (info.context or {}).get("execute"):
+            plugin.load()
+        return full
+
+    return AfterValidator(validate)
 
 
-def located(kind: Kind[Any], text: str, info: ValidationInfo) -> tuple[str, Plugin[Any]]:
+def located(kind: Kind[Any], text: str, info: ValidationInfo, at: Loc = ()) -> tuple[str, Plugin[Any]]:
     """Return a name that holds everywhere and its plugin; runs nothing of it. Raises Faults."""
     folder = (info.context or {}).get("folder", Path())
     source, _, attribute = text.rpartition(":")
     try:
         return f"{folder / source}:{attribute}" if source.endswith(".py") else text, kind.find(text, folder)
     except PluginError as wrong:
-        raise Faults([Fault((), str(problem)) for problem in wrong.problems]) from None
+        raise Faults([Fault(at, str(problem)) for problem in wrong.problems]) from None
 
 
-def use(kind: Kind[Any], text: str, params: Any, info: ValidationInfo) -> PluginUse:
+def use(kind: Kind[Any], text: str, params: Any, info: ValidationInfo, *, named_at: Loc = ()) -> PluginUse:
     """Return the use of a plugin; its parameters are checked if the run is made: `info.context["execute"]`.
 
     Raises:
         Faults: there is no such plugin, or a parameter is wrong.
         PluginError: it was executed, and is wrong itself.
     """
-    full, plugin = located(kind, text, info)
+    full, plugin = located(kind, text, info, named_at)
     params = {} if params is None else params
     if not isinstance(params, Mapping):
         raise Faults([Fault((), f"the parameters of {plugin.title} must be a mapping (key: value)")])
@@ -98,9 +105,13 @@ def configured(plugin: Plugin[Any], params: Mapping[str, Any]) -> Any:
     if schema is config:
         return model
     try:
-        return config(**{name: getattr(model, name) for name in model.model_fields_set})
+        return config(**_given(model))
     except ValueError as wrong:  # of its own __post_init__
         raise Faults([Fault((), f"{plugin.title}: {wrong}")]) from None
+
+
+def _given(model: StrictModel) -> dict[str, Any]:
+    return {name: getattr(model, name) for name in model.model_fields_set}
 
 
 def _schema(config: type) -> type[StrictModel]:
@@ -111,7 +122,7 @@ def _schema(config: type) -> type[StrictModel]:
         if field.init:
             default = field.default if field.default_factory is dataclasses.MISSING else None
             fields[field.name] = (hints[field.name], ... if default is dataclasses.MISSING else default)
-    return create_model(config.__name__, __base__=StrictModel, **fields)
+    return create_model(config.__name__, __base__=StrictModel, __doc__=config.__doc__, **fields)
 
 
 class OneOfKind(OneOf):
@@ -150,6 +161,16 @@ class OneOfKind(OneOf):
             raise Faults(faults)
         return found
 
+    def resolved(self) -> tuple[Plugin[Any], Any]:
+        """Return the plugin and an object of its `Config`; runs the file of a user's."""
+        given = self.config
+        plugin = self.of.find(given.reference if isinstance(given, PluginUse) else self.kind)
+        if isinstance(given, PluginUse):
+            return plugin, given.config(plugin)
+        config = plugin.config
+        assert config is not None
+        return plugin, given if isinstance(given, config) else config(**_given(given))
+
 
 def model_of(name: str, base: type[OneOfKind]) -> type[OneOfKind]:
     """Return the schema of a `OneOfKind`, with a field for each thing that ships, and any other name."""
@@ -158,6 +179,7 @@ def model_of(name: str, base: type[OneOfKind]) -> type[OneOfKind]:
     for shipped in kind.shipped:
         config = kind.find(shipped).config
         assert config is not None
+        model = config if issubclass(config, StrictModel) else _schema(config)
         summary = (config.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
-        fields[shipped] = (Annotated[config | None, Field(description=summary)], None)
+        fields[shipped] = (Annotated[model | None, Field(description=summary)], None)
     return create_model(name, __base__=base, __doc__=base.__doc__, **fields)

@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from twin.models.catalogue import catalogue
 from twin.parameters import NotNegative, Seconds
+from twin.scenario.detectors import DetectorEntry
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
@@ -38,6 +39,8 @@ class RobotConfig(StrictModel):
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None
     """Its navigation nodes; absent: none, `{}`: all defaults."""
+    detector: DetectorEntry | None = None
+    """What finds the boxes that its gripper is to take; absent: `box_faces`."""
 
     @property
     def id(self) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from twin.errors import ScenarioError
+from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
 from twin.scenario.checks import Check, CheckEntry
@@ -17,6 +18,7 @@ from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
+from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
 from twin.strict_yaml import Faults, StrictModel
@@ -44,6 +46,8 @@ class Scenario(StrictModel):
     """What they are to do."""
     faults: tuple[FaultEntry, ...] = ()
     """What goes wrong, and when."""
+    sensors: tuple[Annotated[str, reference(SENSORS)], ...] = ()
+    """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
     recording: RecordingConfig = RecordingConfig()
@@ -86,7 +90,7 @@ def load(
 
     Args:
         name_or_path: A name of `twin scenarios`, or a file.
-        overrides: Dotted path to YAML text (`{"robots.0.pose.x": "2 m"}`).
+        overrides: Dotted paths to YAML text: `{"robots.0.pose.x": "2 m"}`.
         execute: Whether the plugins that it names are executed, and their parameters checked by what they
             declare; without it they are found by reading.
 
@@ -94,8 +98,8 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    path = catalogue.resolve(name_or_path)
-    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    file = catalogue.resolve(name_or_path)
+    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
 
 
 def json_schema() -> dict[str, Any]:

@@ -13,7 +13,7 @@ from twin.models.description import RobotDescription
 
 if TYPE_CHECKING:
     from twin.sim.hardware import Hardware
-    from twin.sim.sensors import Sensor
+    from twin.sim.sensors import SampledSensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class RobotHandle:
         name: str,
         description: RobotDescription,
         hardware: Hardware,
-        sensors: tuple[Sensor, ...],
+        sensors: tuple[SampledSensor, ...],
         data: mujoco.MjData,
         mocap_id: int,
         free_joint: tuple[int, int] | None,

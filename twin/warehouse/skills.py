@@ -47,7 +47,7 @@ from twin.nodes.missions.leaves import (
     sequence,
     while_true,
 )
-from twin.nodes.missions.simple import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
 

@@ -14,6 +14,7 @@ Outcome = Literal["kept", "translated", "guessed", "dropped"]
 not what is possible, so something was chosen. dropped: has no effect in the model."""
 Fate = tuple[Outcome, str]
 """What became of an element, and how or why."""
+NOISE: Fate = ("translated", "noise of the sensor; MuJoCo itself adds none")
 INSIDE: Fate = ("translated", "see what is inside")
 NO_EFFECT: Fate = ("dropped", "nothing in it has an effect")
 LOST: Mapping[str, str] = MappingProxyType(

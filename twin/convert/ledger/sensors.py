@@ -6,51 +6,36 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from twin.convert.ledger.fates import Fate, container_fate
-from twin.convert.sensors import MAX_RAYS
 from twin.models.description import RobotDescription
-from twin.models.specs import CameraSpec, LidarSpec, SensorSpec
+from twin.models.sensors import plugin_of
+from twin.models.specs import CameraSpec, SensorSpec
 from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
 from twin.models.urdf.gazebo import value_of
 from twin.models.urdf.sensors import kind_of
 
-RAYS: Fate = ("translated", "one site and rangefinder per ray")
-RANGE: Fate = ("translated", "cutoff of the rangefinders")
-NOISE: Fate = ("translated", "noise of the sensor; MuJoCo itself adds none")
 ELSEWHERE = "not in robot.xml; report.json has it"
 OUTPUT: Fate = ("dropped", "the plugin is not simulated")
 TAGS: Mapping[str, Fate] = MappingProxyType(
     {
-        "scan/horizontal/samples": RAYS,
-        "scan/horizontal/min_angle": RAYS,
-        "scan/horizontal/max_angle": RAYS,
-        "range/max": RANGE,
-        "sonar/max": RANGE,
-        "sonar/radius": RAYS,
-        "plugin/fov": RAYS,
-        "noise/stddev": NOISE,
-        "angular_velocity/x/noise/stddev": NOISE,
-        "linear_acceleration/x/noise/stddev": NOISE,
-        "noise/rate/stddev": NOISE,
-        "noise/accel/stddev": NOISE,
-        "gaussianNoise": NOISE,
-        "plugin/gaussianNoise": NOISE,
         "bodyName": ("translated", "body of the site"),
         "pose": ("kept", "pose of the site"),
-        "horizontal_fov": ("translated", "fovy, by the image's shape"),
-        "image/width": ("kept", "resolution"),
-        "image/height": ("kept", "resolution"),
         "topic": ("dropped", ELSEWHERE),
         "update_rate": ("dropped", f"MuJoCo measures in every step; {ELSEWHERE}"),
-        "range/min": ("dropped", ELSEWHERE),
-        "sonar/min": ("dropped", ELSEWHERE),
-        "clip/near": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
-        "clip/far": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
         "always_on": ("dropped", "sensors are always on"),
         "collision": ("dropped", "every shape of the link counts"),
     }
 )
 """By path below the sensor, without `ray`, `lidar`, `imu`, `camera` and `contact`."""
+OF_CAMERAS: Mapping[str, Fate] = MappingProxyType(
+    {
+        "horizontal_fov": ("translated", "fovy, by the image's shape"),
+        "image/width": ("kept", "resolution"),
+        "image/height": ("kept", "resolution"),
+        "clip/near": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
+        "clip/far": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
+    }
+)
 WRAPPERS = ("ray", "lidar", "imu", "camera", "contact")
 
 
@@ -60,21 +45,21 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
     if spec is None:
         kind = kind_of(sensor) or "without a type"
         return "dropped", f"not simulated: a sensor of type {kind}"
-    if isinstance(spec, LidarSpec) and spec.samples > MAX_RAYS:
-        return "dropped", f"{spec.samples} rays; more than {MAX_RAYS} are left out. {ELSEWHERE}"
+    camera = isinstance(spec, CameraSpec)
+    cls = None if camera else plugin_of(spec).load()
+    missing = cls.left_out(spec) if cls is not None else ""
+    if missing:
+        return "dropped", f"{missing}. {ELSEWHERE}"
     if element is sensor:
-        return "translated", _translation(spec)
+        return "translated", f"{'camera' if cls is None else cls.in_mujoco}, called '{spec.name}'"
     path = _path(element, sensor)
-    if len(element) and path not in TAGS:
+    own = OF_CAMERAS.get(path) if cls is None else cls.fate(path, element, sensor)
+    if own is None and len(element) and path not in TAGS:
         return container_fate(element, lambda child: sensor_fate(child, sensor, link, description))
-    if isinstance(spec, CameraSpec) and path.startswith("noise"):
+    if camera and path.startswith("noise"):
         return "dropped", f"MuJoCo's images are free of noise; {ELSEWHERE}"
-    if path.endswith("bias_stddev"):
-        return "dropped", ELSEWHERE
-    if path.startswith(("angular_velocity/", "linear_acceleration/")) and path.endswith("/stddev"):
-        return _axis_noise(element, path, sensor)
-    if path in TAGS:
-        return TAGS[path]
+    if (found := own or TAGS.get(path)) is not None:
+        return found
     return OUTPUT if path.startswith("plugin") else ("dropped", "no counterpart in MuJoCo")
 
 
@@ -98,23 +83,3 @@ def _path(element: Element, sensor: Element) -> str:
             tags.append(element.tag)
         element = element.getparent()
     return "/".join(reversed(tags))
-
-
-def _translation(spec: SensorSpec) -> str:
-    kinds = {
-        "LidarSpec": "a site and rangefinder per ray",
-        "RangeSpec": "a site and rangefinder per ray of the cone",
-        "ImuSpec": "site with framequat, gyro and accelerometer",
-        "ContactSpec": "contact sensor of the body",
-        "CameraSpec": "camera",
-    }
-    return f"{kinds[type(spec).__name__]}, called '{spec.name}'"
-
-
-def _axis_noise(element: Element, path: str, sensor: Element) -> Fate:
-    """Return the fate of an IMU's noise about one axis: that of x holds for all."""
-    quantity, axis = path.split("/")[:2]
-    x = sensor.find(f"imu/{quantity}/x/noise/{element.tag}")
-    if axis == "x" or (x is not None and value_of(x) == value_of(element)):
-        return NOISE
-    return "dropped", "the noise of the x axis holds for all axes"

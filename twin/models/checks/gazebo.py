@@ -8,7 +8,7 @@ from twin.errors import nearest
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.source import read_source
 from twin.models.description import RobotDescription
-from twin.models.specs import ContactSpec
+from twin.models.sensors import SENSORS, plugin_of
 from twin.models.urdf.cameras import CAMERA, camera_fault, lenses
 from twin.models.urdf.commands import INTERFACES, command_interface
 from twin.models.urdf.document import Element, Report, first, place
@@ -21,14 +21,13 @@ from twin.models.urdf.gazebo import (
     number_in,
     value_of,
 )
-from twin.models.urdf.sensors import LIDAR, PLUGIN_IMU, RAY, SONAR, kind_of
+from twin.models.urdf.sensors import PLUGIN_IMU, kind_of
 from twin.models.urdf.transmissions import HARDWARE, transmissions
 
 OWN_PLUGINS = ("joint_state_publisher", "joint-state-publisher-system", "_control", "_control-system")
 """Ends of the names of libraries whose work twin's own nodes do: joint states, and running controllers."""
 WORLD_PLUGINS = ("sensors-system", "imu-system", "contact-system")
 """Of new Gazebo, which has to be told to simulate sensors at all."""
-SAMPLED = (*LIDAR, *SONAR, "imu", "contact")
 
 
 def gazebo(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -94,20 +93,21 @@ class _Check:
         what = f"sensor '{name}' of type {kind or 'unknown'}"
         if kind in CAMERA:
             yield from self._camera(sensor, link, what)
-        elif kind not in SAMPLED:
+        elif kind not in SENSORS.names():
             message = f"{what} is not simulated"
-            yield self._found("not-simulated", sensor, message, f"twin has {', '.join(SAMPLED)} and cameras")
-        rows = number_in(first(sensor, *(f"{ray}/scan/vertical/samples" for ray in RAY)))
-        if kind in LIDAR and rows is not None and rows > 1:
-            message = f"{what} has {rows:g} layers, of which only a level one is simulated"
-            yield self._found("not-simulated", sensor, message, "twin's lidars are planar")
+            yield self._found(
+                "not-simulated", sensor, message, f"twin has {', '.join(SENSORS.names())} and cameras"
+            )
+        elif (plugin := SENSORS.find(kind)).ships:
+            for fault, fix in plugin.load().unlike_gazebo(sensor):
+                yield self._found("not-simulated", sensor, f"{what} {fault}", fix)
         yield from self._displaced(sensor, name, link)
 
     def _displaced(self, sensor: Element, name: str, link: str) -> Iterator[Diagnostic]:
         for spec in self._description.sensors:
             moved = any(spec.T_link_sensor.xyz) or abs(spec.T_link_sensor.quat_wxyz[0]) < 1.0
             mine = spec.link == link and spec.name in (name, f"{link}_{name}")
-            if mine and moved and not isinstance(spec, ContactSpec):
+            if mine and moved and plugin_of(spec).load().at_origin:
                 yield self._found(
                     "not-simulated",
                     sensor,

@@ -47,7 +47,7 @@ def read_cameras(
         for name, camera in lenses(element):
             if camera_fault(camera):
                 continue
-            common = read_common(element, link, "camera", report)
+            common = read_common(element, link, report, topic="image_raw", rate_hz=30.0)
             names = [*taken, *(other.name for other in cameras)]
             common["name"] = unique_name(name or common["name"], link, names)
             common["T_link_sensor"] = common["T_link_sensor"] @ read_pose(camera)

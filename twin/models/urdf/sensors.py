@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Container, Iterator, Mapping
 from dataclasses import replace
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from twin.geometry import Pose3
 from twin.models.description import Link
-from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
+from twin.models.options import ReadOptions
+from twin.models.sensors import SENSORS
+from twin.models.specs import SensorSpec
 from twin.models.urdf.document import LARGEST, Element, Report, first, text_of
 from twin.models.urdf.drives import library_of
 from twin.models.urdf.gazebo import value_of
 from twin.models.urdf.plain_numbers import plain_numbers
+from twin.plugins import Plugin
 
-LIDAR = ("gpu_lidar", "lidar", "ray", "gpu_ray")
-SONAR = ("sonar", "ray-cone")
 PLUGIN_IMU = "gazebo_ros_imu"
 """An IMU of ROS 1 that is a plugin of the robot, with the name of its link in <bodyName>."""
-TOPICS = {"lidar": "scan", "sonar": "range", "imu": "imu", "contact": "bumper", "camera": "image_raw"}
-DEFAULT_RATE_HZ = {"lidar": 10.0, "sonar": 10.0, "imu": 100.0, "contact": 50.0, "camera": 30.0}
 TOPIC_TAGS = (
     "topic",
     "plugin/ros/remapping",
@@ -30,10 +29,6 @@ TOPIC_TAGS = (
     "plugin/topic",
     "topicName",
 )
-RAY = ("lidar", "ray")
-"""The element with <scan> and <range>: new and classic name."""
-MAX_SAMPLES = 100_000
-"""Rays of a lidar; every one of them is cast for every scan."""
 MAX_RATE_HZ = 1e6
 
 
@@ -48,13 +43,16 @@ class Common(TypedDict):
     line: int
 
 
-def read_sensors(root: Element, links: Mapping[str, Link], report: Report) -> tuple[SensorSpec, ...]:
+def read_sensors(
+    root: Element, links: Mapping[str, Link], report: Report, options: ReadOptions
+) -> tuple[SensorSpec, ...]:
     """Return the sensors that `twin.sim` samples, in file order; those of unknown links are left out."""
     sensors: list[SensorSpec] = []
     for link, element in sensor_elements(root, links):
-        sensor = _read_sensor(element, link, report)
-        if sensor is None:
+        plugin = _plugin_for(element, options)
+        if plugin is None:
             continue
+        sensor = _read_sensor(element, link, report, plugin)
         if any((sensor.name, sensor.link) == (other.name, other.link) for other in sensors):
             report.add(
                 element, f"sensor '{sensor.name}' is defined twice; names are unique", code="bad-sensor"
@@ -87,37 +85,37 @@ def kind_of(element: Element) -> str:
     return "imu" if element.tag == "plugin" else str(element.get("type", "")).strip()
 
 
-def _read_sensor(element: Element, link: str, report: Report) -> SensorSpec | None:
+def _plugin_for(element: Element, options: ReadOptions) -> Plugin[Any] | None:
+    """Return what reads a sensor; None: it is not simulated, or is a package's, which may not be run."""
     kind = kind_of(element)
-    if kind in LIDAR:
-        if _is_range(element):
-            return _read_range(element, link, report)
-        return _read_lidar(element, link, report)
-    if kind in SONAR:
-        return _read_range(element, link, report)
-    if kind == "imu":
-        return _read_imu(element, link, report)
-    if kind == "contact":
-        return ContactSpec(**read_common(element, link, "contact", report))
-    return None
+    for plugin in options.sensors:
+        types = plugin.load().types
+        if not isinstance(types, tuple) or not types:
+            raise plugin.error("names no `types`, the type='...' of the <sensor>s that it is")
+        if kind in types:
+            return plugin
+    if kind not in SENSORS.names():
+        return None
+    plugin = SENSORS.find(kind)
+    return plugin if plugin.ships or options.execute else None
 
 
-def _is_range(element: Element) -> bool:
-    """Tell whether classic Gazebo's ray sensor is read out as a sensor_msgs/Range (an ultrasonic ranger)."""
-    for plugin in element.findall("plugin"):
-        if text_of(plugin, "output_type") == "sensor_msgs/Range":
-            return True
-        if plugin.get("filename", "").endswith("gazebo_ros_range.so"):
-            return True
-    return False
+def _read_sensor(element: Element, link: str, report: Report, plugin: Plugin[Any]) -> SensorSpec:
+    with plugin.guard:
+        sensor = plugin.load().for_element(element)
+        common = read_common(element, link, report, topic=sensor.topic, rate_hz=sensor.rate_hz)
+        spec: SensorSpec = sensor.read(element, common, report)
+    if not isinstance(spec, SensorSpec):
+        raise plugin.error(f"reads a {type(spec).__name__} from its <sensor>; it must be a SensorSpec")
+    return spec if plugin.ships else replace(spec, plugin=plugin)
 
 
-def read_common(element: Element, link: str, kind: str, report: Report) -> Common:
+def read_common(element: Element, link: str, report: Report, *, topic: str, rate_hz: float) -> Common:
     """Return what all sensors have; a rate of 0, which is every step in Gazebo, becomes the usual one."""
     rate = report.child_number(
         element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate"
     )
-    rate = rate or DEFAULT_RATE_HZ[kind]
+    rate = rate or rate_hz
     if not 0.0 < rate <= MAX_RATE_HZ:
         report.add(
             element,
@@ -126,11 +124,11 @@ def read_common(element: Element, link: str, kind: str, report: Report) -> Commo
             code="bad-sensor",
         )
         rate = 1.0
-    topic = text_of(element, *TOPIC_TAGS) or TOPICS[kind]
+    given = text_of(element, *TOPIC_TAGS) or topic
     return {
         "name": report.required(element, "name"),
         "link": link,
-        "topic": topic.rpartition(":=")[2].strip("/~") or TOPICS[kind],
+        "topic": given.rpartition(":=")[2].strip("/~") or topic,
         "rate_hz": rate,
         "T_link_sensor": read_pose(element),
         "line": report.line(element),
@@ -152,103 +150,7 @@ def read_pose(element: Element) -> Pose3:
     return Pose3.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
 
 
-def _read_lidar(element: Element, link: str, report: Report) -> LidarSpec:
-    scan = _ray_child(element, "scan/horizontal")
-    samples = _need(element, scan, "samples", report)
-    if samples != int(samples) or not 1 <= samples <= MAX_SAMPLES:
-        valid = f"a whole number from 1 to {MAX_SAMPLES}"
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}' has {samples:g} samples; {valid}",
-            code="bad-sensor",
-        )
-        samples = 1.0
-    angle_min, angle_max = (
-        _need(element, scan, "min_angle", report),
-        _need(element, scan, "max_angle", report),
-    )
-    if angle_min > angle_max:
-        report.add(
-            element, f"sensor '{element.get('name', '')}': min_angle is above max_angle", code="bad-sensor"
-        )
-    low, high = _read_reach(element, report)
-    return LidarSpec(
-        **read_common(element, link, "lidar", report),
-        angle_min=angle_min,
-        angle_max=angle_max,
-        samples=int(samples),
-        range_min=low,
-        range_max=high,
-        noise_stddev=_noise(element, report),
-    )
-
-
-def _read_range(element: Element, link: str, report: Report) -> RangeSpec:
-    scan = _ray_child(element, "scan/horizontal")
-    field_of_view = report.child_number(element, "plugin/fov", "sonar/fov")
-    low, high = _read_reach(element, report)
-    radius = report.child_number(element, "sonar/radius")
-    if field_of_view is None and radius is not None and high > 0.0:
-        field_of_view = 2.0 * math.atan2(radius, high)
-    if field_of_view is None:
-        field_of_view = _need(element, scan, "max_angle", report) - _need(element, scan, "min_angle", report)
-    if not 0.0 < field_of_view < math.pi:
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}' has a cone of {field_of_view:g} rad; 0 to pi is valid",
-            code="bad-sensor",
-        )
-    return RangeSpec(
-        **read_common(element, link, "sonar", report),
-        field_of_view=field_of_view,
-        range_min=low,
-        range_max=high,
-        noise_stddev=_noise(element, report),
-    )
-
-
-def _read_imu(element: Element, link: str, report: Report) -> ImuSpec:
-    both = _deviation(element, report, "plugin/gaussianNoise", "gaussianNoise") or 0.0
-    gyro = _deviation(element, report, *_imu_noise("angular_velocity", "rate", "stddev"))
-    bias = _deviation(element, report, *_imu_noise("angular_velocity", "rate", "bias_stddev"))
-    accel = _deviation(element, report, *_imu_noise("linear_acceleration", "accel", "stddev"))
-    return ImuSpec(
-        **read_common(element, link, "imu", report),
-        gyro_noise_stddev=both if gyro is None else gyro,
-        gyro_bias_stddev=bias or 0.0,
-        accel_noise_stddev=both if accel is None else accel,
-    )
-
-
-def _imu_noise(axes: str, classic: str, name: str) -> tuple[str, str]:
-    """Return where new and classic Gazebo have a parameter of the noise."""
-    return f"imu/{axes}/x/noise/{name}", f"imu/noise/{classic}/{name}"
-
-
-def _read_reach(element: Element, report: Report) -> tuple[float, float]:
-    reach = _ray_child(element, "range")
-    if reach is None:
-        reach = first(element, "sonar")
-    low, high = _need(element, reach, "min", report), _need(element, reach, "max", report)
-    if not 0.0 <= low < high:
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}': range {low:g} to {high:g} m is not a range",
-            code="bad-sensor",
-        )
-    return low, high
-
-
-def _ray_child(element: Element, path: str) -> Element | None:
-    return first(element, *(f"{ray}/{path}" for ray in RAY))
-
-
-def _noise(element: Element, report: Report) -> float:
-    paths = (*(f"{ray}/noise/stddev" for ray in RAY), "plugin/gaussianNoise")
-    return _deviation(element, report, *paths) or 0.0
-
-
-def _deviation(element: Element, report: Report, *paths: str) -> float | None:
+def deviation(element: Element, report: Report, *paths: str) -> float | None:
     """Return a standard deviation, or None."""
     value = report.child_number(element, *paths)
     if value is not None and value < 0.0:
@@ -260,7 +162,8 @@ def _deviation(element: Element, report: Report, *paths: str) -> float | None:
     return value
 
 
-def _need(sensor: Element, parent: Element | None, name: str, report: Report) -> float:
+def required_number(sensor: Element, parent: Element | None, name: str, report: Report) -> float:
+    """Return the number of a child that a sensor cannot do without."""
     value = None if parent is None else report.child_number(parent, name)
     if value is None:
         if parent is None or first(parent, name) is None:

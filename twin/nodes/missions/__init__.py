@@ -1,1 +1,3 @@
-"""What robots are told to do, as nodes."""
+"""What robots are to do, as nodes."""
+
+from twin.nodes.missions.mission_node import MissionNode as MissionNode

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.bridge.bus import Bus
-from twin.nodes.missions.simple import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 
 

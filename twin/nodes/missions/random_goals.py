@@ -16,7 +16,7 @@ from twin.bridge.qos import LATCHED
 from twin.geometry import Array, Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.messages import pose_stamped
-from twin.nodes.missions.simple import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 

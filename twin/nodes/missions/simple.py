@@ -10,52 +10,12 @@ from typing import Any
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import String, Twist
-from twin.bridge.qos import LATCHED
+from twin.bridge.msgs import Twist
 from twin.bridge.types import ActionType
-from twin.navigation.behavior_trees.node import Status, TreeNode
+from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.missions.leaves import CallAction, Do, WaitUntil, sequence
+from twin.nodes.missions.mission_node import MissionNode
 from twin.periods import next_due
-
-
-class MissionNode:
-    """`/mission`: publishes `mission/state`, and knows whether the mission is over and how it ended."""
-
-    def __init__(self, bus: Bus, *, namespace: str = "") -> None:
-        self.node = bus.create_node("mission", namespace)
-        self._publisher = self.node.create_publisher(String, "mission/state", LATCHED)
-        self.state = "start"
-        self.done = False
-        self.succeeded: bool | None = None
-        self.reason = ""
-
-    def run(self, tree: TreeNode, period_ns: int) -> None:
-        """Tick a tree until it ends, and the mission with it."""
-
-        def tick() -> None:
-            status = Status.IDLE if self.done else tree.execute_tick()
-            if status.is_completed:
-                self.finish(status is Status.SUCCESS)
-
-        self.node.create_timer(period_ns, tick)
-
-    def enter(self, state: str) -> None:
-        """Go on to `state` and tell it."""
-        self.state = state
-        self._publisher.publish(String(data=state))
-        self.node.get_logger().info(state)
-
-    def note(self, reason: str) -> None:
-        """Keep a reason for a failure; the last one is that of the mission."""
-        self.reason = f"{self.state}: {reason}"
-        self.node.get_logger().warn(self.reason)
-
-    def finish(self, succeeded: bool) -> None:
-        """End the mission."""
-        self.done, self.succeeded = True, succeeded
-        if succeeded:
-            self.reason = ""
-        self.enter("done" if succeeded else "failed")
 
 
 @dataclass(frozen=True)

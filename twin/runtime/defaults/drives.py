@@ -31,7 +31,7 @@ def _task(robot: RobotConfig, mission: Mission) -> str:
     """Return what moves a robot, in words; empty: nothing does."""
     if robot.navigation is not None:
         return "its navigation"
-    if isinstance(mission, Idle | R2D2StatePublisher) or mission.robot != robot.id:
+    if isinstance(mission, Idle | R2D2StatePublisher) or mission.robot not in (None, robot.id):
         return ""
     still = isinstance(mission, Behaviors) and all(step.kind == "wait" for step in mission.steps)
     return "" if still else f"the mission {mission.type}"

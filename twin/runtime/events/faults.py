@@ -12,8 +12,8 @@ from twin.geometry import Pose3
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.faults import Displacement, EncoderFault, FaultEntry, Kidnapping, LidarFault, OdometryJump
-from twin.sim.sensors.failing import FailingLidar
-from twin.sim.sensors.lidar import Lidar
+from twin.sensors.failing import FailingLidar
+from twin.sensors.lidar import Lidar
 from twin.sim.world import World
 
 

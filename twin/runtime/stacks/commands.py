@@ -7,7 +7,7 @@ from dataclasses import replace
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.specs import DriveSpec, LidarSpec
+from twin.models.specs import DriveSpec
 from twin.navigation.control.collision_monitor import (
     FOOTPRINT_APPROACH,
     CollisionMonitorConfig,
@@ -18,6 +18,7 @@ from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNod
 from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.collision_monitor import CollisionMonitorParameters
+from twin.sensors.lidar import LidarSpec
 
 _GUARDED = "cmd_vel_muxed"
 _SCAN = "scan"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from twin.bridge.action_types import (
@@ -24,6 +25,7 @@ from twin.navigation.costmaps import footprint as footprints
 from twin.navigation.exploration.explorer import ExplorerConfig
 from twin.navigation.exploration.frontiers import FrontierConfig
 from twin.nodes.messages import pose_stamped
+from twin.nodes.missions import MissionNode
 from twin.nodes.missions.explore import ExploreMissionNode
 from twin.nodes.missions.random_goals import RandomGoalsConfig, RandomGoalsNode
 from twin.nodes.missions.simple import ActionSequenceNode, ActionStep, VelocityProfileNode
@@ -33,6 +35,7 @@ from twin.runtime.defaults.navigation import overridden
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario import missions
 from twin.scenario.missions import (
+    MISSIONS,
     Behaviors,
     BehaviorStep,
     Explore,
@@ -41,6 +44,7 @@ from twin.scenario.missions import (
     PickAndPlace,
     R2D2StatePublisher,
     RandomGoals,
+    UserMission,
     VelocityProfile,
 )
 from twin.strict_yaml import StrictModel
@@ -78,6 +82,20 @@ class IdleMission:
     reason = ""
 
 
+@dataclass(frozen=True, kw_only=True)
+class MissionContext:
+    """What a mission is made with."""
+
+    bus: Bus
+    robot: RobotStack
+    """Its nodes; `robot_pose` is where it believes to be, `frames` are the names of its frames."""
+    namespace: str
+    """Of the robot's nodes: '' for a single robot, '/name' among several."""
+    arena: Arena | None
+    seed: int
+    control_period_ns: int
+
+
 def build_mission(
     bus: Bus,
     mission: Mission,
@@ -90,42 +108,66 @@ def build_mission(
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
         return IdleMission()
-    stack, namespace = stacks[mission.robot], namespaces[mission.robot]
-    match mission:
-        case PickAndPlace():
-            return _pick_and_place(bus, mission, stack, arena, namespace)
-        case Behaviors():
-            steps = [_behavior(step, stack) for step in mission.steps]
-            return ActionSequenceNode(bus, steps * mission.repeat, namespace=namespace)
-        case RandomGoals():
-            goals = RandomGoalsConfig(
-                distance=mission.distance,
-                clearance=mission.clearance,
-                min_goal_distance=mission.min_goal_distance,
-                max_failed=mission.max_failed,
-                retries=mission.retries,
-            )
-            return RandomGoalsNode(bus, stack.robot_pose, goals, seed=seed, namespace=namespace)
-        case VelocityProfile():
-            profile = [(step.duration, step.linear, step.angular) for step in mission.steps]
-            return VelocityProfileNode(
-                bus, profile * mission.repeat, control_period_ns=control_period_ns, namespace=namespace
-            )
-        case Explore():
-            return _explore(bus, mission, stack, namespace)
-        case R2D2StatePublisher():
-            return R2D2StatePublisherNode(
-                bus,
-                radius=mission.radius,
-                rate_hz=mission.rate,
-                degrees_per_cycle=mission.degrees_per_cycle,
-                joints=tuple(stack.handle.description.commands),
-                move_base=lambda pose: stack.handle.set_kinematic_pose(
-                    Pose3.from_pose2(pose, stack.spawn_height)
-                ),
-                frames=stack.frames,
-                namespace=namespace,
-            )
+    name = mission.robot or next(iter(stacks))
+    context = MissionContext(
+        bus=bus,
+        robot=stacks[name],
+        namespace=namespaces[name],
+        arena=arena,
+        seed=seed,
+        control_period_ns=control_period_ns,
+    )
+    if not isinstance(mission, UserMission):
+        return MISSIONS.find(mission.type).create(context, mission)
+    plugin = MISSIONS.find(mission.type)
+    made = plugin.create(context, mission.use.config(plugin))
+    if not hasattr(made, "done"):
+        raise plugin.error("does not call super().__init__(context.bus, namespace=context.namespace)")
+    return made
+
+
+def behaviors(context: MissionContext, mission: Behaviors) -> MissionNode:
+    """Return Nav2's behaviours, one after the other."""
+    steps = [_behavior(step, context.robot) for step in mission.steps]
+    return ActionSequenceNode(context.bus, steps * mission.repeat, namespace=context.namespace)
+
+
+def random_goals(context: MissionContext, mission: RandomGoals) -> MissionNode:
+    """Return a drive to random places."""
+    goals = RandomGoalsConfig(
+        distance=mission.distance,
+        clearance=mission.clearance,
+        min_goal_distance=mission.min_goal_distance,
+        max_failed=mission.max_failed,
+        retries=mission.retries,
+    )
+    pose = context.robot.robot_pose
+    return RandomGoalsNode(context.bus, pose, goals, seed=context.seed, namespace=context.namespace)
+
+
+def velocity_profile(context: MissionContext, mission: VelocityProfile) -> MissionNode:
+    """Return commands open loop."""
+    return VelocityProfileNode(
+        context.bus,
+        [(step.duration, step.linear, step.angular) for step in mission.steps] * mission.repeat,
+        control_period_ns=context.control_period_ns,
+        namespace=context.namespace,
+    )
+
+
+def r2d2_state_publisher(context: MissionContext, mission: R2D2StatePublisher) -> MissionNode:
+    """Return the tutorial's circle."""
+    stack = context.robot
+    return R2D2StatePublisherNode(
+        context.bus,
+        radius=mission.radius,
+        rate_hz=mission.rate,
+        degrees_per_cycle=mission.degrees_per_cycle,
+        joints=tuple(stack.handle.description.commands),
+        move_base=lambda pose: stack.handle.set_kinematic_pose(Pose3.from_pose2(pose, stack.spawn_height)),
+        frames=stack.frames,
+        namespace=context.namespace,
+    )
 
 
 def _behavior(step: BehaviorStep, stack: RobotStack) -> ActionStep:
@@ -165,7 +207,9 @@ def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:
     raise TypeError(type(step).__name__)
 
 
-def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
+def explore(context: MissionContext, mission: Explore) -> MissionNode:
+    """Return an explorer and who watches it."""
+    bus, stack, namespace = context.bus, context.robot, context.namespace
     overrides = mission.overrides()
     inner, outer = footprints.radii(stack.footprint)
     frontiers = overridden(FrontierConfig(robot_radius=outer, inscribed_radius=inner), overrides)
@@ -175,9 +219,9 @@ def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> M
     return ExploreMissionNode(bus, node, namespace=namespace)
 
 
-def _pick_and_place(
-    bus: Bus, mission: PickAndPlace, stack: RobotStack, arena: Arena | None, namespace: str
-) -> MissionHandle:
+def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNode:
+    """Return the drive from tote to tote."""
+    stack, arena = context.robot, context.arena
     if arena is None:
         raise ScenarioError("the mission pick_and_place needs an arena with totes; set world.arena")
     if stack.manipulator is None or stack.navigator is None:
@@ -208,11 +252,11 @@ def _pick_and_place(
             )
         )
     return PickAndPlaceNode(
-        bus,
+        context.bus,
         tasks,
         stack.manipulator.arm,
         gripper_joint=stack.manipulator.gripper_joint,
         gripper_open=stack.manipulator.gripper_open,
         robot_pose=stack.robot_pose,
-        namespace=namespace,
+        namespace=context.namespace,
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
-from twin.models.specs import DriveSpec, LidarSpec
+from twin.models.specs import DriveSpec
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
@@ -25,6 +25,7 @@ from twin.runtime.stacks.commands import build_commands
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
+from twin.sensors.lidar import LidarSpec
 
 
 def build_navigation(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from twin.errors import ScenarioError
-from twin.models.specs import ImuSpec
 from twin.nodes.navigation.localisation.ekf import EkfNode, EkfNodeConfig, for_robot
 from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource
 from twin.nodes.navigation.robot_pose import Frames
@@ -14,6 +13,7 @@ from twin.runtime.parameter_files.ekf import ekf_with_file
 from twin.runtime.parameter_files.unpublished_topics import tell_unheard
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.localisation_parameters import EkfParameters
+from twin.sensors.imu import ImuSpec
 
 
 @dataclass(frozen=True, kw_only=True)

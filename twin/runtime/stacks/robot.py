@@ -114,4 +114,5 @@ class RobotStack:
             period_ns=self._context.control_period_ns,
             namespace=namespace,
         )
-        ToteDetectorNode(bus, self.robot_pose, namespace=namespace)
+        detector = None if self._context.config.detector is None else self._context.config.detector.build()
+        ToteDetectorNode(bus, self.robot_pose, detector, namespace=namespace)

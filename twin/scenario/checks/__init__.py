@@ -43,9 +43,7 @@ class AnyCheck(OneOfKind):
 
     def build(self, context: CheckContext) -> Check:
         """Return a fresh fold; runs the file of a user's check."""
-        use = self.config
-        plugin = CHECKS.find(use.reference if isinstance(use, PluginUse) else self.kind)
-        config = use.config(plugin) if isinstance(use, PluginUse) else use
+        plugin, config = self.resolved()
         subject = getattr(config, "tote", None) or getattr(config, "robot", None)
         name = plugin.name if subject is None else f"{plugin.name}({subject})"
         check = plugin.create(name, config, context)

@@ -13,6 +13,8 @@ class GuardedCheck(Check):
     """Hands everything on to a user's check."""
 
     def __init__(self, plugin: Plugin[Check], check: Check) -> None:
+        if not hasattr(check, "name"):
+            raise plugin.error("does not call super().__init__(name, config, context)")
         super().__init__(check.name, check.config, check.context)
         self.measures_work = check.measures_work
         self._plugin, self._check = plugin, check

@@ -1,42 +1,21 @@
-"""Sensors: bound to a compiled world, they turn its state into noisy readings."""
+"""Sensors in a compiled world: where they are mounted, and the rays that some cast."""
 
 from __future__ import annotations
 
-from twin.models.specs import ContactSpec, ImuSpec, LidarSpec, RangeSpec, SensorSpec
-from twin.sim.sensors.contact import ContactReading, ContactSensor
-from twin.sim.sensors.imu import Imu, ImuReading
-from twin.sim.sensors.lidar import Lidar, LidarReading
-from twin.sim.sensors.range import Range, RangeReading
-from twin.sim.sensors.sensor import Mount, Sensor
+from twin.models.sensors import plugin_of
+from twin.models.specs import SensorSpec
+from twin.sim.sensors.sensor import Mount, SampledSensor
 
-__all__ = [
-    "ContactReading",
-    "ContactSensor",
-    "Imu",
-    "ImuReading",
-    "Lidar",
-    "LidarReading",
-    "Mount",
-    "Range",
-    "RangeReading",
-    "Sensor",
-    "create_sensor",
-]
+__all__ = ["Mount", "SampledSensor", "create_sensor"]
 
 
-def create_sensor(spec: SensorSpec, mount: Mount) -> Sensor:
+def create_sensor(spec: SensorSpec, mount: Mount) -> SampledSensor:
     """Build the sensor that `spec` describes.
 
     Raises:
         ModelError: It is faster than the physics.
+        PluginError: It is a user's, and fails.
     """
     mount.check_rate(spec)
-    if isinstance(spec, LidarSpec):
-        return Lidar(spec, mount)
-    if isinstance(spec, ImuSpec):
-        return Imu(spec, mount)
-    if isinstance(spec, RangeSpec):
-        return Range(spec, mount)
-    if isinstance(spec, ContactSpec):
-        return ContactSensor(spec, mount)
-    raise TypeError(f"no sensor for {type(spec).__name__}")
+    sensor: SampledSensor = plugin_of(spec).create(spec, mount)
+    return sensor

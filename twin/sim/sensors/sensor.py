@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from twin.sim.world import World
 
 
-class Sensor(Protocol):
+class SampledSensor(Protocol):
     """Measures the world as it is now."""
 
     @property

@@ -17,7 +17,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Odometry, SpeedLimit, Twist, new
 from twin.geometry import Array, Pose2
-from twin.navigation.control.plugins import create_controller
+from twin.navigation.plugins import CONTROLLERS, create
 from twin.nodes.navigation.controller_server.command import Commander
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.display import ControllerDisplay
@@ -31,13 +31,6 @@ from twin.nodes.navigation.controller_server.goal import (
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-
-_PARAMETER_NAMES = {
-    "controllers": "",
-    "goal_checkers": "",
-    "progress_checkers": "",
-    "primary_controller": "",
-}
 
 
 class ControllerServerNode:
@@ -57,12 +50,13 @@ class ControllerServerNode:
         self.config = config or ControllerServerConfig()
         self._robot_pose = robot_pose
         self.controllers = {
-            name: create_controller(plugin, footprint) for name, plugin in self.config.controllers.items()
+            name: create(CONTROLLERS, plugin, footprint=footprint)
+            for name, plugin in self.config.controllers.items()
         }
         """By name."""
         for kind in ("controller", "goal_checker", "progress_checker"):
             node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
-        declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
+        declare_config(node, self.config, self._reconfigure)
         self._commander = Commander(node, costmap, footprint, self.config)
         self._velocity = (0.0, 0.0)
         self._speed_limit: SpeedLimit | None = None

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from twin.models.specs import LidarSpec
-from twin.sim.sensors.lidar import Lidar, LidarReading
+from twin.sensors.lidar import Lidar, LidarReading, LidarSpec
 
 LidarFailure = Literal["stop", "freeze", "nan", "blind"]
 """No reading; the last one again; nothing but NaN; nothing but inf."""

@@ -1,0 +1,169 @@
+"""A planar lidar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from twin.bridge.msgs import Header, LaserScan
+from twin.convert.sensors import SensorBuilder
+from twin.geometry import Array, quat_wxyz_from_yaw
+from twin.models.specs import SensorSpec
+from twin.models.urdf.document import Element, Report, text_of
+from twin.models.urdf.gazebo import number_in
+from twin.models.urdf.sensors import Common, required_number
+from twin.sensors.range import Range
+from twin.sensors.ray_elements import (
+    FATES,
+    MAX_RAYS,
+    add_rangefinders,
+    ray_child,
+    read_noise,
+    read_reach,
+)
+from twin.sensors.sensor import Sensor
+from twin.sim.sensors import Mount
+from twin.sim.sensors.rays import RayCaster
+
+MAX_SAMPLES = 100_000
+"""Rays of a lidar; every one of them is cast for every scan."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarSpec(SensorSpec):
+    """A planar lidar: `samples` rays from angle_min to angle_max, both included."""
+
+    kind: ClassVar[str] = "lidar"
+    angle_min: float
+    """[rad]"""
+    angle_max: float
+    """[rad]"""
+    samples: int
+    range_min: float
+    """[m]"""
+    range_max: float
+    """[m]"""
+    noise_stddev: float = 0.0
+    """[m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarReading:
+    """One scan."""
+
+    time_ns: int
+    ranges: Array
+    """From angle_min to angle_max, shape (samples,) [m].
+
+    As REP-117 says: +inf where nothing returns, -inf where something is nearer than range_min.
+    """
+
+
+class Lidar(Sensor):
+    """Casts rays in the x-y plane of its link against collision shapes; its own link is not seen."""
+
+    types = ("gpu_lidar", "lidar", "ray", "gpu_ray")
+    topic, rate_hz = "scan", 10.0
+    message = LaserScan
+    in_mujoco = "a site and rangefinder per ray"
+    fates = FATES
+
+    @classmethod
+    def for_element(cls, element: Element) -> type[Sensor]:
+        """Return a ranger if classic Gazebo's ray sensor is read out as a sensor_msgs/Range."""
+        for plugin in element.findall("plugin"):
+            if text_of(plugin, "output_type") == "sensor_msgs/Range":
+                return Range
+            if plugin.get("filename", "").endswith("gazebo_ros_range.so"):
+                return Range
+        return cls
+
+    @classmethod
+    def read(cls, element: Element, common: Common, report: Report) -> LidarSpec:
+        """Read `<ray>` or `<lidar>`."""
+        scan = ray_child(element, "scan/horizontal")
+        samples = required_number(element, scan, "samples", report)
+        if samples != int(samples) or not 1 <= samples <= MAX_SAMPLES:
+            valid = f"a whole number from 1 to {MAX_SAMPLES}"
+            report.add(
+                element,
+                f"sensor '{element.get('name', '')}' has {samples:g} samples; {valid}",
+                code="bad-sensor",
+            )
+            samples = 1.0
+        low = required_number(element, scan, "min_angle", report)
+        high = required_number(element, scan, "max_angle", report)
+        if low > high:
+            report.add(
+                element,
+                f"sensor '{element.get('name', '')}': min_angle is above max_angle",
+                code="bad-sensor",
+            )
+        range_min, range_max = read_reach(element, report)
+        return LidarSpec(
+            **common,
+            angle_min=low,
+            angle_max=high,
+            samples=int(samples),
+            range_min=range_min,
+            range_max=range_max,
+            noise_stddev=read_noise(element, report),
+        )
+
+    @classmethod
+    def unlike_gazebo(cls, element: Element) -> Iterator[tuple[str, str]]:
+        """Yield that further layers are missing."""
+        rows = number_in(ray_child(element, "scan/vertical/samples"))
+        if rows is not None and rows > 1:
+            yield f"has {rows:g} layers, of which only a level one is simulated", "twin's lidars are planar"
+
+    def __init__(self, spec: LidarSpec, mount: Mount) -> None:
+        super().__init__(spec, mount)
+        angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
+        directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(spec.samples)))
+        self._rays = RayCaster(mount, directions, cutoff=spec.range_max)
+        self._noise = mount.noise(spec.name)
+        self._world = mount.world
+
+    def sample(self, time_ns: int) -> LidarReading:
+        """Scan; all rays are cast at the same time."""
+        spec = self.spec
+        distance = self._rays.cast()
+        ranges = distance
+        if spec.noise_stddev > 0.0:
+            noise = self._noise.normal(time_ns // self._world.timestep_ns, spec.samples)
+            ranges = distance + spec.noise_stddev * noise
+        ranges = np.where(distance > spec.range_max, np.inf, ranges)
+        return LidarReading(time_ns=time_ns, ranges=np.where(distance < spec.range_min, -np.inf, ranges))
+
+    @classmethod
+    def to_message(cls, spec: LidarSpec, header: Header, reading: LidarReading) -> LaserScan:
+        """Return a scan."""
+        return LaserScan(
+            header=header,
+            angle_min=spec.angle_min,
+            angle_max=spec.angle_max,
+            angle_increment=(spec.angle_max - spec.angle_min) / max(1, spec.samples - 1),
+            time_increment=0.0,
+            scan_time=1.0 / spec.rate_hz,
+            range_min=spec.range_min,
+            range_max=spec.range_max,
+            ranges=reading.ranges.astype(np.float32),
+            intensities=np.zeros(0, np.float32),
+        )
+
+    @classmethod
+    def left_out(cls, spec: LidarSpec) -> str:
+        """Return that it has too many rays."""
+        return f"{spec.samples} rays; more than {MAX_RAYS} are left out" if spec.samples > MAX_RAYS else ""
+
+    @classmethod
+    def to_mujoco(cls, spec: LidarSpec, model: SensorBuilder) -> Iterator[str]:
+        """Add a rangefinder per ray, from angle_min to angle_max."""
+        if not cls.left_out(spec):
+            angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
+            turns = [quat_wxyz_from_yaw(float(angle)) for angle in angles]
+            yield from add_rangefinders(model, spec, turns, cutoff=spec.range_max, noise=spec.noise_stddev)
