@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test test-long check bench soak fuzz oracle scenarios smoke docs clean
+.PHONY: run test test-long check bench soak fuzz oracle scenarios wheel smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt benchmarks/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
@@ -56,12 +56,16 @@ oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fide
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios
 
+wheel: $(VENV)/.ready  ## what others install: dist/twin-*.whl with robots, arenas, scenarios and examples
+	rm -rf build/lib
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+
 smoke: constraints.txt  ## the wheel alone, in a fresh environment without the development tools
-	rm -rf build/smoke && mkdir -p build/smoke
+	rm -rf build/lib build/smoke && mkdir -p build/smoke
 	$(PYTHON) -m venv build/smoke/venv
 	build/smoke/venv/bin/python -m pip wheel --quiet --no-deps --wheel-dir build/smoke .
 	build/smoke/venv/bin/python -m pip install --quiet --constraint constraints.txt build/smoke/*.whl
-	cd build/smoke && venv/bin/twin run ../../scenarios/diff_bot_figure8.yaml --out run
+	cd build/smoke && venv/bin/twin run diff_bot_figure8 --out run && venv/bin/twin new rover && cd rover && ../venv/bin/twin test
 
 docs: $(VENV)/.ready  ## the tables of the documentation, from schemas and code
 	$(BIN)/python docs/reference.py

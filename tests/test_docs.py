@@ -48,6 +48,8 @@ SLOW = {
 
 NOT_RUN = {
     r"make (?P<target>\w+)": "sets up an environment of its own: only its recipe is looked at",
+    r"pip install twin-\*\.whl": "tests/test_wheel.py does that",
+    r"cd my_robot && (twin test .*|python -m pytest)": "tests/test_wheel.py does that, with the wheel",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",

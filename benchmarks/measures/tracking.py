@@ -17,13 +17,13 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.control.controller import Controller
-from twin.navigation.control.plugins import create_controller
 from twin.navigation.costmaps.costmap import Costmap, footprint_cost
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import Planner, PlannerConfig
 from twin.navigation.planning.smoother import SimpleSmoother
+from twin.navigation.plugins import CONTROLLERS, create
 from twin.navigation.warm_up import warm_up_controller
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.scenario.controllers import ControllerParameters
@@ -125,13 +125,13 @@ def drive(controller: Controller, costmap: Costmap, path: np.ndarray) -> Result:
 def results() -> dict[str, Result]:
     """Drive with every plugin."""
     costmap = hall()
-    plan = Planner(config=PlannerConfig()).plan(costmap, START, GOAL)
+    plan = Planner(config=PlannerConfig()).create_plan(costmap, START, GOAL)
     path = SimpleSmoother().smooth(plan, costmap)
     found = {}
     for plugin in ("regulated_pure_pursuit", "dwb", "mppi"):
         parameters = ControllerParameters(plugin=plugin)  # type: ignore[arg-type]
         config = controller_server_config(parameters, LIMITS).controllers["FollowPath"]
-        controller = create_controller(config, FOOTPRINT)
+        controller = create(CONTROLLERS, config, footprint=FOOTPRINT)
         controller.set_goal_tolerance(0.05)
         found[plugin] = drive(controller, costmap, path)
     return found

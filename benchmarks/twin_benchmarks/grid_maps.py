@@ -222,7 +222,7 @@ def _planners(costmap: Costmap) -> dict[str, Plan]:
     def planner(planner: Planner) -> Plan:
         def plan(start: Pose2, goal: Pose2) -> Route | None:
             try:
-                path = planner.plan(costmap, start, goal)
+                path = planner.create_plan(costmap, start, goal)
             except NoValidPath:
                 return None
             return lambda: path

@@ -57,10 +57,19 @@ class FakeRuntime:
         self.fault: Exception | None = None
         self.metrics = {"sim_time_s": 1.0, "wall_time_s": 0.1, "real_time_factor": 10.0}
 
-    def run(self, scenario: Scenario, **options: Any) -> Verdict:
+    def OpenRun(self, scenario: Scenario, **options: Any) -> FakeRuntime:
         self.calls.append({"scenario": scenario, **options})
+        return self
+
+    def advance_to_end(self, progress: object) -> None:
         if self.fault is not None:
             raise self.fault
+
+    def close(self) -> None:
+        pass
+
+    def finish(self) -> Verdict:
+        scenario = self.calls[-1]["scenario"]
         reason = "" if self.passed else "diff_bot used 3 J"
         check = CheckResult(
             name="energy", passed=self.passed, value=0.25, limit=1.0, unit="J", at_s=1.0, reason=reason
@@ -78,7 +87,7 @@ class FakeRuntime:
 def runtime(monkeypatch: pytest.MonkeyPatch) -> FakeRuntime:
     fake = FakeRuntime()
     module = types.ModuleType("twin.runtime")
-    module.run = fake.run  # type: ignore[attr-defined]
+    module.OpenRun = fake.OpenRun  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "twin.runtime", module)
     monkeypatch.setattr("twin.runtime", module, raising=False)
     return fake

@@ -117,12 +117,21 @@ from twin.scenario.verdict import Verdict
 cases, words = [case.split(":") for case in sys.argv[1].split()], sys.argv[2:]
 
 
-def run(scenario, **options):
-    signal.raise_signal(number)
-    return Verdict(scenario=scenario.name, seed=0)
+class Run:
+    def __init__(self, scenario, **options):
+        self.name = scenario.name
+
+    def advance_to_end(self, progress):
+        signal.raise_signal(number)
+
+    def finish(self):
+        return Verdict(scenario=self.name, seed=0)
+
+    def close(self):
+        pass
 
 
-twin.runtime = sys.modules["twin.runtime"] = types.SimpleNamespace(run=run, Progress=None)
+twin.runtime = sys.modules["twin.runtime"] = types.SimpleNamespace(OpenRun=Run, Progress=None)
 for number, how, out in cases:
     number = int(number)
     child = os.fork()

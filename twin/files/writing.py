@@ -79,6 +79,15 @@ def replaced(path: Path) -> Iterator[Path]:
         raise
 
 
+def make_folder(path: Path) -> Path:
+    """Make a folder for results, unless it is there; raises RecordingError where that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise RecordingError(f"{path}: cannot be the folder of the results: {fault.strerror}") from fault
+    return path
+
+
 @contextmanager
 def written_alone(folder: Path) -> Iterator[None]:
     """Keep other processes of twin from writing into a folder, which is there, during the block.

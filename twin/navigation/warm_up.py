@@ -28,7 +28,7 @@ from twin.navigation.localisation.particles import clusters, regularised, temper
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.odometry_watch import OdometryWatch
-from twin.navigation.planning.planner import Planner, ThetaStarConfig
+from twin.navigation.planning.planner import ThetaStar
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
 
@@ -67,7 +67,7 @@ def warm_up_keepout() -> None:
 def warm_up_planning() -> None:
     """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
     costmap = _costmap().costmap
-    SimpleSmoother().smooth(Planner(config=ThetaStarConfig()).plan(costmap, _START, _GOAL), costmap)
+    SimpleSmoother().smooth(ThetaStar().create_plan(costmap, _START, _GOAL), costmap)
 
 
 @cache

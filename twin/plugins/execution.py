@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from twin.plugins.plugin import Plugin
 
 
+_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
+
+
 class Execution:
     """The plugins that one run has executed."""
 
@@ -44,6 +47,23 @@ class Execution:
             self._told.add(where)
             self._tell(where)
 
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Keep what is executed inside of the block, too: a run need not be one block.
+
+        An exception that came through a plugin's code leaves as a `PluginError` with its line.
+        """
+        token = _CURRENT.set(self)
+        try:
+            yield
+        except Exception as error:
+            blamed = None if isinstance(error, TwinError) else self.blamed(error)
+            if blamed is None:
+                raise
+            raise blamed from error
+        finally:
+            _CURRENT.reset(token)
+
     def blamed(self, error: Exception) -> PluginError | None:
         """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
         faults = [(depth_of(plugin, error), plugin) for plugin in self._plugins]
@@ -51,29 +71,16 @@ class Execution:
         return blame(plugin, error) if plugin is not None and depth else None
 
 
-_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
-
-
 @contextmanager
 def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
-    """Keep what is executed inside of the block; blocks inside of each other keep it for the outer one.
-
-    An exception that came through a plugin's code leaves as a `PluginError` with its line.
-    """
+    """Keep what is executed inside of the block; blocks inside of each other keep it for the outer one."""
     current = _CURRENT.get()
     if current is not None:
         yield current
         return
-    token = _CURRENT.set(current := Execution(tell))
-    try:
+    current = Execution(tell)
+    with current.going_on():
         yield current
-    except Exception as error:
-        blamed = None if isinstance(error, TwinError) else current.blamed(error)
-        if blamed is None:
-            raise
-        raise blamed from error
-    finally:
-        _CURRENT.reset(token)
 
 
 def run(plugin: Plugin[object]) -> Any:

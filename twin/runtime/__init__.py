@@ -1,5 +1,5 @@
 """Builds a run from a Scenario and steps it; the only place where step order and rates are written."""
 
-from twin.runtime.run import Progress, run
+from twin.runtime.open_run import OpenRun, Progress, run
 
-__all__ = ["Progress", "run"]
+__all__ = ["OpenRun", "Progress", "run"]

@@ -7,23 +7,18 @@ plugin does not have is refused.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
-from twin.navigation.control.dwb.config import DWBConfig
-from twin.navigation.control.goal_checker import (
-    GoalCheckerConfig,
-    PositionGoalCheckerConfig,
-    StoppedGoalCheckerConfig,
-)
-from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
-from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
+from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
+from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.plugins import Kind
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
+from twin.scenario.plugin_groups import PluginGroup, plugin_choice, plugin_name
+from twin.scenario.plugins import PluginUse
 from twin.strict_yaml import Fault, Faults
 
 
@@ -35,33 +30,24 @@ def _not_the_first(name: str) -> str:
 
 ControllerId = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$"), AfterValidator(_not_the_first)]
 """As in Nav2's controller_plugins."""
-Plugin = Literal["regulated_pure_pursuit", "dwb", "mppi"]
-GOAL_CHECKERS: Mapping[str, type[PositionGoalCheckerConfig]] = MappingProxyType(
-    {
-        "simple": GoalCheckerConfig,
-        "stopped": StoppedGoalCheckerConfig,
-        "position": PositionGoalCheckerConfig,
-    }
-)
-PROGRESS_CHECKERS: Mapping[str, type[ProgressCheckerConfig]] = MappingProxyType(
-    {"simple": ProgressCheckerConfig, "pose": PoseProgressCheckerConfig}
-)
 
 
 @keys_of(StoppedGoalCheckerConfig)
 class GoalCheckerParameters(ParameterGroup):
     """Which goal checker, and its parameters."""
 
-    goal_checker: Literal["simple", "stopped", "position"] | None = None
-    """What a goal asks for: position and heading, rest too, or position alone; absent: `simple`."""
+    goal_checker: plugin_choice(GOAL_CHECKERS) | None = None  # type: ignore[valid-type]
+    """What a goal asks for: position and heading (`simple`), rest too (`stopped`), or `position` alone; a
+    plugin of yours, or `{plugin: ...}` with its parameters; absent: `simple`."""
 
 
 @keys_of(PoseProgressCheckerConfig)
 class ProgressCheckerParameters(ParameterGroup):
     """Which progress checker, and its parameters."""
 
-    progress_checker: Literal["simple", "pose"] | None = None
-    """What progress is: a movement, or a turn too; absent: `simple`."""
+    progress_checker: plugin_choice(PROGRESS_CHECKERS) | None = None  # type: ignore[valid-type]
+    """What progress is: a movement (`simple`), or a turn too (`pose`); a plugin of yours, or `{plugin: ...}`
+    with its parameters; absent: `simple`."""
 
 
 @keys_of(ControllerServerConfig)
@@ -76,19 +62,16 @@ class ServerParameters(ProgressCheckerParameters):
 class PluginParameters(GoalCheckerParameters):
     """What each controller has, whatever its plugin."""
 
-    plugin: Plugin | None = None
-    """What follows the path; absent: `regulated_pure_pursuit`."""
+    plugin: plugin_name(CONTROLLERS) | None = None  # type: ignore[valid-type]
+    """What follows the path: `regulated_pure_pursuit`, `dwb`, `mppi`, or a plugin of yours, whose parameters
+    stand beside it; absent: `regulated_pure_pursuit`."""
     rotation_shim: bool | None = None
-    """Whether the robot turns in place to a path's direction, and at the goal; absent: with all but regulated
-    pure pursuit, which does that itself."""
+    """Whether the robot turns in place to a path's direction, and at the goal; absent: with `dwb` and
+    `mppi`."""
 
 
-_OF_PLUGIN = {
-    "regulated_pure_pursuit": group_of(RegulatedPurePursuitConfig),
-    "dwb": group_of(DWBConfig),
-    "mppi": group_of(MPPIConfig),
-}
-_OF_SHIM = group_of(RotationShimConfig)
+_OF_PLUGIN = {name: group_of(config_of(CONTROLLERS.find(name))) for name in CONTROLLERS.shipped}
+_OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
 
 
 def _valid_with(name: str) -> str:
@@ -99,19 +82,27 @@ def _valid_with(name: str) -> str:
     return " or ".join(owners)
 
 
-@keys_of(RegulatedPurePursuitConfig, RotationShimConfig, DWBConfig, MPPIConfig)
-class ControllerParameters(PluginParameters, ServerParameters):
+@keys_of(*(config_of(CONTROLLERS.find(name)) for name in CONTROLLERS.shipped))
+class ControllerParameters(PluginGroup, PluginParameters, ServerParameters):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
 
+    of = CONTROLLERS
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the keys of the server, the checkers, and the rotation shim if it is asked for."""
+        shim = _OF_SHIM.model_fields if data.get("rotation_shim") is True else {}
+        return {*ServerParameters.model_fields, *PluginParameters.model_fields, *shim}
+
     @property
-    def chosen(self) -> Plugin:
+    def chosen(self) -> str:
         """The plugin, given or not."""
         return self.plugin or "regulated_pure_pursuit"
 
     @property
     def shim(self) -> bool:
         """Whether the rotation shim is in front of it."""
-        return self.chosen != "regulated_pure_pursuit" if self.rotation_shim is None else self.rotation_shim
+        return self.chosen in ("dwb", "mppi") if self.rotation_shim is None else self.rotation_shim
 
     @model_validator(mode="after")
     def _keys_of_the_plugin(self) -> ControllerParameters:
@@ -121,10 +112,13 @@ class ControllerParameters(PluginParameters, ServerParameters):
         return self
 
     def _foreign(self) -> Iterator[Fault]:
+        if self.chosen == "rotation_shim":
+            yield Fault(("plugin",), "the rotation shim stands before a plugin: write 'rotation_shim: true'")
+            return
         groups: list[type[ParameterGroup]] = [
             ServerParameters,
             PluginParameters,
-            _OF_PLUGIN[self.chosen],
+            *([_OF_PLUGIN[self.chosen]] if self.users is None else []),
             *([_OF_SHIM] if self.shim else []),
         ]
         valid = {name for group in groups for name in group.model_fields}
@@ -133,10 +127,13 @@ class ControllerParameters(PluginParameters, ServerParameters):
                 told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
                 yield Fault((name,), f"'{name}' is not of {told}; valid with {_valid_with(name)}")
 
-        for key, configs in (("goal_checker", GOAL_CHECKERS), ("progress_checker", PROGRESS_CHECKERS)):
-            having = {kind: group_of(config).model_fields for kind, config in configs.items()}
+        kinds: dict[str, Kind[Any]] = {"goal_checker": GOAL_CHECKERS, "progress_checker": PROGRESS_CHECKERS}
+        for key, configs in kinds.items():
+            having = {kind: group_of(config_of(configs.find(kind))).model_fields for kind in configs.shipped}
+            chosen = getattr(self, key) or "simple"
+            own = {} if isinstance(chosen, PluginUse) else having[chosen]
             for name in dict.fromkeys(name for names in having.values() for name in names):
-                if name in self.model_fields_set and name not in having[getattr(self, key) or "simple"]:
+                if name in self.model_fields_set and name not in own:
                     needed = " or ".join(
                         f"'{key}: {kind}'" for kind, names in having.items() if name in names
                     )

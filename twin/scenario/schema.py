@@ -90,7 +90,7 @@ def load(
 
     Args:
         name_or_path: A name of `twin scenarios`, or a file.
-        overrides: Dotted path to YAML text (`{"robots.0.pose.x": "2 m"}`).
+        overrides: Dotted paths to YAML text: `{"robots.0.pose.x": "2 m"}`.
         execute: Whether the plugins that it names are executed, and their parameters checked by what they
             declare; without it they are found by reading.
 
@@ -98,8 +98,8 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    path = catalogue.resolve(name_or_path)
-    return load_yaml(path, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    file = catalogue.resolve(name_or_path)
+    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
 
 
 def json_schema() -> dict[str, Any]:

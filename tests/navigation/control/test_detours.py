@@ -89,7 +89,7 @@ def test_dwb_gets_around_on_a_path_that_is_planned_anew_every_second() -> None:
     path = np.zeros((0, 3))
     for step in range(260):
         if step % 17 == 0:
-            plan = Planner(config=PlannerConfig()).plan(costmap, pose, goal)
+            plan = Planner(config=PlannerConfig()).create_plan(costmap, pose, goal)
             path = SimpleSmoother().smooth(plan, costmap)
         if pose.distance(goal) < 0.05:
             break
@@ -118,7 +118,7 @@ def test_a_turn_in_three_points_is_driven_as_hybrid_a_star_plans_it(index: int) 
     aisle = hall((0.1, 0.1, 7.9, 1.0), (0.1, 3.0, 7.9, 3.9))
     config = HybridConfig(motion_model_for_search="REEDS_SHEPP", minimum_turning_radius=0.5)
     start, goal = Pose2(4.0, 2.0, 0.0), Pose2(3.0, 2.0, np.pi)
-    path = HybridPlanner(config=config, footprint=FOOTPRINT).plan(aisle, start, goal)
+    path = HybridPlanner(config=config, footprint=FOOTPRINT).create_plan(aisle, start, goal)
     assert cusps(path), "there is no other way to turn in it"
     controller, pose, v, w, speeds = reversing_controllers()[index], start, 0.0, 0.0, []
     for _ in range(400):

@@ -25,7 +25,6 @@ from twin.navigation.control.mppi.config import (
 )
 from twin.navigation.control.mppi.controller import MPPI
 from twin.navigation.control.mppi.sent_commands import SentCommands
-from twin.navigation.control.plugins import create_controller
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
 from twin.navigation.control.rotation_shim import RotationShimConfig
@@ -35,6 +34,7 @@ from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostm
 from twin.navigation.failures import InvalidPath, NoValidControl
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.planner import with_headings
+from twin.navigation.plugins import CONTROLLERS, create
 
 pytestmark = pytest.mark.xdist_group("planning")
 
@@ -68,7 +68,7 @@ def shimmed(config: MPPIConfig | DWBConfig) -> Controller:
         max_angular_accel=1.2,
         rotate_to_goal_heading=True,
     )
-    controller = create_controller(shim, FOOTPRINT)
+    controller = create(CONTROLLERS, shim, footprint=FOOTPRINT)
     controller.set_goal_tolerance(0.05)
     return controller
 
@@ -268,7 +268,7 @@ def test_who_is_carried_off_at_the_goal_drives_there_anew(
     """Localisation is put right by 40 cm while the robot turns: it is not at the goal any more."""
     if not with_shim and isinstance(config, MPPIConfig):
         config = replace(config, GoalAngleCritic=GoalAngleCriticConfig())
-    controller = shimmed(config) if with_shim else create_controller(config, FOOTPRINT)
+    controller = shimmed(config) if with_shim else create(CONTROLLERS, config, footprint=FOOTPRINT)
     controller.set_goal_tolerance(0.05)
     path = line(2.0, 4.0, 2.0)
     path[-1, 2] = 0.9
@@ -287,7 +287,7 @@ def test_who_is_carried_off_at_the_goal_drives_there_anew(
 def test_a_speed_limit_holds_backwards_too() -> None:
     back = line(4.0, 2.0, 2.0)
     back[:, 2] = 0.0
-    controller = create_controller(replace(DWB_CONFIG, min_vel_x=-0.5), FOOTPRINT)
+    controller = create(CONTROLLERS, replace(DWB_CONFIG, min_vel_x=-0.5), footprint=FOOTPRINT)
     controller.set_goal_tolerance(0.05)
     controller.set_speed_limit(0.1)
     assert drive(controller, Pose2(4.0, 2.0, 0.0), back, hall())[:, 3].min() == pytest.approx(-0.1, abs=0.01)
@@ -331,7 +331,7 @@ def listed(name: str, **critics: object) -> MPPIConfig:
 
 
 def first_command(config: MPPIConfig, start: Pose2, v: float) -> tuple[float, float]:
-    controller = create_controller(config, FOOTPRINT)
+    controller = create(CONTROLLERS, config, footprint=FOOTPRINT)
     return controller.compute_velocity(start, (v, 0.0), line(1.0, 6.5, 2.0), hall(), DT)
 
 
@@ -350,7 +350,7 @@ def test_a_deadband_critic_avoids_speeds_that_the_drive_would_not_obey() -> None
 
     def speed(config: MPPIConfig) -> float:
         controller, pose, v, w, steps = (
-            create_controller(config, FOOTPRINT),
+            create(CONTROLLERS, config, footprint=FOOTPRINT),
             Pose2(3.0, 2.0, 0.0),
             0.6,
             0.0,

@@ -21,14 +21,14 @@ def block(**shift: int) -> Costmap:
 
 
 def side(costmap: Costmap) -> float:
-    path = Planner(config=PlannerConfig()).plan(costmap, START, GOAL)
+    path = Planner(config=PlannerConfig()).create_plan(costmap, START, GOAL)
     return float(np.sign(path[len(path) // 2, 1] - 2.5))
 
 
 def test_the_side_once_chosen_is_kept_until_it_is_blocked() -> None:
     config = CommitmentConfig(commitment_cost=20)
     assert (side(block(up=-2)), side(block(up=1))) == (1.0, -1.0)
-    first = Planner(config=PlannerConfig()).plan(block(up=-2), START, GOAL)
+    first = Planner(config=PlannerConfig()).create_plan(block(up=-2), START, GOAL)
     assert side(committed(block(up=1), first, config)) == 1.0
     closed = block(up=1)
     closed.costs[30:, 20:30] = 254

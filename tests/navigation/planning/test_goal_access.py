@@ -49,7 +49,7 @@ def test_a_free_goal_is_planned_to_on_the_costmap_itself() -> None:
 def test_an_occupied_goal_is_planned_to_as_if_it_were_free(person: tuple[float, float]) -> None:
     layers = hall(person, (4.0, 2.0))
     costmap = opened(GoalAccess(footprint=LONG), layers, FAR, 0.0)
-    path = Planner(config=ThetaStarConfig(tolerance=0.0)).plan(costmap, FAR, GOAL)
+    path = Planner(config=ThetaStarConfig(tolerance=0.0)).create_plan(costmap, FAR, GOAL)
     assert path[-1] == pytest.approx(GOAL)
     assert np.hypot(path[:, 0] - 4.0, path[:, 1] - 2.0).min() > 0.3, "around who stands on the way"
     assert costmap.cost_at(7.0, 0.05) == 254, "what the map shows stays"

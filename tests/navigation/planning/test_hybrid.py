@@ -64,7 +64,7 @@ def check(path: np.ndarray, room: Costmap, start: Pose2, goal: Pose2) -> np.ndar
 def test_paths_round_a_wall_can_be_driven_by_the_whole_footprint(model: str) -> None:
     room = costmap((2.5, 0.0, 2.7, 4.0))
     start, goal = Pose2(1.0, 1.5, 0.3), Pose2(4.5, 1.5, -1.5)
-    path = planner(model).plan(room, start, goal)
+    path = planner(model).create_plan(room, start, goal)
     ways = check(path, room, start, goal)
     assert model == "REEDS_SHEPP" or (ways > 0).all()
     assert path[:, 1].max() > 4.0
@@ -73,53 +73,53 @@ def test_paths_round_a_wall_can_be_driven_by_the_whole_footprint(model: str) -> 
 
 def test_only_reeds_shepp_drives_backwards_where_that_is_shorter() -> None:
     room, start, goal = costmap(), Pose2(3.0, 3.0, 0.0), Pose2(2.0, 3.0, 0.0)
-    back = planner("REEDS_SHEPP").plan(room, start, goal)
+    back = planner("REEDS_SHEPP").create_plan(room, start, goal)
     assert (check(back, room, start, goal) < 0).all()
     assert path_length(back) == pytest.approx(1.0, abs=1e-6)
-    round_about = planner().plan(room, start, goal)
+    round_about = planner().create_plan(room, start, goal)
     assert (check(round_about, room, start, goal) > 0).all()
     assert path_length(round_about) > 3.0
 
 
 def test_straight_ahead_is_straight() -> None:
     room, start, goal = costmap(), Pose2(1.0, 3.0, 0.0), Pose2(5.0, 3.0, 0.0)
-    path = planner().plan(room, start, goal)
+    path = planner().create_plan(room, start, goal)
     assert path_length(path) == pytest.approx(4.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("model", ["DUBIN", "REEDS_SHEPP"])
 def test_a_robot_at_its_goal_stays_there(model: str) -> None:
     here = Pose2(3.0, 3.0, 0.7)
-    path = planner(model).plan(costmap(), here, here)
+    path = planner(model).create_plan(costmap(), here, here)
     assert path_length(path) == 0.0
     assert path[-1] == pytest.approx(here)
 
 
 def test_planning_twice_gives_the_same_path() -> None:
     room = costmap((2.5, 2.5, 3.5, 3.5))
-    paths = [planner().plan(room, Pose2(1.0, 1.0, 2.0), Pose2(5.0, 5.0, 0.0)) for _ in range(2)]
+    paths = [planner().create_plan(room, Pose2(1.0, 1.0, 2.0), Pose2(5.0, 5.0, 0.0)) for _ in range(2)]
     assert np.array_equal(*paths)
 
 
 def test_a_goal_where_the_robot_does_not_fit_moves_within_the_tolerance() -> None:
     room, start, goal = costmap((3.0, 2.0, 3.5, 4.0)), Pose2(1.0, 3.0, 0.0), Pose2(2.62, 3.0, 0.0)
-    path = planner(tolerance=0.3).plan(room, start, goal)
+    path = planner(tolerance=0.3).create_plan(room, start, goal)
     end = Pose2(*map(float, path[-1]))
     assert 0.0 < end.distance(goal) <= 0.3
     check(path, room, start, end)
     with pytest.raises(GoalOccupied):
-        planner(tolerance=0.05).plan(room, start, goal)
+        planner(tolerance=0.05).create_plan(room, start, goal)
 
 
 def test_failures() -> None:
     room = costmap((2.5, 0.0, 2.7, 6.0))
     inside = Pose2(1.0, 3.0, 0.0)
     with pytest.raises(NoValidPath):
-        planner().plan(room, inside, Pose2(4.5, 3.0, 0.0))
+        planner().create_plan(room, inside, Pose2(4.5, 3.0, 0.0))
     with pytest.raises(StartOccupied):
-        planner().plan(room, Pose2(2.2, 3.0, 0.0), inside)
+        planner().create_plan(room, Pose2(2.2, 3.0, 0.0), inside)
     with pytest.raises(GoalOutsideMap):
-        planner().plan(room, inside, Pose2(9.0, 3.0, 0.0))
+        planner().create_plan(room, inside, Pose2(9.0, 3.0, 0.0))
     with pytest.raises(PlanningTimeout) as caught:
-        planner(max_iterations=5).plan(costmap((2.5, 0.0, 2.7, 4.0)), inside, Pose2(4.5, 1.0, 0.0))
+        planner(max_iterations=5).create_plan(costmap((2.5, 0.0, 2.7, 4.0)), inside, Pose2(4.5, 1.0, 0.0))
     assert caught.value.error_code == 207

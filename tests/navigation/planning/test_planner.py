@@ -52,7 +52,7 @@ def centre(column: int, row: int, yaw: float = 0.0) -> Pose2:
 def plan(
     costmap: Costmap, start: Pose2, goal: Pose2, config: PlannerConfig | ThetaStarConfig = EXACT
 ) -> np.ndarray:
-    return Planner(config=config).plan(costmap, start, goal)
+    return Planner(config=config).create_plan(costmap, start, goal)
 
 
 @pytest.mark.parametrize("name", ["maze-32-32-2", "random-32-32-20"])
@@ -287,9 +287,11 @@ def test_a_planner_kept_for_many_maps_forgets_each_of_them() -> None:
     open_field, wall = grid("...", "...", "..."), grid("...", "@@.", "...")
     for costmap in (open_field, wall, grid(".....", "@@@@.", "....."), wall, open_field):
         goal = centre(0, costmap.costs.shape[0] - 1)
-        assert np.array_equal(kept.plan(costmap, centre(0, 0), goal), plan(costmap, centre(0, 0), goal))
+        assert np.array_equal(
+            kept.create_plan(costmap, centre(0, 0), goal), plan(costmap, centre(0, 0), goal)
+        )
     with pytest.raises(NoValidPath):
-        kept.plan(grid("...", "@@@", "..."), centre(0, 0), centre(0, 2))
+        kept.create_plan(grid("...", "@@@", "..."), centre(0, 0), centre(0, 2))
 
 
 @settings(max_examples=20, deadline=None)

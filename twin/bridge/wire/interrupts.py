@@ -46,6 +46,14 @@ class _Guard:
         self._users += 1
         return True
 
+    def take_again(self) -> None:
+        """Guard where somebody has taken SIGINT over since, as a notebook does for each of its cells."""
+        if self._users and threading.current_thread() is threading.main_thread():
+            current = signal.getsignal(signal.SIGINT)
+            if callable(current) and current != self._on_signal:
+                self._previous = current
+                signal.signal(signal.SIGINT, self._on_signal)
+
     def leave(self) -> None:
         """Guard no more, for one user; who has taken SIGINT over in between keeps it."""
         self._users -= 1

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from twin.errors import RecordingError
-from twin.files.writing import written_alone
+from twin.files.writing import make_folder, written_alone
 
 
 def run_folder(scenario: str) -> Path:
@@ -45,12 +44,3 @@ def bag_folder() -> Path:
 def map_name() -> Path:
     """Return `map_<seconds>`, as nav2's map_saver_cli names a map."""
     return Path(f"map_{int(datetime.now().timestamp())}")
-
-
-def make_folder(path: Path) -> Path:
-    """Make a folder for results, unless it is there; raises RecordingError where that cannot be."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        raise RecordingError(f"{path}: cannot be the folder of the results: {fault.strerror}") from fault
-    return path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,11 +21,9 @@ class Situation:
     """What one command is made from."""
 
     pose: Pose2
-    """Of the base, in the path's frame."""
+    """Of the base, in the path's frame: x, y [m], yaw [rad]."""
     velocity: tuple[float, float]
     """The present (v [m/s], w [rad/s])."""
-    path: Array
-    """Shape (n, 3): x, y, yaw."""
     costmap: Costmap | None
     """Around the robot; None: nothing is known of obstacles."""
     at: Pose2
@@ -46,10 +44,18 @@ class Situation:
 
 
 class Controller(ABC):
-    """Follows one path at a time; a new path array starts it over."""
+    """Follows one path at a time.
 
+    The path is in `path`, its parameters, an object of its `Config`, are in `config`. What depends on them
+    alone is made in `_build`, what on the path in `set_plan`.
+    """
+
+    Config: ClassVar[type | None] = None
+    """Frozen dataclass of its parameters; None: it has none."""
     config: Any
-    """Its parameters, frozen; see `configure`."""
+    """Its parameters; see `configure`."""
+    path: Array | None = None
+    """What is followed: shape (n, 3), n >= 1: x, y [m], yaw [rad], finite, in the map's frame."""
     carrot: tuple[float, float] | None = None
     """The point that the last command steered for, in the path's frame [m]; None if it steers for none."""
 
@@ -75,13 +81,16 @@ class Controller(ABC):
         """The speed that percentages of a speed limit are of [m/s]."""
 
     @property
-    @abstractmethod
     def reverses(self) -> bool:
         """Whether it drives paths backwards where their headings say so."""
+        return False
 
     def configure(self, config: Any) -> None:
-        """Go on with other parameters of the same kind; lifts the speed limit."""
+        """Go on with other parameters of the same kind, and the same path; lifts the speed limit."""
+        path = self.path
         self._take(config)
+        if path is not None:
+            self.set_plan(path)
 
     def _take(self, config: Any) -> None:
         self.config = config
@@ -89,13 +98,21 @@ class Controller(ABC):
         self._build()
         self.reset()
 
-    @abstractmethod
     def _build(self) -> None:
         """Make what depends on the parameters."""
+        return
 
-    @abstractmethod
+    def set_plan(self, path: Array) -> None:
+        """Follow another path, shape (n, 3), from now on (nav2_core::Controller::newPathReceived).
+
+        Raises:
+            InvalidPath: the path is empty, not finite or not of shape (n, 3).
+        """
+        self.path = path
+
     def reset(self) -> None:
         """Forget the path, and what was learnt on it."""
+        self.path = self.carrot = None
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than `limit` [m/s]; None lifts the limit (nav2's SpeedLimit)."""
@@ -136,18 +153,21 @@ class Controller(ABC):
         *,
         costmap_pose: Pose2 | None = None,
     ) -> tuple[float, float]:
-        """Return `command`; the arguments are those of `Situation`.
+        """Return the command to follow `path`, a new one or not; the others are those of `Situation`.
 
         Without `costmap_pose` the costmap's frame is the path's.
         """
+        if path is not self.path:
+            self.set_plan(path)
         at = pose if costmap_pose is None else costmap_pose
-        return self.command(Situation(pose=pose, velocity=velocity, path=path, costmap=costmap, at=at, dt=dt))
+        return self.compute_velocity_commands(
+            Situation(pose=pose, velocity=velocity, costmap=costmap, at=at, dt=dt)
+        )
 
     @abstractmethod
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]).
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]), finite; asked once per control period, after `set_plan`.
 
         Raises:
-            InvalidPath: the path is empty, not finite or not of shape (n, 3).
             NoValidControl: no command is free of collisions.
         """

@@ -38,18 +38,12 @@ class DetouringPathHandler:
     def reset(self) -> None:
         """Forget the path."""
         self._handler.reset()
-        self._given: Array | None = None
         self._wait = 0
 
     def accept(self, path: Array) -> None:
-        """Start over when the path is another array than last time.
-
-        Raises:
-            InvalidPath: the path is empty, not finite or not of shape (n, 3).
-        """
-        if path is not self._given:
-            self._handler.accept(path)
-            self._given, self._wait = path, 0
+        """Start over with a path; see `PathHandler.accept`."""
+        self._handler.accept(path)
+        self._wait = 0
 
     def local(self, pose: Pose2, costmap: Costmap | None, at: Pose2) -> LocalPath:
         """Return what lies ahead of the robot, or the way around it; moves on along the path.
@@ -79,7 +73,7 @@ class DetouringPathHandler:
 
     def _around(self, costmap: Costmap, start: Pose2, target: Array) -> Array:
         """Return the smoothed cheapest way, shape (n, 2); raises PlanningFailure."""
-        path = self._planner.plan(costmap, start, Pose2(float(target[0]), float(target[1]), 0.0))
+        path = self._planner.create_plan(costmap, start, Pose2(float(target[0]), float(target[1]), 0.0))
         return self._smoother.smooth(path, costmap)[:, :2]
 
 

@@ -3,28 +3,41 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Annotated, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 from twin.geometry import Pose2, wrap_angle
+from twin.navigation.configured import Configured
 from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians, RadiansPerSecond
 
 _AT_REST = (0.0, 0.0)
 
 
-class GoalChecker(Protocol):
-    """Asked once per control period."""
+class GoalChecker(Configured, ABC):
+    """Asked once per control period; made anew for every goal."""
+
+    def __init__(self, *, config: Any = None) -> None:
+        super().__init__(config=config)
+        self.reset()
+
+    @property
+    def xy_tolerance(self) -> float:
+        """How near counts as there [m]: a controller that turns at the goal does it from there on."""
+        return float(getattr(self.config, "xy_goal_tolerance", 0.25))
 
     def reset(self) -> None:
         """Start on a new goal."""
+        return
 
+    @abstractmethod
     def is_goal_reached(
         self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
     ) -> bool:
-        """Return whether `pose` is at `goal`, both in one frame.
+        """Return whether `pose` is at `goal`, both in the map's frame.
 
         Args:
-            pose: Of the base.
+            pose: Of the base: x, y [m], yaw [rad].
             goal: The path's last pose.
             velocity: (v [m/s], w [rad/s]).
             remaining: Length of the path from the nearest pose on [m]; a path may pass by its own goal.
@@ -65,14 +78,10 @@ class StoppedGoalCheckerConfig(GoalCheckerConfig):
     """... and turns slower than this."""
 
 
-@dataclass(kw_only=True)
-class PositionGoalChecker:
+class PositionGoalChecker(GoalChecker):
     """Position alone."""
 
-    config: PositionGoalCheckerConfig = field(default_factory=PositionGoalCheckerConfig)
-
-    def __post_init__(self) -> None:
-        self.reset()
+    Config: ClassVar = PositionGoalCheckerConfig
 
     def reset(self) -> None:
         """Start on a new goal."""
@@ -94,11 +103,10 @@ class PositionGoalChecker:
         return reached
 
 
-@dataclass(kw_only=True)
 class SimpleGoalChecker(PositionGoalChecker):
     """Position first, then yaw."""
 
-    config: GoalCheckerConfig = field(default_factory=GoalCheckerConfig)
+    Config: ClassVar = GoalCheckerConfig
 
     def is_goal_reached(
         self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0
@@ -109,14 +117,13 @@ class SimpleGoalChecker(PositionGoalChecker):
         off = abs(wrap_angle(goal.yaw - pose.yaw))
         if self.config.symmetric_yaw_tolerance:
             off = min(off, math.pi - off)
-        return off <= self.config.yaw_goal_tolerance
+        return bool(off <= self.config.yaw_goal_tolerance)
 
 
-@dataclass(kw_only=True)
 class StoppedGoalChecker(SimpleGoalChecker):
     """Position, yaw, and rest."""
 
-    config: StoppedGoalCheckerConfig = field(default_factory=StoppedGoalCheckerConfig)
+    Config: ClassVar = StoppedGoalCheckerConfig
 
     def is_goal_reached(
         self, pose: Pose2, goal: Pose2, velocity: tuple[float, float] = _AT_REST, remaining: float = 0.0

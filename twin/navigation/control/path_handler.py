@@ -53,7 +53,7 @@ class LocalPath:
 
 @dataclass(kw_only=True)
 class PathHandler:
-    """Follows one path at a time; a new path array starts it over."""
+    """Follows one path at a time."""
 
     config: PathHandlerConfig = field(default_factory=PathHandlerConfig)
 
@@ -68,14 +68,12 @@ class PathHandler:
         self._segments: list[tuple[int, bool]] = []
         self._nearest = 0
 
-    def accept(self, path: Array) -> bool:
-        """Start over, and return True, when the path is another array than last time.
+    def accept(self, path: Array) -> None:
+        """Start over with a path.
 
         Raises:
             InvalidPath: the path is empty, not finite or not of shape (n, 3).
         """
-        if path is self.path:
-            return False
         if path.ndim != 2 or path.shape[1] != 3 or not len(path) or not np.isfinite(path).all():
             raise InvalidPath(
                 f"a path has shape (n, 3), n >= 1, and finite values; this one has {path.shape}"
@@ -87,7 +85,6 @@ class PathHandler:
         turns = cusps(path) if self.config.enforce_path_inversion else []
         for first, last in itertools.pairwise([0, *turns, len(path) - 1]):
             self._segments.append((int(knots[last]), is_reversing(path[first : last + 1])))
-        return True
 
     @property
     def remaining(self) -> float:

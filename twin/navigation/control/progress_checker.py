@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 from twin.geometry import Pose2, wrap_angle
+from twin.navigation.configured import Configured
 from twin.parameters import Metres, Positive, Radians, Seconds
 
 
-class ProgressChecker(Protocol):
+class ProgressChecker(Configured, ABC):
     """Asked once per control period."""
+
+    def __init__(self, *, config: Any = None) -> None:
+        super().__init__(config=config)
+        self.reset()
 
     def reset(self) -> None:
         """Start on a new path."""
+        return
 
+    @abstractmethod
     def check(self, pose: Pose2, time_ns: int) -> bool:
         """Return False when the robot has not moved enough within the allowance.
 
         Args:
-            pose: Of the base, in a fixed frame.
+            pose: Of the base, in the map's frame: x, y [m], yaw [rad].
             time_ns: Now [ns].
         """
 
@@ -42,14 +50,10 @@ class PoseProgressCheckerConfig(ProgressCheckerConfig):
     """Turning by this is progress too."""
 
 
-@dataclass(kw_only=True)
-class SimpleProgressChecker:
+class SimpleProgressChecker(ProgressChecker):
     """Asks for a movement out of a circle within a time."""
 
-    config: ProgressCheckerConfig = field(default_factory=ProgressCheckerConfig)
-
-    def __post_init__(self) -> None:
-        self.reset()
+    Config: ClassVar = ProgressCheckerConfig
 
     def reset(self) -> None:
         """Start on a new path."""
@@ -60,18 +64,17 @@ class SimpleProgressChecker:
         if self._baseline is None or self._moved(self._baseline[0], pose):
             self._baseline = (pose, time_ns)
             return True
-        return (time_ns - self._baseline[1]) * 1e-9 <= self.config.movement_time_allowance
+        return bool((time_ns - self._baseline[1]) * 1e-9 <= self.config.movement_time_allowance)
 
     def _moved(self, before: Pose2, now: Pose2) -> bool:
-        return before.distance(now) > self.config.required_movement_radius
+        return bool(before.distance(now) > self.config.required_movement_radius)
 
 
-@dataclass(kw_only=True)
 class PoseProgressChecker(SimpleProgressChecker):
     """Lets a turn count as a movement, too."""
 
-    config: PoseProgressCheckerConfig = field(default_factory=PoseProgressCheckerConfig)
+    Config: ClassVar = PoseProgressCheckerConfig
 
     def _moved(self, before: Pose2, now: Pose2) -> bool:
         turned = abs(wrap_angle(now.yaw - before.yaw))
-        return super()._moved(before, now) or turned > self.config.required_movement_angle
+        return super()._moved(before, now) or bool(turned > self.config.required_movement_angle)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.controller import Controller, Situation
-from twin.navigation.control.dwb.config import DWBConfig
-from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, footprint_cost
+from twin.navigation.plugins import CONTROLLERS, create
 from twin.parameters import (
     Flat,
     Interval,
@@ -32,9 +31,7 @@ from twin.parameters import (
 class RotationShimConfig:
     """Parameters; names and defaults are those of nav2_rotation_shim_controller."""
 
-    primary_controller: Annotated[RegulatedPurePursuitConfig | MPPIConfig | DWBConfig, Flat] = field(
-        default_factory=RegulatedPurePursuitConfig
-    )
+    primary_controller: Annotated[Any, Flat] = field(default_factory=RegulatedPurePursuitConfig)
     """Of what drives."""
     angular_dist_threshold: Annotated[Radians, Positive] = 0.785
     """Farther off the path's direction than this the robot turns in place."""
@@ -63,12 +60,11 @@ class RotationShimConfig:
 class RotationShim(Controller):
     """Wraps any controller."""
 
+    Config = RotationShimConfig
     config: RotationShimConfig
 
-    def __init__(
-        self, *, config: RotationShimConfig, primary: Controller, footprint: Array | None = None
-    ) -> None:
-        self.primary = primary
+    def __init__(self, *, config: RotationShimConfig, footprint: Array | None = None) -> None:
+        self.primary = create(CONTROLLERS, config.primary_controller, footprint=footprint)
         super().__init__(config=config, footprint=footprint)
         self._tolerance = 0.0
 
@@ -100,13 +96,23 @@ class RotationShim(Controller):
     def _build(self) -> None:
         self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
 
+    def set_plan(self, path: Array) -> None:
+        """Follow another path; see `Controller.set_plan`."""
+        same = self.path is not None and bool(np.array_equal(self.path[-1], path[-1]))
+        self._handler.accept(path)
+        super().set_plan(path)
+        self.primary.set_plan(path)
+        self._aligned &= same and self.config.rotate_to_heading_once
+        self._turning = self._at_goal = False
+
     def reset(self) -> None:
         """Forget the path."""
+        super().reset()
         self.primary.reset()
         self._handler.reset()
-        self._turning = self._aligned = self._at_goal = self._driving = False
+        self._aligned = False
+        self._turning = self._at_goal = self._driving = False
         self._last_w: float | None = None
-        self.carrot = None
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Pass the limit [m/s] on."""
@@ -121,19 +127,15 @@ class RotationShim(Controller):
         """Leave it to the primary controller."""
         return self.primary.cancel()
 
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
-        before = self._handler.path
-        if self._handler.accept(now.path):
-            same = before is not None and len(before) > 0 and np.array_equal(before[-1], now.path[-1])
-            self._aligned &= same and self.config.rotate_to_heading_once
-            self._turning = self._at_goal = False
-        angle = self._angle(now.pose, now.path)
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity_commands`."""
+        assert self.path is not None
+        angle = self._angle(now.pose, self.path)
         w = 0.0 if angle is None else self._turn_rate(angle, now.velocity[1], now.dt)
         # Where there is no room to turn the primary controller may know a way, as in Nav2.
         if angle is None or self._collides(now, w, angle):
             self._turning = False
-            command = self.primary.command(now)
+            command = self.primary.compute_velocity_commands(now)
             self.carrot, self._driving = self.primary.carrot, True
         else:
             command, self._driving = (0.0, w), False

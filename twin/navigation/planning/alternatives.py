@@ -57,4 +57,4 @@ def other_way(
     Raises:
         PlanningFailure: there is no path at all.
     """
-    return planner.plan(avoiding(costmap, tried, config) if tried else costmap, start, goal)
+    return planner.create_plan(avoiding(costmap, tried, config) if tried else costmap, start, goal)

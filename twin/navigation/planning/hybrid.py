@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
@@ -28,7 +28,7 @@ from twin.navigation.planning.hybrid_kernel import (
     expand,
     pose_cost,
 )
-from twin.navigation.planning.planner import check_inside
+from twin.navigation.planning.planner import GlobalPlanner, check_inside
 
 _SLACK = 1.3
 """The cost to the goal is known for cells of so many times the start's; the others cost more."""
@@ -80,18 +80,20 @@ class _Frame:
         return np.array([(pose.x - x) / resolution, (pose.y - y) / resolution, pose.yaw])
 
 
-@dataclass(kw_only=True)
-class HybridPlanner:
-    """Plans arcs and straight lines (Dolgov et al. 2008; nav2_smac_planner), forwards or also backwards."""
+class HybridPlanner(GlobalPlanner):
+    """Plans arcs and straight lines (Dolgov et al. 2008; nav2_smac_planner), forwards or also backwards.
 
-    config: HybridConfig
-    footprint: ArrayLike = ((0.0, 0.0),)
-    """Corners [m] in the base frame, shape (n, 2); a single one leaves it to the inscribed zone."""
-    inflation_radius: float = 0.0
-    """Of the costmap [m]: from it follows how low a cost keeps the whole footprint clear."""
-    _search: GridSearch = field(default_factory=GridSearch, init=False, repr=False, compare=False)
+    From the costmap's inflation radius follows how low a cost keeps the whole footprint clear.
+    """
 
-    def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
+    Config: ClassVar = HybridConfig
+    drivable = True
+
+    def __init__(self, **setup: Any) -> None:
+        super().__init__(**setup)
+        self._search = GridSearch()
+
+    def create_plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
         """Return a path, shape (n, 3): x, y [m] and the robot's heading [rad], at most a cell apart.
 
         Where the robot drives backwards, the next pose lies behind the heading.
@@ -136,7 +138,7 @@ class HybridPlanner:
         )
 
     def _frame(self, costmap: Costmap) -> _Frame:
-        corners = np.array(self.footprint, dtype=np.float64, order="C")
+        corners = self.footprint
         reach = float(np.hypot(corners[:, 0], corners[:, 1]).max())
         clear_below = 0
         if self.inflation_radius >= reach:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from twin.geometry import Array, Pose2
+from twin.navigation.configured import Configured
 from twin.navigation.costmaps.costmap import (
     INSCRIBED_INFLATED_OBSTACLE,
     LETHAL_OBSTACLE,
@@ -27,12 +29,38 @@ from twin.navigation.failures import (
 from twin.navigation.planning.grid_search import GridSearch
 
 
-class GlobalPlanner(Protocol):
-    """What plans a path over a costmap."""
+class GlobalPlanner(Configured, ABC):
+    """What plans a path over a costmap (nav2_core::GlobalPlanner)."""
 
-    def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
-        """Return a path, shape (n, 3): x, y [m], yaw [rad]; raise a PlanningFailure if there is none."""
-        ...
+    drivable: ClassVar[bool] = False
+    """Whether its paths are followed as they are; others are smoothed."""
+
+    def __init__(
+        self, *, config: Any = None, footprint: ArrayLike = ((0.0, 0.0),), inflation_radius: float = 0.0
+    ) -> None:
+        """Take what planning depends on.
+
+        Args:
+            config: An object of its `Config`; without one its defaults.
+            footprint: Corners in the base frame, shape (n, 2) [m]; one alone leaves it to the inscribed zone.
+            inflation_radius: Of the costmap [m].
+        """
+        super().__init__(config=config)
+        self.footprint = np.array(footprint, dtype=np.float64, order="C")
+        self.inflation_radius = inflation_radius
+
+    @abstractmethod
+    def create_plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
+        """Return a path, shape (n, 3), n >= 1: x, y [m], yaw [rad], finite, in the map's frame.
+
+        Args:
+            costmap: The global one; its frame is the map's.
+            start: Where the robot is, or the last path ended.
+            goal: Where to.
+
+        Raises:
+            PlanningFailure: there is none, for a reason that has an error code.
+        """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +105,16 @@ class ThetaStarConfig:
         return 1.0 + self.w_traversal_cost / max(self.w_euc_cost, 1e-6) * level**2
 
 
-@dataclass(kw_only=True)
-class Planner:
-    """A* (Hart, Nilsson, Raphael 1968) or Theta* (Nash et al. 2007) by its config; never cuts a corner."""
+class Planner(GlobalPlanner):
+    """A* (Hart, Nilsson, Raphael 1968), 8-connected, or with any angle Theta*; never cuts a corner."""
 
-    config: PlannerConfig | ThetaStarConfig
-    _search: GridSearch = field(default_factory=GridSearch, init=False, repr=False, compare=False)
+    Config: ClassVar[type] = PlannerConfig
 
-    def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
+    def __init__(self, **setup: Any) -> None:
+        super().__init__(**setup)
+        self._search = GridSearch()
+
+    def create_plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
         """Return the cheapest path, shape (n, 3): x, y [m], yaw [rad] along the path.
 
         The first row is the start's position, the last the goal itself with its yaw, or the nearest reachable
@@ -149,6 +179,12 @@ class Planner:
         free = np.isfinite(price[costmap.costs[v, u]]) | (flat == first)
         usable = free & (distance <= self.config.tolerance)
         return flat[usable][np.argsort(distance[usable], kind="stable")]
+
+
+class ThetaStar(Planner):
+    """Theta* (Nash, Daniel, Koenig, Felner 2007)."""
+
+    Config: ClassVar = ThetaStarConfig
 
 
 def check_inside(costmap: Costmap, start: Pose2, goal: Pose2) -> None:

@@ -6,17 +6,35 @@ As in Nav2, cusps stay where they are: the pieces between them are smoothed one 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array, wrap_angles
 from twin.navigation._jit import jit
+from twin.navigation.configured import Configured
 from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
 from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
+
+
+class Smoother(Configured, ABC):
+    """Makes a path smoother (nav2_core::Smoother)."""
+
+    @abstractmethod
+    def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
+        """Return the path, shape (n, 3), smoother between its first and last place, which stay.
+
+        Rows look along the smooth path, but for the last one, which looks where it did.
+
+        Args:
+            path: Shape (n, 3), n >= 2: x, y [m], yaw [rad], in the costmap's frame, the map's.
+            costmap: Where points may go; None lets them go anywhere.
+        """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,21 +52,13 @@ class SmootherConfig:
     """How often the result is smoothed again."""
 
 
-@dataclass(kw_only=True)
-class SimpleSmoother:
+class SimpleSmoother(Smoother):
     """Smooths a path; no point moves into the inscribed zone, an obstacle, or dearer unknown space."""
 
-    config: SmootherConfig = field(default_factory=SmootherConfig)
+    Config: ClassVar = SmootherConfig
 
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
-        """Return the path, shape (n, 3), smoother between its first and last place, which stay.
-
-        Rows look along the smooth path, but for the last one, which looks where it did.
-
-        Args:
-            path: Shape (n, 3).
-            costmap: Where points may go; None lets them go anywhere.
-        """
+        """Return the path, smoother; see `Smoother.smooth`."""
         if len(path) < 3:
             return path.copy()
         return _smoothed(path, lambda points: self._relaxed(points, costmap))
@@ -84,21 +94,13 @@ _WINDOW = np.array([-2.0, 3.0, 6.0, 7.0, 6.0, 3.0, -2.0]) / 21.0
 """Value in the middle of the parabola through seven points (Savitzky and Golay 1964)."""
 
 
-@dataclass(kw_only=True)
-class SavitzkyGolaySmoother:
+class SavitzkyGolaySmoother(Smoother):
     """Takes the noise out of a path and keeps its shape; points that would run into an obstacle stay."""
 
-    config: SavitzkyGolayConfig = field(default_factory=SavitzkyGolayConfig)
+    Config: ClassVar = SavitzkyGolayConfig
 
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
-        """Return the path, shape (n, 3), smoother between its first and last place, which stay.
-
-        Rows look along the smooth path, but for the last one, which looks where it did.
-
-        Args:
-            path: Shape (n, 3).
-            costmap: Where points may go; None lets them go anywhere.
-        """
+        """Return the path, smoother; see `Smoother.smooth`."""
         if len(path) < len(_WINDOW):
             return path.copy()
         return _smoothed(path, lambda points: self._filtered(points, costmap))

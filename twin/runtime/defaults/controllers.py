@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
-from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
+from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
@@ -16,13 +17,14 @@ from twin.navigation.control.mppi.config import (
     MPPIConfig,
     PathAlignCriticConfig,
 )
-from twin.navigation.control.plugins import ControllerConfig
-from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.runtime.defaults.overrides import overridden
-from twin.scenario.controllers import GOAL_CHECKERS, PROGRESS_CHECKERS, ControllerParameters
+from twin.scenario.controllers import ControllerParameters
+from twin.scenario.plugin_groups import config_of_use
+from twin.scenario.plugins import PluginUse
 
 _PERIOD_NS = 60_000_000
 _PATIENCE_NS = 4_000_000_000
@@ -65,17 +67,17 @@ def controller_server_config(
     )
 
 
-def _controller(
-    parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float
-) -> ControllerConfig:
+def _controller(parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float) -> Any:
     overrides = parameters.overrides()
-    controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig
-    if parameters.chosen == "mppi":
+    controller: Any
+    if parameters.users is not None:
+        controller = config_of_use(CONTROLLERS, parameters.users)
+    elif parameters.chosen == "mppi":
         controller = overridden(_mppi(parameters, smoother, period), overrides)
     elif parameters.chosen == "dwb":
         controller = overridden(_dwb(parameters, smoother), overrides)
     else:
-        tolerance = _goal_checker(parameters).xy_goal_tolerance
+        tolerance = getattr(_goal_checker(parameters), "xy_goal_tolerance", _TOLERANCE)
         controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
     if not parameters.shim:
         return controller
@@ -154,13 +156,20 @@ def _braking(limits: AxisLimits) -> float:
     return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
 
 
-def _goal_checker(parameters: ControllerParameters) -> PositionGoalCheckerConfig:
-    kind = GOAL_CHECKERS[parameters.goal_checker or "simple"]
-    near = kind(xy_goal_tolerance=_TOLERANCE, xy_goal_tolerance_buffer=_TOLERANCE_BUFFER)
+def _goal_checker(parameters: ControllerParameters) -> Any:
+    chosen = parameters.goal_checker or "simple"
+    if isinstance(chosen, PluginUse):
+        return config_of_use(GOAL_CHECKERS, chosen)
+    near = config_of(GOAL_CHECKERS.find(chosen))(
+        xy_goal_tolerance=_TOLERANCE, xy_goal_tolerance_buffer=_TOLERANCE_BUFFER
+    )
     if isinstance(near, GoalCheckerConfig):
         near = replace(near, yaw_goal_tolerance=_TOLERANCE)
     return overridden(near, parameters.overrides())
 
 
-def _progress_checker(parameters: ControllerParameters) -> ProgressCheckerConfig:
-    return overridden(PROGRESS_CHECKERS[parameters.progress_checker or "simple"](), parameters.overrides())
+def _progress_checker(parameters: ControllerParameters) -> Any:
+    chosen = parameters.progress_checker or "simple"
+    if isinstance(chosen, PluginUse):
+        return config_of_use(PROGRESS_CHECKERS, chosen)
+    return overridden(config_of(PROGRESS_CHECKERS.find(chosen))(), parameters.overrides())

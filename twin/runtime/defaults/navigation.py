@@ -13,7 +13,7 @@ from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.commitment import CommitmentConfig
 from twin.navigation.planning.goal_access import GoalAccessConfig
-from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
+from twin.navigation.plugins import PLANNERS, config_of
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
@@ -44,7 +44,7 @@ class NavigationParameters:
     smoother: VelocitySmootherConfig
     global_costmap: CostmapNodeConfig
     local_costmap: CostmapNodeConfig
-    planner: PlannerPluginConfig
+    planner: Any
     planner_server: PlannerServerConfig
     commitment: CommitmentConfig
     goal_access: GoalAccessConfig
@@ -104,7 +104,8 @@ def navigation_parameters(
             "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
         ),
         planner=overridden(
-            PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
+            config_of(PLANNERS.find(config.planner.plugin))(tolerance=0.1, allow_unknown=mapping),
+            config.planner.overrides(),
         ),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),

@@ -166,7 +166,7 @@ def test_a_robot_that_is_blocked_again_and_again_maneuvers_before_it_gives_up(
     checker = ProgressCheckerConfig(required_movement_radius=0.2, movement_time_allowance=6.0)
     stack, goal = beside_a_box(bench, reach=reach, progress_checkers={"progress_checker": checker})
     (controller,) = stack.controller_server.controllers.values()
-    drive, calls, said = controller.compute_velocity, itertools.count(), bench.logs()
+    drive, calls, said = controller.compute_velocity_commands, itertools.count(), bench.logs()
 
     def every_other_time(*args: Any, **kwargs: Any) -> tuple[float, float]:
         """Find a turn that is valid but leads nowhere, until a maneuver has begun."""
@@ -175,7 +175,7 @@ def test_a_robot_that_is_blocked_again_and_again_maneuvers_before_it_gives_up(
             return drive(*args, **kwargs)
         return 0.0, 0.02 if n % 4 else -0.02
 
-    monkeypatch.setattr(controller, "compute_velocity", every_other_time)
+    monkeypatch.setattr(controller, "compute_velocity_commands", every_other_time)
     bench.until(lambda: goal.done, 40.0)
     assert goal.result.error_code == outcome
     assert ("maneuvering: no progress" in said) == (outcome == 0)

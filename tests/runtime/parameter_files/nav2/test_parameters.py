@@ -243,7 +243,7 @@ def test_docks_and_smoothers_of_the_file(tmp_path: Path) -> None:
     assert kind.use_external_detection_pose
     assert docking.controller_period_ns == 50_000_000
     assert docking.max_retries == 1, "the scenario goes first"
-    assert got.path_smoother.simple_smoother.max_its == 77
+    assert got.path_smoother.smoothers["simple_smoother"].max_its == 77
     assert docking.controller.projection_time == 2.5
     assert told == [
         "nav2.yaml: docking_server does not have my_dock.filter_coef, controller.k_phi, "

@@ -25,6 +25,7 @@ from twin.navigation.failures import NoValidControl
 class DWB(Controller):
     """Tries every pair of speeds within reach."""
 
+    Config = DWBConfig
     config: DWBConfig
 
     @property
@@ -52,18 +53,22 @@ class DWB(Controller):
             )
         )
 
+    def set_plan(self, path: Array) -> None:
+        """Follow another path; see `Controller.set_plan`."""
+        self._handler.accept(path)
+        super().set_plan(path)
+        self._at_goal = self._rotating = False
+
     def reset(self) -> None:
         """Forget the path."""
+        super().reset()
         self._handler.reset()
         self._oscillation.reset()
         self._at_goal = self._rotating = False
-        self.carrot = None
         self._trajectory: Array | None = None
 
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
-        if self._handler.accept(now.path):
-            self._at_goal = self._rotating = False
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity_commands`."""
         local = self._handler.local(now.pose)
         self._note_goal(now, local)
         samples = self._samples(now.velocity, local)

@@ -41,6 +41,7 @@ _FILTERS = {
 class MPPI(Controller):
     """Goes on with the controls it has when a new path comes."""
 
+    Config = MPPIConfig
     config: MPPIConfig
 
     @property
@@ -91,21 +92,24 @@ class MPPI(Controller):
             detours=config.detours,
         )
 
+    def set_plan(self, path: Array) -> None:
+        """Follow another path; see `Controller.set_plan`."""
+        self._handler.accept(path)
+        super().set_plan(path)
+
     def reset(self) -> None:
         """Forget the path, and the controls found for it."""
+        super().reset()
         self._handler.reset()
-        self.carrot = None
         self._scene: Scene | None = None
         self._forget_controls()
 
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.command`.
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity_commands`.
 
         Raises:
-            InvalidPath: the path is empty, not finite or not of shape (n, 3).
             NoValidControl: every rollout collides, also after a start from rest.
         """
-        self._handler.accept(now.path)
         scene = self._look(now)
         for _ in range(self.config.retry_attempt_limit + 1):
             if self._optimize(scene, now.dt):

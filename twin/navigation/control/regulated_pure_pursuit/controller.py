@@ -17,6 +17,7 @@ from twin.navigation.control.rotation import turn_rate
 class RegulatedPurePursuit(Controller):
     """Drives the arc to a point of the path ahead; plans nothing."""
 
+    Config = RegulatedPurePursuitConfig
     config: RegulatedPurePursuitConfig
 
     @property
@@ -43,23 +44,26 @@ class RegulatedPurePursuit(Controller):
             )
         )
 
+    def set_plan(self, path: Array) -> None:
+        """Follow another path; see `Controller.set_plan`."""
+        self._handler.accept(path)
+        super().set_plan(path)
+        self._reached_xy = self._cancelling = self._stopped = False
+
     def reset(self) -> None:
         """Forget the path."""
+        super().reset()
         self._handler.reset()
-        self._reached_xy = False
-        self._cancelling = self._stopped = False
-        self.carrot = None
+        self._reached_xy = self._cancelling = self._stopped = False
 
     def cancel(self) -> bool:
         """Brake along the path if use_cancel_deceleration; return whether the robot may be stopped."""
         self._cancelling = True
         return self._stopped or not self.config.use_cancel_deceleration
 
-    def command(self, now: Situation) -> tuple[float, float]:
-        """Return the command (v [m/s], w [rad/s]); see `Controller.command`."""
+    def compute_velocity_commands(self, now: Situation) -> tuple[float, float]:
+        """Return the command (v [m/s], w [rad/s]); see `Controller.compute_velocity_commands`."""
         config = self.config
-        if self._handler.accept(now.path):
-            self._reached_xy = self._cancelling = self._stopped = False
         ahead = self._handler.local(now.pose)
         sign = -1.0 if ahead.reversing and config.allow_reversing else 1.0
         local = now.pose.inverse().apply(ahead.poses[:, :2])
@@ -115,7 +119,8 @@ class RegulatedPurePursuit(Controller):
         if not self.config.use_rotate_to_heading:
             return None
         if self._reached_xy:
-            return self._turn_rate(wrap_angle(float(now.path[-1, 2]) - now.pose.yaw), now)
+            assert self.path is not None
+            return self._turn_rate(wrap_angle(float(self.path[-1, 2]) - now.pose.yaw), now)
         return (
             self._turn_rate(bearing, now) if abs(bearing) > self.config.rotate_to_heading_min_angle else None
         )

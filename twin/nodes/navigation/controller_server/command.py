@@ -6,6 +6,7 @@ import numpy as np
 
 from twin.bridge.node import Node
 from twin.geometry import Array, Pose2
+from twin.navigation.control.controller import Situation
 from twin.navigation.control.maneuver import Maneuver
 from twin.navigation.failures import ControlFailure, NoValidControl
 from twin.navigation.warm_up import warm_up_maneuver
@@ -79,8 +80,8 @@ class Commander:
                 goal.last_valid_ns = goal.searched_ns = now
                 return maneuvered
         try:
-            command = goal.controller.compute_velocity(
-                in_map, velocity, goal.path, costmap, dt, costmap_pose=in_odom
+            command = goal.controller.compute_velocity_commands(
+                Situation(pose=in_map, velocity=velocity, costmap=costmap, at=in_odom, dt=dt)
             )
         except NoValidControl as failure:
             goal.blocked_ns = now

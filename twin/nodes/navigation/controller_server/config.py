@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
-from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
+from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
-from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.parameters import (
@@ -28,13 +27,13 @@ from twin.parameters import (
 class ControllerServerConfig:
     """Parameters of the server and of its plugins by name; the first of a kind is taken unless named."""
 
-    controllers: Annotated[Mapping[str, ControllerConfig], Flat] = field(
+    controllers: Annotated[Mapping[str, Any], Flat] = field(
         default_factory=lambda: {"FollowPath": RegulatedPurePursuitConfig()}
     )
-    goal_checkers: Annotated[Mapping[str, PositionGoalCheckerConfig], Flat] = field(
+    goal_checkers: Annotated[Mapping[str, Any], Flat] = field(
         default_factory=lambda: {"general_goal_checker": GoalCheckerConfig()}
     )
-    progress_checkers: Annotated[Mapping[str, ProgressCheckerConfig], Flat] = field(
+    progress_checkers: Annotated[Mapping[str, Any], Flat] = field(
         default_factory=lambda: {"progress_checker": ProgressCheckerConfig()}
     )
     controller_period_ns: Annotated[PeriodNs, Interval(gt=0, le=1000)] = 60_000_000

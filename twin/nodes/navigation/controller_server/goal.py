@@ -12,8 +12,9 @@ from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker
 from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
-from twin.navigation.control.plugins import create_goal_checker, create_progress_checker
 from twin.navigation.control.progress_checker import ProgressChecker
+from twin.navigation.failures import ControlFailure
+from twin.navigation.plugins import GOAL_CHECKERS, PROGRESS_CHECKERS, create
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 
@@ -78,7 +79,9 @@ def follow_goal(
         Abort: a plugin is unknown, or the path cannot be followed.
     """
     controller = _chosen("controller", controllers, request.controller_id)
-    goal_checker = _chosen("goal checker", config.goal_checkers, request.goal_checker_id)
+    goal_checker = create(
+        GOAL_CHECKERS, _chosen("goal checker", config.goal_checkers, request.goal_checker_id)
+    )
     progress = _chosen("progress checker", config.progress_checkers, request.progress_checker_id)
     path = robot_pose.path_in_map(request.path)
     if path is None:
@@ -88,12 +91,16 @@ def follow_goal(
         raise Abort(INVALID_PATH, "the path is empty or not finite")
     handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
     handler.accept(path)
-    controller.set_goal_tolerance(goal_checker.xy_goal_tolerance)
+    controller.set_goal_tolerance(goal_checker.xy_tolerance)
+    try:
+        controller.set_plan(path)
+    except ControlFailure as failure:
+        raise Abort(failure.error_code, str(failure)) from failure
     return FollowGoal(
         path=path,
         controller=controller,
-        goal_checker=create_goal_checker(goal_checker),
-        progress_checker=before.progress_checker if before else create_progress_checker(progress),
+        goal_checker=goal_checker,
+        progress_checker=before.progress_checker if before else create(PROGRESS_CHECKERS, progress),
         handler=handler,
         last_valid_ns=before.last_valid_ns if before else now_ns,
         searched_ns=before.searched_ns if before else now_ns,

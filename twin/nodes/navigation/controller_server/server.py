@@ -17,7 +17,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Odometry, SpeedLimit, Twist, new
 from twin.geometry import Array, Pose2
-from twin.navigation.control.plugins import create_controller
+from twin.navigation.plugins import CONTROLLERS, create
 from twin.nodes.navigation.controller_server.command import Commander
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.display import ControllerDisplay
@@ -50,7 +50,8 @@ class ControllerServerNode:
         self.config = config or ControllerServerConfig()
         self._robot_pose = robot_pose
         self.controllers = {
-            name: create_controller(plugin, footprint) for name, plugin in self.config.controllers.items()
+            name: create(CONTROLLERS, plugin, footprint=footprint)
+            for name, plugin in self.config.controllers.items()
         }
         """By name."""
         for kind in ("controller", "goal_checker", "progress_checker"):

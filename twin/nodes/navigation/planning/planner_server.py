@@ -20,10 +20,10 @@ from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, Planni
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.commitment import CommitmentConfig, committed
 from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
-from twin.navigation.planning.hybrid import HybridConfig
 from twin.navigation.planning.path_validity import blocked_poses
-from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
+from twin.navigation.planning.planner import GlobalPlanner, ThetaStarConfig
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
+from twin.navigation.plugins import PLANNERS, config_of, create, plugin_of
 from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
@@ -53,22 +53,23 @@ class PlannerParameters:
 
     planner_plugins: tuple[str, ...]
     server: PlannerServerConfig
-    planner: PlannerPluginConfig
+    planner: Any
     commitment: CommitmentConfig
     goal_access: GoalAccessConfig
     smoother: SmootherConfig
 
 
-def _by_id(chosen: PlannerPluginConfig) -> dict[str, PlannerPluginConfig]:
+_SHARED = ("tolerance", "allow_unknown")
+
+
+def _by_id(chosen: Any) -> dict[str, Any]:
     """Return the configs of all planners: the chosen one under its own name, too, the others like it."""
+    own = plugin_of(PLANNERS, chosen).name
+    shared = {name: getattr(chosen, name) for name in _SHARED if hasattr(chosen, name)}
     configs = {DEFAULT_ID: chosen}
-    for name, plugin in PLUGINS.items():
-        configs[name] = (
-            chosen
-            if isinstance(chosen, plugin)
-            else plugin(tolerance=chosen.tolerance, allow_unknown=chosen.allow_unknown)
-        )
-    return configs
+    for name in PLANNERS.shipped:
+        configs[name] = chosen if name == own else config_of(PLANNERS.find(name))(**shared)
+    return {**configs, own: chosen}
 
 
 class PlannerServerNode:
@@ -84,7 +85,7 @@ class PlannerServerNode:
         robot_pose: RobotPose,
         costmap: CostmapNode,
         *,
-        config: PlannerPluginConfig | None = None,
+        config: Any = None,
         server: PlannerServerConfig | None = None,
         smoother: SmootherConfig | None = None,
         commitment: CommitmentConfig | None = None,
@@ -94,7 +95,7 @@ class PlannerServerNode:
         self.node = bus.create_node("planner_server", namespace)
         self._robot_pose = robot_pose
         self._costmap = costmap
-        self._configs = _by_id(config or PLUGINS[DEFAULT]())
+        self._configs = _by_id(config or ThetaStarConfig())
         self._planners = {name: self._made(plugin) for name, plugin in self._configs.items()}
         self._tried: list[Array] = []
         self._last: tuple[Pose2, Array] | None = None
@@ -123,9 +124,9 @@ class PlannerServerNode:
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)
         ActionServer(self.node, ComputePathThroughPoses, "compute_path_through_poses", self._through_poses)
 
-    def _made(self, config: PlannerPluginConfig) -> Any:
+    def _made(self, config: Any) -> GlobalPlanner:
         layers = self._costmap.config.layers
-        return make_planner(config, layers.polygon, layers.inflation_radius)
+        return create(PLANNERS, config, footprint=layers.polygon, inflation_radius=layers.inflation_radius)
 
     def _apply(self, parameters: PlannerParameters) -> None:
         """Plan the next path with these parameters."""
@@ -184,7 +185,7 @@ class PlannerServerNode:
         path = other_way(planner, costmap, start, goal, tried, AlternativesConfig())
         self._tried.append(path)
         self._last = (goal, path)
-        if isinstance(self._configs[name], HybridConfig):
+        if planner.drivable:
             return path
         smooth = self._smoother.smooth(path, costmap)
         # A smooth path needs no point per cell; the message costs by the point.

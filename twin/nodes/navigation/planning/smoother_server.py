@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,12 +14,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import duration, new
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
-from twin.navigation.planning.smoother import (
-    SavitzkyGolayConfig,
-    SavitzkyGolaySmoother,
-    SimpleSmoother,
-    SmootherConfig,
-)
+from twin.navigation.planning.smoother import SavitzkyGolayConfig, SmootherConfig
+from twin.navigation.plugins import SMOOTHERS, create
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.node_parameters import declare_config
@@ -30,10 +26,11 @@ _INVALID_SMOOTHER, _IN_COLLISION, _INVALID_PATH = 501, 503, 505
 
 @dataclass(frozen=True, kw_only=True)
 class SmootherServerConfig:
-    """Parameters of the server's plugins; the first one is used unless a request names another."""
+    """Parameters of the server's plugins by name; the first one is used unless a request names another."""
 
-    simple_smoother: SmootherConfig = field(default_factory=SmootherConfig)
-    savitzky_golay: SavitzkyGolayConfig = field(default_factory=SavitzkyGolayConfig)
+    smoothers: Mapping[str, Any] = field(
+        default_factory=lambda: {"simple_smoother": SmootherConfig(), "savitzky_golay": SavitzkyGolayConfig()}
+    )
 
 
 class SmootherServerNode:
@@ -50,14 +47,11 @@ class SmootherServerNode:
         self.node = bus.create_node("smoother_server", namespace)
         self._costmap = costmap
         self._apply(config or SmootherServerConfig())
-        declare_config(self.node, config or SmootherServerConfig(), self._apply)
+        declare_config(self.node, config or SmootherServerConfig(), self._apply, {"smoothers": ""})
         ActionServer(self.node, SmoothPath, "smooth_path", self._execute)
 
     def _apply(self, config: SmootherServerConfig) -> None:
-        self._smoothers: dict[str, SimpleSmoother | SavitzkyGolaySmoother] = {
-            "simple_smoother": SimpleSmoother(config=config.simple_smoother),
-            "savitzky_golay": SavitzkyGolaySmoother(config=config.savitzky_golay),
-        }
+        self._smoothers = {name: create(SMOOTHERS, plugin) for name, plugin in config.smoothers.items()}
 
     def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
         yield

@@ -172,7 +172,7 @@ def with_file(
         docking=file.applied(
             "docking_server", docking, DOCKING_NAMES, keep=nav2_given.for_docking(config.docking)
         ),
-        path_smoother=file.applied("smoother_server", parameters.path_smoother),
+        path_smoother=file.applied("smoother_server", parameters.path_smoother, {"smoothers": ""}),
         navigator=file.applied(
             "bt_navigator",
             parameters.navigator,

@@ -1,0 +1,82 @@
+"""What scripts read: scenarios, arenas, recordings, bags."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from twin.recording.read_back import Recording
+    from twin.scenario.schema import Scenario
+    from twin.warehouse.arena import Arena
+
+
+def load_arena(name_or_path: str | Path) -> Arena:
+    """Read an arena: its poses, racks, zones and totes by name.
+
+    Args:
+        name_or_path: Of an arena that comes with twin, or a file.
+
+    Raises:
+        ScenarioError: With every problem of the file, each with its line.
+    """
+    from twin.warehouse import arena
+
+    return arena.load(name_or_path)
+
+
+def load_scenario(
+    scenario: Scenario | str | Path,
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    execute: bool = False,
+) -> Scenario:
+    """Read a scenario.
+
+    Args:
+        scenario: Name of one that ships with twin or is in the folder `scenarios`, or a file; what was read
+            already is returned as it is, if nothing is to be changed.
+        overrides: Dotted keys of the file -> values that go before its own, as in
+            `{"robots.0.pose.x": 1.5, "duration": "2 min", "checks.0.energy": {"max": "3 J"}}`.
+        execute: Whether the plugins that it names are executed, to check their parameters; else they are
+            found by reading, and a run executes them.
+
+    Raises:
+        ScenarioError: With every problem of the file and of the overrides, each with its line.
+    """
+    from twin.errors import ScenarioError
+    from twin.scenario import schema
+
+    if isinstance(scenario, schema.Scenario):
+        if overrides:
+            raise ScenarioError(
+                f"scenario '{scenario.name}' is read already; give overrides to load_scenario, "
+                "or the file instead of the scenario"
+            )
+        return scenario
+    texts = {key: _as_yaml(value) for key, value in overrides.items()}
+    return schema.load(scenario, texts, execute=execute)
+
+
+def _as_yaml(value: Any) -> str:
+    """Return a value as in a file (JSON is YAML); text is taken as it is, as that of `twin run --set`."""
+    if isinstance(value, str):
+        return value
+    return json.dumps(value, default=lambda other: other.tolist() if hasattr(other, "tolist") else str(other))
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a Rerun recording: columns of numpy arrays by entity and component.
+
+    Args:
+        path: Of an `.rrd` file.
+
+    Raises:
+        RecordingError: It is missing, not a recording, or empty.
+    """
+    from twin.recording.read_back import read
+
+    return read(Path(path))

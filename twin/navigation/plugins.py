@@ -1,0 +1,176 @@
+"""What of navigation can come from a user's package or file; what ships is registered in the same way.
+
+A plugin is found by its parameters: their class is the plugin's `Config`. That of a user's plugin is derived
+from what he wrote, and so knows whose it is, also where two plugins share their parameters.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from twin.plugins import Kind, Plugin, require_finite
+
+if TYPE_CHECKING:
+    from twin.navigation.control.controller import Controller
+    from twin.navigation.control.goal_checker import GoalChecker
+    from twin.navigation.control.progress_checker import ProgressChecker
+    from twin.navigation.planning.planner import GlobalPlanner
+    from twin.navigation.planning.smoother import Smoother
+
+T = TypeVar("T")
+
+CONTROLLERS: Kind[Controller] = Kind(
+    "controller", base="twin.navigation.control.controller:Controller", group="twin.controllers"
+)
+CONTROLLERS.register(
+    "regulated_pure_pursuit",
+    "twin.navigation.control.regulated_pure_pursuit.controller:RegulatedPurePursuit",
+)
+CONTROLLERS.register("dwb", "twin.navigation.control.dwb.controller:DWB")
+CONTROLLERS.register("mppi", "twin.navigation.control.mppi.controller:MPPI")
+CONTROLLERS.register("rotation_shim", "twin.navigation.control.rotation_shim:RotationShim")
+
+GOAL_CHECKERS: Kind[GoalChecker] = Kind(
+    "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
+)
+GOAL_CHECKERS.register("simple", "twin.navigation.control.goal_checker:SimpleGoalChecker")
+GOAL_CHECKERS.register("stopped", "twin.navigation.control.goal_checker:StoppedGoalChecker")
+GOAL_CHECKERS.register("position", "twin.navigation.control.goal_checker:PositionGoalChecker")
+
+PROGRESS_CHECKERS: Kind[ProgressChecker] = Kind(
+    "progress checker",
+    base="twin.navigation.control.progress_checker:ProgressChecker",
+    group="twin.progress_checkers",
+)
+PROGRESS_CHECKERS.register("simple", "twin.navigation.control.progress_checker:SimpleProgressChecker")
+PROGRESS_CHECKERS.register("pose", "twin.navigation.control.progress_checker:PoseProgressChecker")
+
+PLANNERS: Kind[GlobalPlanner] = Kind(
+    "planner", base="twin.navigation.planning.planner:GlobalPlanner", group="twin.planners"
+)
+PLANNERS.register("grid_based", "twin.navigation.planning.planner:Planner")
+PLANNERS.register("theta_star", "twin.navigation.planning.planner:ThetaStar")
+PLANNERS.register("smac_hybrid", "twin.navigation.planning.hybrid:HybridPlanner")
+
+SMOOTHERS: Kind[Smoother] = Kind(
+    "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
+)
+SMOOTHERS.register("simple_smoother", "twin.navigation.planning.smoother:SimpleSmoother")
+SMOOTHERS.register("savitzky_golay", "twin.navigation.planning.smoother:SavitzkyGolaySmoother")
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """Those of a plugin that has none."""
+
+
+def config_of(plugin: Plugin[Any]) -> type:
+    """Return the class of a plugin's parameters, by which `create` finds it."""
+    loaded: Any = plugin.load()
+    return (loaded.Config or NoParameters) if plugin.ships else _bound(plugin, loaded)
+
+
+@functools.cache
+def _bound(plugin: Plugin[Any], loaded: Any) -> type:
+    """Return the class of a user's plugin's parameters, for the class as it was loaded."""
+    written = getattr(loaded, "Config", None) or NoParameters
+    return type(written.__name__, (written,), {"plugin": plugin, "__module__": written.__module__})
+
+
+def bound(plugin: Plugin[Any], config: Any) -> Any:
+    """Return parameters as an object by which `create` finds the plugin; None: there are none."""
+    kind = config_of(plugin)
+    if config is not None and not is_dataclass(config):
+        raise plugin.error("has a Config that is no dataclass")
+    given = () if config is None else (field.name for field in fields(config) if field.init)
+    return kind(**{name: getattr(config, name) for name in given})
+
+
+def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
+    """Return the plugin that parameters are of."""
+    found: Plugin[T] | None = getattr(config, "plugin", None)
+    if found is not None:
+        return found
+    shipped = map(kind.find, kind.shipped)
+    return next(plugin for plugin in shipped if plugin.config is type(config))
+
+
+def create(kind: Kind[T], config: Any, **setup: Any) -> T:
+    """Return the object that parameters are of, made with further arguments.
+
+    Raises:
+        PluginError: a user's plugin cannot be made; also later, when it answers nonsense.
+    """
+    plugin = plugin_of(kind, config)
+    made = _checked(plugin)
+    with plugin.guard:
+        return made(config=config, **setup)
+
+
+def _checked(plugin: Plugin[T]) -> Callable[..., T]:
+    """Return a plugin's class; of a user's one that looks at what its methods answer."""
+    loaded = plugin.load()
+    if plugin.ships:
+        return loaded
+    base = next(cls for cls in loaded.__mro__ if f"{cls.__module__}:{cls.__name__}" == plugin.kind.base)
+    members: dict[str, Any] = {
+        name: _answering(plugin, getattr(loaded, name), *answer)
+        for name, answer in _ANSWERS.items()
+        if hasattr(base, name)
+    }
+    return type(loaded.__name__, (loaded,), {**members, "__module__": loaded.__module__})
+
+
+def _answering(
+    plugin: Plugin[Any], method: Callable[..., Any], answer: Callable[..., Any], valid: str
+) -> Any:
+    @functools.wraps(method)
+    def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        said = method(self, *args, **kwargs)
+        try:
+            return answer(plugin, said)
+        except (TypeError, ValueError):
+            shown = f"answers {method.__name__} with {said!r:.200}"
+            raise plugin.error(f"{shown}; it must return {valid}") from None
+
+    return call
+
+
+def _command(plugin: Plugin[Any], answer: Any) -> tuple[float, float]:
+    v, w = map(float, answer)
+    require_finite(plugin, "a command", (v, w))
+    return v, w
+
+
+def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
+    path = np.array(answer, dtype=np.float64, order="C")
+    if path.ndim != 2 or path.shape[1] != 3 or not len(path):
+        raise ValueError
+    require_finite(plugin, "a path", path[~np.isfinite(path).all(axis=1)].ravel())
+    return path
+
+
+def _truth(plugin: Plugin[Any], answer: Any) -> bool:
+    if not isinstance(answer, bool | np.bool_):
+        raise TypeError
+    return bool(answer)
+
+
+_A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
+_A_TRUTH = (_truth, "True or False")
+_ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
+    {
+        "compute_velocity_commands": (_command, "(v [m/s], w [rad/s])"),
+        "create_plan": _A_PATH,
+        "smooth": _A_PATH,
+        "is_goal_reached": _A_TRUTH,
+        "check": _A_TRUTH,
+    }
+)
+"""What methods must return: what reads the answer of a plugin, and raises a ValueError; in words."""

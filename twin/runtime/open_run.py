@@ -1,0 +1,269 @@
+"""A run with all that keeps it: digest, recording, bag, pace; it ends in a verdict."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from twin.bridge.bags.tap import BagTap
+from twin.bridge.wire.interrupts import guard
+from twin.bridge.wire.session import SessionConfig
+from twin.errors import RecordingError
+from twin.plugins import execution
+from twin.recording.digest import RunDigest
+from twin.runtime.build import Parts, build
+from twin.runtime.defaults import from_description as derive
+from twin.runtime.pacing import Pace
+from twin.runtime.run import Run
+from twin.runtime.saved_maps import save_maps
+from twin.scenario.outside import ALONE, Outside
+from twin.scenario.provenance import cpu_class, versions
+from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Verdict
+
+if TYPE_CHECKING:
+    from twin.recording.sink import RerunSink
+
+_SHOWN_S = 0.25
+"""Between two calls of a progress bar, by the clock on the wall."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """How far a run is."""
+
+    time_s: float
+    """Simulated time [s]."""
+    duration_s: float
+    """Longest simulated time [s]."""
+    real_time_factor: float
+    mission_state: str
+
+
+class OpenRun:
+    """A run that is under way. Whatever happens, it has to be closed; `finish` does it, too."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        out: Path | None = None,
+        record: bool = True,
+        pace: float | None = None,
+        listen: Sequence[str] = (),
+        network: SessionConfig | None = None,
+        outside: Outside = ALONE,
+        bag: Path | None = None,
+        bag_hidden_topics: bool = False,
+        save_model: Path | None = None,
+    ) -> None:
+        """Build everything, up to the first tick.
+
+        Args:
+            scenario: What to run.
+            out: Folder for the recording, for maps that robots make, and for the last states if the physics
+                diverges; None writes none of them.
+            record: Whether to write `<scenario>.rrd`.
+            pace: Simulated seconds per second; None is as fast as possible. Changes no result. What is lost
+                is not caught up; the verdict tells of it.
+            listen: Zenoh endpoints for other processes, such as `tcp/127.0.0.1:7447`. Unless the run waits
+                for them, they make it non-deterministic, and the verdict says so.
+            network: How else the bus takes part in a network, instead of `listen`.
+            outside: Who takes part from other processes, and how the run keeps time with them.
+            bag: Folder for a bag of every message.
+            bag_hidden_topics: Whether topics of actions are in the bag too.
+            save_model: Folder for the compiled world as MJCF.
+
+        Raises:
+            TwinError: The run cannot be made.
+        """
+        self._digest = RunDigest()
+        self._out = out
+        self._outside = outside
+        self._sink = _recording(scenario, out) if record else None
+        self._wall_s = self._cpu_s = 0.0
+        bag_tap = None if bag is None else BagTap(bag, hidden=bag_hidden_topics)
+        taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
+        with execution() as self._executed, ExitStack() as ending:
+            parts = build(
+                scenario,
+                taps=[self._digest.on_sample, *taps],
+                network=network or SessionConfig(listen=outside.endpoints(listen)),
+                outside=outside,
+                crash_folder=out,
+            )
+            ending.callback(parts.bus.close)
+            if bag_tap is not None:
+                ending.callback(bag_tap.close)
+                parts.bus.arrival_taps.append(bag_tap.on_arrival)
+            if self._sink is not None:
+                ending.callback(self._sink.close)
+            if save_model is not None:
+                _save_model(parts, save_model)
+            self.run = Run(scenario, parts, self._sink, outside)
+            if self.run.lockstep is not None:
+                ending.callback(self.run.lockstep.close)
+            if self._sink is not None:
+                stacks = parts.stacks.items()
+                wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
+                self._sink.declare(parts.world, wheels)
+            self._pace = None if pace is None else Pace(pace)
+            self._ending = ending.pop_all()
+
+    def advance(
+        self,
+        until: Callable[[], bool] | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> bool:
+        """Tick until a condition holds after a tick, or the run is over; return whether the condition holds.
+
+        Args:
+            until: Asked after each tick; None goes on to the end.
+            progress: Called about four times a second.
+
+        Raises:
+            TwinError: The run cannot go on.
+        """
+        run = self.run
+        shown = time.perf_counter()
+        began = shown - self._wall_s
+        guard.take_again()
+        with self._executed.going_on(), self._timed():
+            while not run.over:
+                run.tick()
+                if until is not None and until():
+                    return True
+                simulated = run.world.time_ns * 1e-9
+                if self._pace is not None:
+                    self._pace.keep(simulated)
+                now = time.perf_counter()
+                if progress is not None and now - shown > _SHOWN_S:
+                    shown = now
+                    progress(
+                        Progress(
+                            time_s=simulated,
+                            duration_s=run.scenario.duration,
+                            real_time_factor=simulated / (now - began),
+                            mission_state=run.parts.mission.state,
+                        )
+                    )
+            return False
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """Add the time of the block to what the run took; pacing is the only other use of the clock."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        try:
+            yield
+        finally:
+            self._wall_s += time.perf_counter() - wall
+            self._cpu_s += time.process_time() - cpu
+
+    def advance_to_end(
+        self,
+        progress: Callable[[Progress], None] | None = None,
+        watch: Callable[[Run], bool] | None = None,
+    ) -> None:
+        """Tick until the run is over, or `watch` returns True; see `advance`."""
+        run = self.run
+        gc.freeze()  # the model and the types stay; collections look only at what ticks make
+        try:
+            self.advance(None if watch is None else lambda: watch(run), progress)
+        finally:
+            gc.unfreeze()
+
+    def finish(self) -> Verdict:
+        """Judge the run as it stands, write what it leaves, and close it.
+
+        Raises:
+            RecordingError: The recording, the bag or a map cannot be written.
+        """
+        with self._ending:
+            verdict = self._verdict()
+            if self._out is not None:
+                save_maps(self.run.parts.stacks, self._out)
+            if self._sink is not None:
+                self._sink.close(verdict.to_dict())
+        return verdict
+
+    def close(self) -> None:
+        """End the run as it stands, without a verdict. Harmless when repeated."""
+        self._ending.close()
+
+    def _verdict(self) -> Verdict:
+        run, pace = self.run, self._pace
+        simulated = run.world.time_ns * 1e-9
+        navigators = [s.navigator for s in run.parts.stacks.values() if s.navigator is not None]
+        refused = sorted(run.bus.refused.items())  # of what came from outside; none without a network
+        clock = self._outside.clock(run.bus.networked)
+        return Verdict(
+            scenario=run.scenario.name,
+            seed=run.scenario.seed,
+            checks=tuple(check.result() for check in run.checks),
+            metrics={
+                "sim_time_s": simulated,
+                "wall_time_s": self._wall_s,
+                "cpu_time_s": self._cpu_s,
+                "real_time_factor": simulated / self._wall_s if self._wall_s else 0.0,
+                **({} if pace is None else {"pace_losses": float(pace.losses), "pace_lost_s": pace.lost_s}),
+                "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
+                **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
+                **({"trailing_bytes": float(run.bus.trailing)} if run.bus.trailing else {}),
+            },
+            digest=self._digest.finish(run.world.state_digest()),
+            deterministic=clock != "free" and not (run.lockstep and run.lockstep.surplus),
+            clock=clock,
+            versions=versions(),
+            plugins=self._executed.versions,
+            cpu=cpu_class(),
+        )
+
+
+def run(
+    scenario: Scenario,
+    *,
+    out: Path | None = None,
+    record: bool = True,
+    pace: float | None = None,
+    listen: Sequence[str] = (),
+    outside: Outside = ALONE,
+    bag: Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    watch: Callable[[Run], bool] | None = None,
+) -> Verdict:
+    """Run a scenario to its verdict; see `OpenRun` and `OpenRun.advance_to_end`.
+
+    Raises:
+        TwinError: The run cannot be made, or the physics diverged.
+    """
+    started = OpenRun(scenario, out=out, record=record, pace=pace, listen=listen, outside=outside, bag=bag)
+    try:
+        started.advance_to_end(progress, watch)
+        return started.finish()
+    finally:
+        started.close()
+
+
+def _save_model(parts: Parts, folder: Path) -> None:
+    try:
+        parts.world.save_model(folder)
+    except OSError as fault:
+        raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
+
+
+def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
+    if out is None or not scenario.recording.enabled:
+        return None
+    from twin.recording.sink import RecordingConfig, RerunSink
+
+    config = RecordingConfig(poses_hz=scenario.recording.poses_hz, block_s=3.0)
+    return RerunSink(
+        out / f"{scenario.name}.rrd",
+        config=config,
+        recording_id=f"{scenario.name}-{scenario.seed}",
+    )

@@ -1,0 +1,91 @@
+"""Plugins of navigation in a scenario: the keys of what ships stand side by side, a user's are his own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    BeforeValidator,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
+
+from twin.navigation.plugins import bound
+from twin.plugins import Kind
+from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.plugins import PluginUse, use
+from twin.strict_yaml import Fault, Faults
+
+
+class PluginGroup(ParameterGroup):
+    """Parameters of a plugin, beside those of what runs it."""
+
+    of: ClassVar[Kind[Any]]
+    _params: Mapping[str, Any] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the keys that are not a user's plugin's, which has all others."""
+        raise NotImplementedError
+
+    @property
+    def users(self) -> PluginUse | None:
+        """The plugin with its parameters, if it is a user's."""
+        name = getattr(self, "plugin", None)
+        if name is None or name in self.of.shipped:
+            return None
+        return PluginUse(reference=name, params=self._params)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_a_user(
+        cls, data: Any, handler: ModelWrapValidatorHandler[PluginGroup], info: ValidationInfo
+    ) -> PluginGroup:
+        name = data.get("plugin") if isinstance(data, Mapping) else None
+        if not isinstance(name, str) or name in cls.of.shipped:
+            return handler(data)
+        beside = cls.beside(data)
+        params = {key: value for key, value in data.items() if key not in beside}
+        used = use(cls.of, name, params, info, named_at=("plugin",))
+        made = handler({key: data[key] for key in data if key in beside} | {"plugin": used.reference})
+        made._params = used.params
+        return made
+
+
+def config_of_use(kind: Kind[Any], used: PluginUse) -> Any:
+    """Return the parameters of a user's plugin, by which it is made; runs its file."""
+    plugin = kind.find(used.reference)
+    return bound(plugin, used.config(plugin))
+
+
+def plugin_name(kind: Kind[Any]) -> Any:
+    """Return the type of a key that names a plugin."""
+    return Annotated[str, WithJsonSchema(_names(kind))]
+
+
+def plugin_choice(kind: Kind[Any]) -> Any:
+    """Return the type of a key that is a plugin: what ships by name, a user's also with its parameters."""
+
+    def read(data: Any, info: ValidationInfo) -> Any:
+        name, params = data, {}
+        if isinstance(data, Mapping) and isinstance(data.get("plugin"), str):
+            name, params = data["plugin"], {key: data[key] for key in data if key != "plugin"}
+        if not isinstance(name, str):
+            return data
+        if name not in kind.shipped:
+            return use(kind, name, params, info, named_at=("plugin",) if name is not data else ())
+        if params:
+            raise Faults([Fault((next(iter(params)),), f"the parameters of '{name}' stand beside it")])
+        return name
+
+    mapping = {"type": "object", "required": ["plugin"], "properties": {"plugin": {"type": "string"}}}
+    schema = WithJsonSchema({"anyOf": [*_names(kind)["anyOf"], mapping]})
+    return Annotated[str | PluginUse, BeforeValidator(read), schema]
+
+
+def _names(kind: Kind[Any]) -> dict[str, list[dict[str, Any]]]:
+    return {"anyOf": [{"enum": list(kind.names())}, {"type": "string", "pattern": ":"}]}
