@@ -11,7 +11,18 @@ import pytest
 
 import twin
 
-HEAVY = ("numpy", "mujoco", "zenoh", "pydantic", "rosbags", "scipy", "rerun", "yaml", "twin.api", "twin.models")
+HEAVY = (
+    "numpy",
+    "mujoco",
+    "zenoh",
+    "pydantic",
+    "rosbags",
+    "scipy",
+    "rerun",
+    "yaml",
+    "twin.api",
+    "twin.models",
+)
 
 
 def test_nothing_heavy_is_loaded_until_a_name_is_used() -> None:
