@@ -18,6 +18,7 @@ from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
     from twin.navigation.control.controller import Controller
+    from twin.navigation.control.critic import Critic, Trajectories
     from twin.navigation.control.goal_checker import GoalChecker
     from twin.navigation.control.progress_checker import ProgressChecker
     from twin.navigation.planning.planner import GlobalPlanner
@@ -35,6 +36,9 @@ CONTROLLERS.register(
 CONTROLLERS.register("dwb", "twin.navigation.control.dwb.controller:DWB")
 CONTROLLERS.register("mppi", "twin.navigation.control.mppi.controller:MPPI")
 CONTROLLERS.register("rotation_shim", "twin.navigation.control.rotation_shim:RotationShim")
+
+CRITICS: Kind[Critic] = Kind("critic", base="twin.navigation.control.critic:Critic", group="twin.critics")
+"""Of MPPI and DWB, beside those that are compiled into them."""
 
 GOAL_CHECKERS: Kind[GoalChecker] = Kind(
     "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
@@ -134,7 +138,7 @@ def _answering(
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
         said = method(self, *args, **kwargs)
         try:
-            return answer(plugin, said)
+            return answer(plugin, said, *args)
         except (TypeError, ValueError):
             shown = f"answers {method.__name__} with {said!r:.200}"
             raise plugin.error(f"{shown}; it must return {valid}") from None
@@ -142,13 +146,13 @@ def _answering(
     return call
 
 
-def _command(plugin: Plugin[Any], answer: Any) -> tuple[float, float]:
+def _command(plugin: Plugin[Any], answer: Any, *_: Any) -> tuple[float, float]:
     v, w = map(float, answer)
     require_finite(plugin, "a command", (v, w))
     return v, w
 
 
-def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
+def _path(plugin: Plugin[Any], answer: Any, *_: Any) -> np.ndarray:
     path = np.array(answer, dtype=np.float64, order="C")
     if path.ndim != 2 or path.shape[1] != 3 or not len(path):
         raise ValueError
@@ -156,10 +160,24 @@ def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
     return path
 
 
-def _truth(plugin: Plugin[Any], answer: Any) -> bool:
+def own_critics(config: Any) -> list[Critic]:
+    """Return the critics of MPPI's or DWB's parameters that a user brings, and that score."""
+    names = [name for name in config.critics if name in config.own_critics]
+    return [create(CRITICS, config.own_critics[name]) for name in names]
+
+
+def _truth(plugin: Plugin[Any], answer: Any, *_: Any) -> bool:
     if not isinstance(answer, bool | np.bool_):
         raise TypeError
     return bool(answer)
+
+
+def _score(plugin: Plugin[Any], answer: Any, trajectories: Trajectories) -> np.ndarray:
+    score = np.array(answer, dtype=np.float64)
+    if score.shape != trajectories.poses.shape[:1]:
+        raise ValueError
+    require_finite(plugin, "a score", score[~np.isfinite(score)])
+    return score
 
 
 _A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
@@ -167,10 +185,11 @@ _A_TRUTH = (_truth, "True or False")
 _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
     {
         "compute_velocity_commands": (_command, "(v [m/s], w [rad/s])"),
+        "score": (_score, "one number per trajectory: an array of shape (n,)"),
         "create_plan": _A_PATH,
         "smooth": _A_PATH,
         "is_goal_reached": _A_TRUTH,
         "check": _A_TRUTH,
     }
 )
-"""What methods must return: what reads the answer of a plugin, and raises a ValueError; in words."""
+"""What methods must return: what reads an answer, and raises a ValueError; the same in words."""

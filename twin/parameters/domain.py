@@ -91,6 +91,8 @@ class Domain:
         Raises:
             ValueError: As `checked`.
         """
+        if self.item is not None and isinstance(value, list):
+            return tuple(value)
         if self.item is not None or self.choices or value is None:
             return value
         if self.unit is not None:

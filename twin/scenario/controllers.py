@@ -6,18 +6,21 @@ plugin does not have is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
+from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
+from twin.navigation.control.mppi.scoring import ROWS
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
-from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
+from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.parameters.declaration import fields_of
 from twin.plugins import Kind
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
-from twin.scenario.plugin_groups import PluginGroup, plugin_choice, plugin_name
+from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_choice, plugin_name
 from twin.scenario.plugins import PluginUse
 from twin.strict_yaml import Fault, Faults
 
@@ -72,6 +75,11 @@ class PluginParameters(GoalCheckerParameters):
 
 _OF_PLUGIN = {name: group_of(config_of(CONTROLLERS.find(name))) for name in CONTROLLERS.shipped}
 _OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
+_CRITICS = {
+    "mppi": tuple(ROWS),
+    "dwb": tuple(one.name for one in fields_of(DWBConfig).values() if one.config is not None),
+}
+"""Those that are compiled into a controller, by its name."""
 
 
 def _valid_with(name: str) -> str:
@@ -83,16 +91,22 @@ def _valid_with(name: str) -> str:
 
 
 @keys_of(*(config_of(CONTROLLERS.find(name)) for name in CONTROLLERS.shipped))
-class ControllerParameters(PluginGroup, PluginParameters, ServerParameters):
+class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, ServerParameters):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
 
-    of = CONTROLLERS
+    of, list_of, list_key = CONTROLLERS, CRITICS, "critics"
 
     @classmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys of the server, the checkers, and the rotation shim if it is asked for."""
         shim = _OF_SHIM.model_fields if data.get("rotation_shim") is True else {}
         return {*ServerParameters.model_fields, *PluginParameters.model_fields, *shim}
+
+    @classmethod
+    def ships(cls, data: Mapping[str, Any]) -> Collection[str] | None:
+        """Return the names of the critics that ship for the plugin; None: it has no list of them."""
+        plugin = data.get("plugin")
+        return _CRITICS.get(plugin) if isinstance(plugin, str) else None
 
     @property
     def chosen(self) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
-from pydantic import Field, Strict, create_model
+from pydantic import Field, create_model
 
 from twin.parameters.declaration import Declaration, fields_of
 from twin.strict_yaml import StrictModel
@@ -76,6 +76,4 @@ def _key(declaration: Declaration) -> tuple[Any, Any] | None:
     if domain is None:
         return None
     kind: Any = Annotated[domain.annotation, domain]
-    if domain.item is not None:  # a group's validator may hand a list on
-        kind = Annotated[kind, Strict(False)]
     return kind | None, Field(default=None, description=declaration.text)

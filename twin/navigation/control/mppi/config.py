@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from twin.parameters import (
+    Flat,
     Fraction,
     Interval,
     Metres,
@@ -273,6 +275,8 @@ class MPPIConfig:
     """Of the noise."""
     critics: tuple[str, ...] = CRITICS
     """Which of them score."""
+    own_critics: Annotated[Mapping[str, Any], Flat] = field(default_factory=dict)
+    """Parameters of critics that a user brings, by the names that `critics` has for them."""
     ConstraintCritic: ConstraintCriticConfig = field(default_factory=ConstraintCriticConfig)
     CostCritic: CostCriticConfig = field(default_factory=CostCriticConfig)
     ObstaclesCritic: ObstaclesCriticConfig = field(default_factory=ObstaclesCriticConfig)
