@@ -17,6 +17,7 @@ from twin.parameters.bounds import Negative as Negative
 from twin.parameters.bounds import NotNegative as NotNegative
 from twin.parameters.bounds import NotPositive as NotPositive
 from twin.parameters.bounds import Positive as Positive
+from twin.parameters.units import Amperes as Amperes
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
@@ -29,4 +30,6 @@ from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
 from twin.parameters.units import RadiansPerSecondSquared as RadiansPerSecondSquared
 from twin.parameters.units import Seconds as Seconds
+from twin.parameters.units import SquareMetres as SquareMetres
+from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit

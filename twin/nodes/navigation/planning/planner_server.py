@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Interval, Metres, NotNegative, Positive
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
@@ -38,13 +39,13 @@ DEFAULT_ID = "GridBased"
 class PlannerServerConfig:
     """Parameters of the server itself."""
 
-    compute_alternatives: int = 0
+    compute_alternatives: Annotated[int, Interval(ge=0, le=100)] = 0
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
-    path_distance: float = 1.0
-    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
-    same_place: float = 0.5
-    """How far the robot may have moved meanwhile [m]."""
+    path_distance: Annotated[Metres, Positive] = 1.0
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew."""
+    same_place: Annotated[Metres, NotNegative] = 0.5
+    """How far the robot may have moved meanwhile."""
 
 
 @dataclass(frozen=True, kw_only=True)
