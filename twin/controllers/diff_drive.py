@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from twin.controllers.limiter import AxisLimits, SpeedLimiter
-from twin.parameters import Metres, Positive, RadiansPerSecond, Seconds
+from twin.parameters import MayBeInfinite, Metres, Name, Positive, RadiansPerSecond, Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,11 +24,11 @@ class DiffDriveConfig:
     wheel_separation_multiplier: Annotated[float, Positive] = 1.0
     """Effective track over geometric track: 1 for two wheels; for skid steer calibrated once, near 1 + (a/b)²
     (half wheelbase a, half track b; isotropic Coulomb friction, equal load)."""
-    linear: AxisLimits = AxisLimits(max_velocity=1.0, max_acceleration=1.0)
+    linear: Annotated[AxisLimits, Name("linear.x")] = AxisLimits(max_velocity=1.0, max_acceleration=1.0)
     """Limits along x."""
-    angular: AxisLimits = AxisLimits(max_velocity=2.0, max_acceleration=3.0)
+    angular: Annotated[AxisLimits, Name("angular.z")] = AxisLimits(max_velocity=2.0, max_acceleration=3.0)
     """Limits about z."""
-    max_wheel_velocity: Annotated[RadiansPerSecond, Positive] = math.inf
+    max_wheel_velocity: Annotated[RadiansPerSecond, Positive, MayBeInfinite] = math.inf
     """Both wheels are scaled together, so that the curvature is kept."""
     cmd_vel_timeout: Annotated[Seconds, Positive] = 0.5
     """Without a command for this long the robot is brought to a stop."""

@@ -11,6 +11,7 @@ import numpy as np
 from twin.geometry import Array
 from twin.navigation._jit import jit
 from twin.parameters import (
+    DurationNs,
     Fraction,
     Interval,
     Le,
@@ -72,9 +73,11 @@ class CollisionMonitorConfig:
     """Parameters of the monitor; names are Nav2's."""
 
     polygons: tuple[MonitorPolygon, ...] = (FOOTPRINT_APPROACH,)
-    source_timeout_ns: int = 1_000_000_000
-    """Data older than this is none, and stops the robot; 0: it does not [ns]."""
+    """The slowest of their results holds."""
+    source_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=1e6)] = 1_000_000_000
+    """The robot stops when a sensor is silent for so long; 0: it does not."""
     enabled: bool = True
+    """Whether commands are looked at."""
 
 
 @dataclass(frozen=True)

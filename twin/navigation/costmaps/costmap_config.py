@@ -11,7 +11,7 @@ from twin.geometry import Array
 from twin.navigation.costmaps import footprint as footprints
 from twin.navigation.costmaps.filters import KeepoutConfig
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
-from twin.parameters import Interval, Le, Metres, NotNegative, PerMetre, Positive, Seconds
+from twin.parameters import Derived, Interval, Le, Metres, NotNegative, PerMetre, Positive, Seconds
 
 _MOST_CELLS = 4000
 """Along an edge of a rolling costmap."""
@@ -35,7 +35,7 @@ class CostmapConfig:
     """Of a grid without static map, along y."""
     robot_radius: Annotated[Metres, Positive, Le(100.0)] = 0.1
     """Takes the robot as a circle of this radius; ignored with a footprint."""
-    footprint: tuple[tuple[Metres, Metres], ...] = ()
+    footprint: Annotated[tuple[tuple[Metres, Metres], ...], Derived] = ()
     """Corners in the base frame."""
     footprint_padding: Annotated[Metres, NotNegative, Le(10.0)] = 0.01
     """Added to each corner's coordinates, away from the base, or to the radius; the footprint that is read

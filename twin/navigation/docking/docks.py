@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.parameters import Amperes, Interval, Le, Metres, NotNegative, Positive, Radians, Seconds
+from twin.parameters import Amperes, Flat, Interval, Le, Metres, NotNegative, Positive, Radians, Seconds
 
 Detection = Literal["none", "face", "tote"]
 Offset = Annotated[Metres, Interval(ge=-10.0, le=10.0)]
@@ -68,6 +68,7 @@ class Dock:
     type: str = ""
     """Name of its type; may be empty if there is only one."""
     frame: str = "map"
+    """Of the pose."""
     pose: Pose2
     """Where the base stands when docked, in `frame`."""
 
@@ -94,8 +95,10 @@ _TYPES: Mapping[str, DockType] = MappingProxyType(
 class DockDatabase:
     """All docks by their ids, and their types by name."""
 
-    types: Mapping[str, DockType] = field(default_factory=lambda: dict(_TYPES))
-    docks: Mapping[str, Dock] = field(default_factory=dict)
+    types: Annotated[Mapping[str, DockType], Flat] = field(default_factory=lambda: dict(_TYPES))
+    """Kinds of docks by name."""
+    docks: Annotated[Mapping[str, Dock], Flat] = field(default_factory=dict)
+    """Docks by the name that `dock_robot` has in `dock_id`."""
 
     def find(self, dock_id: str) -> Dock:
         """Return a dock.

@@ -10,7 +10,7 @@ from typing import Annotated
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.exploration.frontiers import Frontier, FrontierConfig, FrontierMap
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.parameters import Interval, Metres, NotNegative, PerMetre, Positive, Seconds
+from twin.parameters import Flat, Interval, Metres, NotNegative, PerMetre, Positive, Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class ExplorerConfig:
     """So far before a frontier the robot stops and looks; the second time it drives up to it."""
     same_place: Annotated[Metres, NotNegative] = 0.5
     """Frontiers within this distance of each other are one and the same."""
-    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
+    frontiers: Annotated[FrontierConfig, Flat] = field(default_factory=FrontierConfig)
     """What counts as one."""
 
 

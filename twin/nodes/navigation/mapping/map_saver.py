@@ -17,15 +17,15 @@ from twin.navigation.maps.map_saver import SaveParameters, save_map
 from twin.navigation.maps.map_yaml import MODES
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.node_parameters import declare_config
-from twin.parameters import Fraction
+from twin.parameters import DurationNs, Fraction, Interval
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapSaverConfig:
     """Parameters of nav2_map_server's MapSaver."""
 
-    save_map_timeout_ns: int = 2_000_000_000
-    """How long a map is waited for [ns]."""
+    save_map_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=1e6)] = 2_000_000_000
+    """How long a map is waited for."""
     free_thresh_default: Annotated[float, Fraction] = 0.25
     """Cells up to this share are free, for requests that say 0."""
     occupied_thresh_default: Annotated[float, Fraction] = 0.65

@@ -29,7 +29,7 @@ from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-from twin.parameters import Interval, Metres, NotNegative, Positive
+from twin.parameters import Flat, Interval, Metres, Name, NotNegative, Positive, ReadOnly
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
@@ -52,12 +52,18 @@ class PlannerServerConfig:
 class PlannerParameters:
     """Parameters of the server and its plugins."""
 
-    planner_plugins: tuple[str, ...]
-    server: PlannerServerConfig
-    planner: PlannerPluginConfig
-    commitment: CommitmentConfig
-    goal_access: GoalAccessConfig
+    planner_plugins: Annotated[tuple[str, ...], ReadOnly]
+    """Names of the planners."""
+    server: Annotated[PlannerServerConfig, Flat]
+    """Of the server itself."""
+    planner: Annotated[PlannerPluginConfig, Name(DEFAULT_ID)]
+    """Of the planner that is used unless a request names another one."""
+    commitment: Annotated[CommitmentConfig, Name(DEFAULT_ID)]
+    """How strongly it stays with the last path."""
+    goal_access: Annotated[GoalAccessConfig, Flat]
+    """What becomes of goals that somebody stands on."""
     smoother: SmootherConfig
+    """How paths are smoothed."""
 
 
 def _by_id(chosen: PlannerPluginConfig) -> dict[str, PlannerPluginConfig]:
@@ -113,12 +119,7 @@ class PlannerServerNode:
         self._polygon = np.array(costmap.config.layers.polygon, order="C")
         self._access = GoalAccess(footprint=self._polygon)
         self._apply(parameters)
-        declare_config(
-            self.node,
-            parameters,
-            self._apply,
-            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "goal_access": "", "server": ""},
-        )
+        declare_config(self.node, parameters, self._apply)
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)
