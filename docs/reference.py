@@ -6,16 +6,12 @@ nothing is written; the exit code is 1 if a page is not up to date.
 
 from __future__ import annotations
 
-import ast
-import dataclasses
 import gc
-import inspect
 import re
 import sys
-import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from twin.bridge.bus import Bus
 from twin.bridge.node import Node
@@ -34,7 +30,8 @@ from twin.nodes.navigation.controller_server.config import ControllerServerConfi
 from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking.server import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
-from twin.nodes.node_parameters import parameter_names
+from twin.parameters import units
+from twin.parameters.declaration import fields_of
 from twin.runtime.build import build
 from twin.scenario.schema import json_schema, load
 from twin.warehouse.arena_file import ArenaFile
@@ -43,15 +40,10 @@ DOCS = Path(__file__).parent
 BEGIN, END = "<!-- {name}: written by docs/reference.py -->\n", "<!-- end of {name} -->"
 
 QUANTITIES = {
-    "s": "time",
-    "m": "length",
-    "rad": "angle",
-    "kg": "mass",
-    "m/s": "speed",
-    "rad/s": "turn rate",
-    "N": "force",
-    "Hz": "frequency",
-    "J": "energy",
+    part.si: part.quantity
+    for hint in vars(units).values()
+    for part in get_args(hint)
+    if isinstance(part, units.Unit)
 }
 """SI unit, the first of a pattern -> what the tables call it."""
 
@@ -296,33 +288,14 @@ def _table(shown: Parameters, config: Any, node: Node) -> list[str]:
     if shown.setters:
         lines += [f"No ROS parameters: {shown.setters}.", ""]
     lines += ["| Parameter | Value | Meaning |", "|---|---|---|"]
-    meanings = _field_docs(type(config))
-    for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        if field.name in ("footprint", "robot_radius") or not isinstance(value, bool | int | float | str):
+    for field, declaration in fields_of(config).items():
+        value, name = getattr(config, field), declaration.name
+        if field in ("footprint", "robot_radius") or not isinstance(value, bool | int | float | str):
             continue
-        (name,) = parameter_names({field.name: value})
-        if not shown.setters:
-            value = node.get_parameter(shown.prefix + name).value
+        value = declaration.tell(value) if shown.setters else node.get_parameter(shown.prefix + name).value
         text = str(value).lower() if isinstance(value, bool) else _plain(value)
-        meaning = _flow(meanings.get(field.name, "")).replace("[ns]", "[s]")
-        if field.name.endswith("period_ns"):
-            meaning = f"[Hz]; {meaning}".removesuffix("; ")
-        lines.append(f"| `{name}` | {text} | {meaning} |")
+        lines.append(f"| `{name}` | {text} | {_flow(declaration.text)} |")
     return [*lines, ""]
-
-
-def _field_docs(kind: type[Any]) -> dict[str, str]:
-    """Return the string below each field of a dataclass, its bases' too."""
-    inherited = [_field_docs(base) for base in kind.__bases__ if dataclasses.is_dataclass(base)]
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    assert isinstance(body, ast.ClassDef)
-    found = {name: text for base in inherited for name, text in base.items()}
-    for item, following in zip(body.body, body.body[1:], strict=False):
-        if isinstance(item, ast.AnnAssign) and isinstance(following, ast.Expr):
-            assert isinstance(item.target, ast.Name)
-            found[item.target.id] = str(ast.literal_eval(following.value))
-    return found
 
 
 def updated(page: str, name: str, content: str) -> str:

@@ -183,7 +183,10 @@ controller_server:
         "nav2.yaml:4: planner_server has no parameter GridBased.tolerence; did you mean 'tolerance'?" in said
     )
     assert "nav2.yaml:5: planner_server: GridBased.allow_unknown must be true or false, not 'maybe'" in said
-    assert "nav2.yaml:8: controller_server: controller_frequency must be more than zero" in said
+    assert (
+        "nav2.yaml:8: controller_server: controller_frequency must be greater than 0 and at most 1000, not 0"
+        in said
+    )
     assert "nav2.yaml:10: controller_server: FollowPath.lookahead_dist must be a number, not 'far'" in said
 
 
@@ -416,7 +419,7 @@ velocity_smoother:
     assert _said(tmp_path, text) == [
         "controller_server: FollowPath.motion_model must be 'DiffDrive' or 'Ackermann', not 'Omni'",
         "controller_server has no critic 'CostCritc'; did you mean 'CostCritic'?",
-        "controller_server: FollowPath.CostCritic.cost_weight must be greater than or equal to 0, not -3.0",
+        "controller_server: FollowPath.CostCritic.cost_weight must be at least 0, not -3.0",
         "planner_server: GridBased.motion_model_for_search must be 'DUBIN' or 'REEDS_SHEPP', not 'LATTICE'",
         "planner_server: GridBased.minimum_turning_radius must be greater than 0, not 0.0",
     ]

@@ -71,7 +71,7 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
         ({"required_movement_angle": 0.5}, "needs 'progress_checker: pose' beside it"),
         (
             {"goal_checker": "position", "yaw_goal_tolerance": 0.5},
-            "not looked at with 'goal_checker: position'",
+            "needs 'goal_checker: simple' or 'goal_checker: stopped' beside it",
         ),
     ],
 )

@@ -127,7 +127,7 @@ def test_every_number_of_the_schema_is_read_or_refused_in_a_sentence() -> None:
         for text in texts[number % 4 :: 4]:  # each kind of place is there many times
             accepted, problems = _validated(data, loc, text)
             assert accepted or problems, (loc, text)
-    assert sound > 0.6 * len(places)  # or nothing would be compared with other fields
+    assert sound > 0.5 * len(places)  # or nothing would be compared with other fields
 
 
 def test_the_sentence_names_place_and_valid_sizes(tmp_path: Path) -> None:

@@ -48,6 +48,8 @@ MapMetaData = ros.nav_msgs__msg__MapMetaData
 OccupancyGrid = ros.nav_msgs__msg__OccupancyGrid
 Odometry = ros.nav_msgs__msg__Odometry
 Path = ros.nav_msgs__msg__Path
+FloatingPointRange = ros.rcl_interfaces__msg__FloatingPointRange
+IntegerRange = ros.rcl_interfaces__msg__IntegerRange
 ListParametersResult = ros.rcl_interfaces__msg__ListParametersResult
 Log = ros.rcl_interfaces__msg__Log
 Parameter = ros.rcl_interfaces__msg__Parameter
@@ -157,6 +159,7 @@ __all__ = [
     "Float32",
     "Float64",
     "Float64MultiArray",
+    "FloatingPointRange",
     "GoalInfo",
     "GoalStatus",
     "GoalStatusArray",
@@ -166,6 +169,7 @@ __all__ = [
     "Imu",
     "Int32",
     "Int64",
+    "IntegerRange",
     "JointState",
     "JointTolerance",
     "JointTrajectory",

@@ -1,9 +1,31 @@
 """What a parameter is: declared once, as an annotated field of a frozen config.
 
-The annotation has the unit and the bound, the docstring below the field its text:
+The annotation has type, unit and bound, the docstring below the field its text:
 
     desired_linear_vel: Annotated[MetresPerSecond, Positive] = 0.5
-    'Cruise speed.'
+    '''Cruise speed.'''
+
+From this are made: the key of a scenario with its JSON schema (`scenario.parameter_group.keys_of`), the ROS
+parameter with its descriptor and the check of a live set (`nodes.node_parameters.declare_config`), the reader
+of parameter files (`parameters.placed.overlay`), and the tables of the docs. All refuse a value outside of
+its bounds in the same words, and NaN, infinity, and sizes beyond `Unit.sizes` in any case.
+
+- Units: `Metres`, `Seconds`, ...; a number without one is a plain `float` or `int`. The text needs not tell
+  the unit.
+- Bounds: `Positive`, `NotNegative`, `Fraction`, `Interval(ge=1, le=1000)`, ...: no value inside may end a
+  run, so counts and rates have an upper one. What two fields may not be together, `__post_init__` refuses by
+  a ValueError that begins with a parameter's name.
+- Choices: `Literal["a", "b"]`. Lists: `tuple[str, ...]`, `tuple[Metres, Metres]`; items have bounds, too.
+- `X | None`: a config in which it is None has no such ROS parameter.
+- Times that a config keeps in nanoseconds: with `controller_period_ns: Annotated[PeriodNs, Interval(gt=0,
+  le=1000)]` the parameter is `controller_frequency`, and its bounds are in Hz; `timeout_ns:
+  Annotated[DurationNs, Positive]` is `timeout`, in seconds.
+- `Name("...")`: the parameter's name, where the field's cannot be it; `Nav2("...")`: Nav2's name in files,
+  where it is another one; `ReadOnly`; `MayBeInfinite`; `Derived`: no key of scenarios.
+- A config inside, or a mapping of configs by name, is a section of its own name, or of `Name("...")`; with
+  `Flat` it is none: `controllers: Annotated[Mapping[str, ControllerConfig], Flat]` gives 'FollowPath.xy'.
+
+A config's annotations must be resolvable at run time: no names that are imported for type checkers only.
 """
 
 from annotated_types import Ge as Ge
@@ -17,6 +39,14 @@ from twin.parameters.bounds import Negative as Negative
 from twin.parameters.bounds import NotNegative as NotNegative
 from twin.parameters.bounds import NotPositive as NotPositive
 from twin.parameters.bounds import Positive as Positive
+from twin.parameters.forms import Derived as Derived
+from twin.parameters.forms import DurationNs as DurationNs
+from twin.parameters.forms import Flat as Flat
+from twin.parameters.forms import MayBeInfinite as MayBeInfinite
+from twin.parameters.forms import Name as Name
+from twin.parameters.forms import Nav2 as Nav2
+from twin.parameters.forms import PeriodNs as PeriodNs
+from twin.parameters.forms import ReadOnly as ReadOnly
 from twin.parameters.units import Amperes as Amperes
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules

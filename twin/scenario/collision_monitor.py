@@ -25,7 +25,8 @@ class MonitorPolygonParameters(ParameterGroup):
 @keys_of(CollisionMonitorConfig)
 class CollisionMonitorParameters(ParameterGroup):
     """Guards the commands of navigation and of people; only for robots with a lidar on `scan`, or with topics
-    named here."""
+    named here.
+    """
 
     polygons: tuple[MonitorPolygonParameters, ...] | None = None
     """The slowest of their results holds; absent: `approach` with the footprint, as early as it brakes."""

@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, model_validator
 
 from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.navigation.localisation.ekf import EkfConfig
 from twin.nodes.navigation.localisation.ekf import EkfNodeConfig
 from twin.nodes.navigation.localisation.ekf_sources import EkfSource
 from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
+from twin.parameters.placed import overridden
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 
 
@@ -45,3 +47,8 @@ class EkfParameters(ParameterGroup):
 
     sources: Mapping[SourceName, EkfSourceParameters] = {}
     """What it listens to besides, or instead of, `odom0` (wheels) and `imu0`."""
+
+    @model_validator(mode="after")
+    def _are_covariances(self) -> EkfParameters:
+        overridden(EkfConfig(), self.overrides())
+        return self

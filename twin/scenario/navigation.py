@@ -9,8 +9,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from twin.parameters import Hertz, MetresPerSecond, Positive, RadiansPerSecond
 from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.parameters import Hertz, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
@@ -23,6 +23,7 @@ from twin.strict_yaml import StrictModel
 @keys_of(CostmapNodeConfig)
 class CostmapParameters(ParameterGroup):
     """Parameters of a costmap."""
+
 
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""

@@ -1,15 +1,95 @@
-"""Overrides of a node's parameters in a scenario."""
+"""Overrides of parameters in a scenario: groups of keys, made from the configs that declare them."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
+from pydantic import Field, create_model
+
+from twin.parameters.declaration import Declaration, fields_of
 from twin.strict_yaml import StrictModel
+
+G = TypeVar("G", bound="ParameterGroup")
 
 
 class ParameterGroup(StrictModel):
     """Parameters of one node; a key that is absent keeps the node's default."""
 
+    configs: ClassVar[tuple[type, ...]] = ()
+    """Whose fields are keys of this group."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
     def overrides(self) -> dict[str, Any]:
-        """Return only the parameters that the file gives, by name."""
-        return {name: getattr(self, name) for name in self.model_fields_set}
+        """Return only the parameters that the file gives, by name; those of a group inside as a mapping."""
+        given = {
+            name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set
+        }
+        return {
+            name: value.overrides() if isinstance(value, ParameterGroup) else value
+            for name, value in given.items()
+        }
+
+
+def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:
+    """Return a decorator that gives a group an optional key for every parameter of some configs.
+
+    Args:
+        configs: What the keys are of.
+        whole: Whether the group is all that a config is made of: what that has no default of is required.
+    """
+
+    def decorate(group: type[G]) -> type[G]:
+        keys: dict[str, Any] = {}
+        for config in configs:
+            for declaration in _keyed(config):
+                key = _key(declaration, required=whole and declaration.is_required)
+                if key is not None and declaration.name not in group.model_fields:
+                    keys[declaration.name] = key
+        made = create_model(
+            group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
+        )
+        made.__qualname__ = group.__qualname__
+        made.configs = (*group.configs, *configs)
+        return made
+
+    return decorate
+
+
+def group_of(config: type) -> type[ParameterGroup]:
+    """Return the group of a config that needs no other keys than its own."""
+    return _group_of(config)
+
+
+@cache
+def _group_of(config: type) -> type[ParameterGroup]:
+    name = f"{config.__name__.removesuffix('Config')}Parameters"
+    body = {"__doc__": config.__doc__, "__module__": config.__module__}
+    return keys_of(config)(type(name, (ParameterGroup,), body))
+
+
+def _keyed(config: type) -> Iterator[Declaration]:
+    """Yield the fields of a config that scenarios have keys for, and those of configs without a section."""
+    for declaration in fields_of(config).values():
+        if declaration.config is not None and not declaration.name:
+            yield from _keyed(declaration.config)
+        elif not declaration.is_derived:
+            yield declaration
+
+
+def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any] | None:
+    """Return the type of a key, and what a schema says of it."""
+    if declaration.config is not None:
+        inner = group_of(declaration.config)
+        return (inner, Field(default=inner(), description=declaration.text)) if inner.model_fields else None
+    domain = declaration.domain
+    if domain is None:
+        return None
+    kind: Any = Annotated[domain.annotation, domain]
+    if required:
+        return kind, Field(description=declaration.text)
+    return kind | None, Field(default=None, description=declaration.text)

@@ -12,16 +12,13 @@ from pydantic_core import to_json
 
 from twin.errors import Problem, TwinError
 from twin.files.reading import absence, read_text
+from twin.parameters.bounds import LARGEST, SMALLEST
 
 Loc = tuple[str | int, ...]
 """Keys and indices from the root of a file to a value."""
 
 _MAX_NODES = 100_000
 """More values than any file we read has; stops a file whose aliases multiply without end."""
-
-
-LARGEST, SMALLEST = 1e15, 1e-100
-"""Of a file's numbers: beyond are none of the physical world, and squares and ratios leave the floats."""
 _DIGITS = 20
 """Of the longest whole number: a seed of 64 bits."""
 

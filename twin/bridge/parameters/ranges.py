@@ -29,11 +29,14 @@ def objection(
             return "Static parameter cannot be undeclared" if declared else ""
         if kind.value != descriptor.type:
             return f"Wrong parameter type, expected '{Type(descriptor.type)}' got '{kind}'"
+    reason = ""
     if kind is Type.INTEGER and descriptor.integer_range:
-        return _outside_integers(name, parameter.value, descriptor.integer_range[0])
-    if kind is Type.DOUBLE and descriptor.floating_point_range:
-        return _outside_doubles(name, parameter.value, descriptor.floating_point_range[0])
-    return ""
+        reason = _outside_integers(name, parameter.value, descriptor.integer_range[0])
+    elif kind is Type.DOUBLE and descriptor.floating_point_range:
+        reason = _outside_doubles(name, parameter.value, descriptor.floating_point_range[0])
+    # Ranges of ROS have an end on each side, and both are valid; the words may say it better.
+    words = descriptor.additional_constraints
+    return f"{name} {words}, not {parameter.value!r}" if reason and words else reason
 
 
 def _outside_integers(name: str, value: int, valid: object) -> str:

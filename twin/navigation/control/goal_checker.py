@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Annotated, Protocol
 
 from twin.geometry import Pose2, wrap_angle
+from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians, RadiansPerSecond
 
 _AT_REST = (0.0, 0.0)
 
@@ -34,12 +35,12 @@ class GoalChecker(Protocol):
 class PositionGoalCheckerConfig:
     """Parameters; names and defaults are Nav2's."""
 
-    xy_goal_tolerance: float = 0.25
-    """[m]"""
-    xy_goal_tolerance_buffer: float = 0.0
-    """A position once reached stays so within this more; 0: everywhere [m]."""
-    path_length_tolerance: float = 1.0
-    """With more of the path left, the goal is only passed by [m]."""
+    xy_goal_tolerance: Annotated[Metres, Positive] = 0.25
+    """Distance within which the goal is reached."""
+    xy_goal_tolerance_buffer: Annotated[Metres, NotNegative] = 0.0
+    """A position once reached stays so within this more; 0: everywhere."""
+    path_length_tolerance: Annotated[Metres, NotNegative] = 1.0
+    """With more of the path left, the goal is only passed by."""
     stateful: bool = True
     """Whether a position once reached stays reached while the robot turns."""
 
@@ -48,8 +49,8 @@ class PositionGoalCheckerConfig:
 class GoalCheckerConfig(PositionGoalCheckerConfig):
     """Parameters of SimpleGoalChecker; names and defaults are Nav2's."""
 
-    yaw_goal_tolerance: float = 0.25
-    """[rad]"""
+    yaw_goal_tolerance: Annotated[Radians, Positive] = 0.25
+    """Heading within which the goal is reached."""
     symmetric_yaw_tolerance: bool = False
     """Whether the opposite heading is as good."""
 
@@ -58,10 +59,10 @@ class GoalCheckerConfig(PositionGoalCheckerConfig):
 class StoppedGoalCheckerConfig(GoalCheckerConfig):
     """Parameters of StoppedGoalChecker; names and defaults are Nav2's."""
 
-    trans_stopped_velocity: float = 0.25
-    """[m/s]"""
-    rot_stopped_velocity: float = 0.25
-    """[rad/s]"""
+    trans_stopped_velocity: Annotated[MetresPerSecond, NotNegative] = 0.25
+    """Slower than this the robot stands ..."""
+    rot_stopped_velocity: Annotated[RadiansPerSecond, NotNegative] = 0.25
+    """... and turns slower than this."""
 
 
 @dataclass(kw_only=True)

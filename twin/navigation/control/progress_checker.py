@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Annotated, Protocol
 
 from twin.geometry import Pose2, wrap_angle
+from twin.parameters import Metres, Positive, Radians, Seconds
 
 
 class ProgressChecker(Protocol):
@@ -27,18 +28,18 @@ class ProgressChecker(Protocol):
 class ProgressCheckerConfig:
     """Parameters; names and defaults are Nav2's."""
 
-    required_movement_radius: float = 0.5
-    """[m]"""
-    movement_time_allowance: float = 10.0
-    """[s]"""
+    required_movement_radius: Annotated[Metres, Positive] = 0.5
+    """Movement that counts as progress."""
+    movement_time_allowance: Annotated[Seconds, Positive] = 10.0
+    """Time allowed for it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseProgressCheckerConfig(ProgressCheckerConfig):
     """Parameters of PoseProgressChecker; names and defaults are Nav2's."""
 
-    required_movement_angle: float = 0.5
-    """Turning by this is progress too [rad]."""
+    required_movement_angle: Annotated[Radians, Positive] = 0.5
+    """Turning by this is progress too."""
 
 
 @dataclass(kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -15,30 +16,40 @@ from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, footprint_cost
+from twin.parameters import (
+    Flat,
+    Interval,
+    Metres,
+    Positive,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecondSquared,
+    Seconds,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RotationShimConfig:
     """Parameters; names and defaults are those of nav2_rotation_shim_controller."""
 
-    primary_controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig = field(
+    primary_controller: Annotated[RegulatedPurePursuitConfig | MPPIConfig | DWBConfig, Flat] = field(
         default_factory=RegulatedPurePursuitConfig
     )
     """Of what drives."""
-    angular_dist_threshold: float = 0.785
-    """Farther off the path's direction than this the robot turns in place [rad]."""
-    angular_disengage_threshold: float = 0.3925
-    """A turn ends nearer to it than this [rad]."""
-    forward_sampling_distance: float = 0.5
-    """Where along the path its direction is taken [m]."""
-    rotate_to_heading_angular_vel: float = 1.8
-    """[rad/s]"""
-    max_angular_accel: float = 3.2
-    """[rad/s²]"""
-    max_cost_threshold: float = float(LETHAL_OBSTACLE)
+    angular_dist_threshold: Annotated[Radians, Positive] = 0.785
+    """Farther off the path's direction than this the robot turns in place."""
+    angular_disengage_threshold: Annotated[Radians, Positive] = 0.3925
+    """A turn ends nearer to it than this."""
+    forward_sampling_distance: Annotated[Metres, Positive] = 0.5
+    """Where along the path its direction is taken."""
+    rotate_to_heading_angular_vel: Annotated[RadiansPerSecond, Positive] = 1.8
+    """Turn rate on the spot."""
+    max_angular_accel: Annotated[RadiansPerSecondSquared, Positive] = 3.2
+    """Its acceleration."""
+    max_cost_threshold: Annotated[float, Interval(ge=1, le=255)] = float(LETHAL_OBSTACLE)
     """Costs under the footprint from which a turn is refused."""
-    simulate_ahead_time: float = 1.0
-    """How much of a turn is looked at for collisions [s]."""
+    simulate_ahead_time: Annotated[Seconds, Interval(gt=0, le=60)] = 1.0
+    """How much of a turn is looked at for collisions."""
     rotate_to_goal_heading: bool = False
     """Whether the robot turns in place at the goal, too."""
     rotate_to_heading_once: bool = False

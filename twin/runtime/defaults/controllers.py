@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
-from twin.navigation.control.goal_checker import (
-    GoalCheckerConfig,
-    PositionGoalCheckerConfig,
-    StoppedGoalCheckerConfig,
-)
+from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
 from twin.navigation.control.maneuver import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
@@ -21,12 +17,12 @@ from twin.navigation.control.mppi.config import (
     PathAlignCriticConfig,
 )
 from twin.navigation.control.plugins import ControllerConfig
-from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
+from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim import RotationShimConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.runtime.defaults.overrides import overridden
-from twin.scenario.controllers import ControllerParameters
+from twin.scenario.controllers import GOAL_CHECKERS, PROGRESS_CHECKERS, ControllerParameters
 
 _PERIOD_NS = 60_000_000
 _PATIENCE_NS = 4_000_000_000
@@ -51,21 +47,21 @@ def controller_server_config(
         smoother: Its limits are the controllers'.
         further: More controllers, by id; each brings a goal checker of the same id.
     """
-    overrides = parameters.overrides()
-    frequency, tolerance = overrides.get("controller_frequency"), overrides.get("failure_tolerance")
-    period_ns = _PERIOD_NS if frequency is None else round(1e9 / frequency)
-    by_id = {"FollowPath": parameters, **(further or {})}
-    checkers = {
-        "general_goal_checker" if name == "FollowPath" else name: _goal_checker(one.overrides())
-        for name, one in by_id.items()
-    }
-    return ControllerServerConfig(
-        controllers={name: _controller(one, smoother, period_ns * 1e-9) for name, one in by_id.items()},
-        goal_checkers=checkers,
-        progress_checkers={"progress_checker": _progress_checker(overrides)},
-        controller_period_ns=period_ns,
-        maneuver=ManeuverConfig() if overrides.get("maneuvers", True) else ManeuverConfig(reach=0.0),
-        failure_tolerance_ns=_PATIENCE_NS if tolerance is None else round(tolerance * 1e9),
+    overrides, by_id = parameters.overrides(), {"FollowPath": parameters, **(further or {})}
+    server = ControllerServerConfig(
+        goal_checkers={
+            "general_goal_checker" if name == "FollowPath" else name: _goal_checker(one)
+            for name, one in by_id.items()
+        },
+        progress_checkers={"progress_checker": _progress_checker(parameters)},
+        controller_period_ns=_PERIOD_NS,
+        maneuver=ManeuverConfig() if parameters.maneuvers is not False else ManeuverConfig(reach=0.0),
+        failure_tolerance_ns=_PATIENCE_NS,
+    )
+    server = overridden(server, overrides)
+    period = server.controller_period_ns * 1e-9
+    return replace(
+        server, controllers={name: _controller(one, smoother, period) for name, one in by_id.items()}
     )
 
 
@@ -75,11 +71,11 @@ def _controller(
     overrides = parameters.overrides()
     controller: RegulatedPurePursuitConfig | MPPIConfig | DWBConfig
     if parameters.chosen == "mppi":
-        controller = overridden(_mppi(smoother, period, overrides), overrides)
+        controller = overridden(_mppi(parameters, smoother, period), overrides)
     elif parameters.chosen == "dwb":
-        controller = overridden(_dwb(smoother, overrides), overrides)
+        controller = overridden(_dwb(parameters, smoother), overrides)
     else:
-        tolerance = _goal_checker(overrides).xy_goal_tolerance
+        tolerance = _goal_checker(parameters).xy_goal_tolerance
         controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
     if not parameters.shim:
         return controller
@@ -110,15 +106,14 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
     )
 
 
-def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[str, Any]) -> MPPIConfig:
+def _mppi(parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float) -> MPPIConfig:
     """Return a horizon of 2.4 s, and critics that end within centimetres.
 
     Fewer rollouts than Nav2's, of slower noise: they reach as far aside, in a third of the time.
     """
     linear, angular = smoother.linear, smoother.angular
-    speed = overrides.get("vx_max") or linear.max_velocity
-    model_dt = overrides.get("model_dt") or period
-    steps = overrides.get("time_steps") or max(8, round(2.4 / model_dt))
+    speed, model_dt = parameters.vx_max or linear.max_velocity, parameters.model_dt or period
+    steps = parameters.time_steps or min(1000, max(8, round(2.4 / model_dt)))
     return MPPIConfig(
         batch_size=600,
         time_steps=steps,
@@ -139,10 +134,10 @@ def _mppi(smoother: VelocitySmootherConfig, period: float, overrides: Mapping[st
     )
 
 
-def _dwb(smoother: VelocitySmootherConfig, overrides: Mapping[str, Any]) -> DWBConfig:
+def _dwb(parameters: ControllerParameters, smoother: VelocitySmootherConfig) -> DWBConfig:
     """Return a local path as long as a sample drives: a farther end is driven to across the corners."""
     linear, angular = smoother.linear, smoother.angular
-    speed, sim_time = overrides.get("max_vel_x") or linear.max_velocity, overrides.get("sim_time") or 1.2
+    speed, sim_time = parameters.max_vel_x or linear.max_velocity, parameters.sim_time or 1.2
     return DWBConfig(
         sim_time=sim_time,
         prune_distance=max(0.6, speed * sim_time),
@@ -159,15 +154,13 @@ def _braking(limits: AxisLimits) -> float:
     return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
 
 
-def _goal_checker(overrides: Mapping[str, Any]) -> PositionGoalCheckerConfig:
-    kind = overrides.get("goal_checker")
-    there: dict[str, Any] = {"xy_goal_tolerance": _TOLERANCE, "xy_goal_tolerance_buffer": _TOLERANCE_BUFFER}
-    if kind == "position":
-        return overridden(PositionGoalCheckerConfig(**there), overrides)
-    of = StoppedGoalCheckerConfig if kind == "stopped" else GoalCheckerConfig
-    return overridden(of(**there, yaw_goal_tolerance=_TOLERANCE), overrides)
+def _goal_checker(parameters: ControllerParameters) -> PositionGoalCheckerConfig:
+    kind = GOAL_CHECKERS[parameters.goal_checker or "simple"]
+    near = kind(xy_goal_tolerance=_TOLERANCE, xy_goal_tolerance_buffer=_TOLERANCE_BUFFER)
+    if isinstance(near, GoalCheckerConfig):
+        near = replace(near, yaw_goal_tolerance=_TOLERANCE)
+    return overridden(near, parameters.overrides())
 
 
-def _progress_checker(overrides: Mapping[str, Any]) -> ProgressCheckerConfig:
-    of = PoseProgressCheckerConfig if overrides.get("progress_checker") == "pose" else ProgressCheckerConfig
-    return overridden(of(), overrides)
+def _progress_checker(parameters: ControllerParameters) -> ProgressCheckerConfig:
+    return overridden(PROGRESS_CHECKERS[parameters.progress_checker or "simple"](), parameters.overrides())

@@ -16,6 +16,7 @@ from twin.navigation.control.collision_monitor import (
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
+from twin.runtime.defaults.overrides import overridden
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 

@@ -3,6 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
+
+from twin.parameters import (
+    Interval,
+    Metres,
+    MetresPerSecond,
+    MetresPerSecondSquared,
+    NotNegative,
+    NotPositive,
+    Positive,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecondSquared,
+    Seconds,
+)
+
+_Weight = Annotated[float, NotNegative]
+MOST_POSES = 1_000_000
+"""Of all samples of one command: a fraction of a second."""
 
 CRITICS = (
     "RotateToGoal",
@@ -20,84 +39,88 @@ CRITICS = (
 class ScaleConfig:
     """What all critics have."""
 
-    scale: float = 1.0
+    scale: _Weight = 1.0
+    """What its score is multiplied by."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ObstacleConfig(ScaleConfig):
     """Costs along a trajectory: of its centre (BaseObstacle), or under its outline (ObstacleFootprint)."""
 
-    scale: float = 0.02
+    scale: _Weight = 0.02
     sum_scores: bool = False
-    """Whether the sum counts, not the last cost."""
+    """Whether the mean along the trajectory counts, not the last cost."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AlignConfig(ScaleConfig):
     """Distance of a point before the robot."""
 
-    forward_point_distance: float = 0.1
-    """[m]"""
+    forward_point_distance: Annotated[Metres, NotNegative] = 0.1
+    """How far before."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RotateToGoalConfig(ScaleConfig):
     """At the goal: first stop, then turn to its heading."""
 
-    scale: float = 32.0
-    trans_stopped_velocity: float = 0.25
-    """[m/s]"""
-    slowing_factor: float = 5.0
-    lookahead_time: float = -1.0
-    """When the heading is looked at; negative: at the trajectory's end [s]."""
+    scale: _Weight = 32.0
+    trans_stopped_velocity: Annotated[MetresPerSecond, NotNegative] = 0.25
+    """Slower than this the robot stands."""
+    slowing_factor: _Weight = 5.0
+    """How much speeds count until then."""
+    lookahead_time: Seconds = -1.0
+    """When the heading is looked at; negative: at the trajectory's end."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OscillationConfig(ScaleConfig):
     """Forbids to go back and forth, or to turn left and right, on the spot."""
 
-    oscillation_reset_dist: float = 0.05
-    """[m]"""
-    oscillation_reset_angle: float = 0.2
-    """[rad]"""
-    oscillation_reset_time: float = -1.0
-    """Negative: never [s]."""
-    x_only_threshold: float = 0.05
-    """Turning counts below this speed only [m/s]."""
+    oscillation_reset_dist: Annotated[Metres, NotNegative] = 0.05
+    """After a movement by this all is allowed again ..."""
+    oscillation_reset_angle: Annotated[Radians, NotNegative] = 0.2
+    """... or after a turn by this ..."""
+    oscillation_reset_time: Seconds = -1.0
+    """... or after this time; negative: never."""
+    x_only_threshold: Annotated[MetresPerSecond, NotNegative] = 0.05
+    """Turning counts below this speed only."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DWBConfig:
     """Parameters of the planner and its trajectory generator, by the critics' names those of the critics."""
 
-    min_vel_x: float = 0.0
-    """[m/s]"""
-    max_vel_x: float = 0.26
-    """[m/s]"""
-    max_vel_theta: float = 1.0
-    """[rad/s]"""
-    min_speed_xy: float = 0.0
-    """Slower than this, and turning slower than min_speed_theta, is no command [m/s]."""
-    min_speed_theta: float = 0.0
-    """[rad/s]"""
-    acc_lim_x: float = 2.5
-    """[m/s²]"""
-    decel_lim_x: float = -2.5
-    """[m/s²]"""
-    acc_lim_theta: float = 3.2
-    """[rad/s²]"""
-    decel_lim_theta: float = -3.2
-    """[rad/s²]"""
-    vx_samples: int = 20
-    vtheta_samples: int = 20
-    sim_time: float = 1.7
-    """[s]"""
-    linear_granularity: float = 0.05
-    """Least distance between two poses of a trajectory [m]."""
-    angular_granularity: float = 0.025
-    """Least angle [rad]."""
-    prune_distance: float = 2.0
-    """Length of the local path [m]."""
+    min_vel_x: MetresPerSecond = 0.0
+    """Slowest, or fastest way back."""
+    max_vel_x: Annotated[MetresPerSecond, Positive] = 0.26
+    """Cruise speed."""
+    max_vel_theta: Annotated[RadiansPerSecond, Positive] = 1.0
+    """Fastest turn."""
+    min_speed_xy: Annotated[MetresPerSecond, NotNegative] = 0.0
+    """Slower than this, and turning slower than min_speed_theta, is no command."""
+    min_speed_theta: Annotated[RadiansPerSecond, NotNegative] = 0.0
+    """And this the turn rate."""
+    acc_lim_x: Annotated[MetresPerSecondSquared, Positive] = 2.5
+    """Acceleration."""
+    decel_lim_x: Annotated[MetresPerSecondSquared, NotPositive] = -2.5
+    """Deceleration, negative."""
+    acc_lim_theta: Annotated[RadiansPerSecondSquared, Positive] = 3.2
+    """Angular acceleration."""
+    decel_lim_theta: Annotated[RadiansPerSecondSquared, NotPositive] = -3.2
+    """Angular deceleration, negative."""
+    vx_samples: Annotated[int, Interval(ge=2, le=1000)] = 20
+    """Speeds to try."""
+    vtheta_samples: Annotated[int, Interval(ge=2, le=1000)] = 20
+    """Turn rates to try with each."""
+    sim_time: Annotated[Seconds, Positive] = 1.7
+    """How far ahead each is driven."""
+    linear_granularity: Annotated[Metres, Positive] = 0.05
+    """Least distance between two poses of a trajectory."""
+    angular_granularity: Annotated[Radians, Positive] = 0.025
+    """Least angle."""
+    prune_distance: Annotated[Metres, Positive] = 2.0
+    """Length of the local path."""
     enforce_path_inversion: bool = True
     """Whether a cusp of the path is driven to before what comes after it."""
     critics: tuple[str, ...] = CRITICS
@@ -112,3 +135,17 @@ class DWBConfig:
     Oscillation: OscillationConfig = field(default_factory=OscillationConfig)
     PreferForward: ScaleConfig = field(default_factory=ScaleConfig)
     Twirling: ScaleConfig = field(default_factory=lambda: ScaleConfig(scale=0.0))
+
+    def __post_init__(self) -> None:
+        if self.min_vel_x > self.max_vel_x:
+            raise ValueError(f"min_vel_x must be at most max_vel_x, {self.max_vel_x}, not {self.min_vel_x}")
+        speed = max(self.max_vel_x, -self.min_vel_x)
+        steps = self.sim_time * max(
+            speed / self.linear_granularity, self.max_vel_theta / self.angular_granularity
+        )
+        poses = self.vx_samples * self.vtheta_samples * steps
+        if poses > MOST_POSES:
+            raise ValueError(
+                "vx_samples x vtheta_samples x sim_time x speed / granularity must be at most "
+                f"{MOST_POSES}, not {poses:.3g}"
+            )

@@ -32,13 +32,6 @@ from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
-_PARAMETER_NAMES = {
-    "controllers": "",
-    "goal_checkers": "",
-    "progress_checkers": "",
-    "primary_controller": "",
-}
-
 
 class ControllerServerNode:
     """Follows a path in `map` with the local costmap in `odom`."""
@@ -62,7 +55,7 @@ class ControllerServerNode:
         """By name."""
         for kind in ("controller", "goal_checker", "progress_checker"):
             node.declare_parameter(f"{kind}_plugins", list(getattr(self.config, f"{kind}s")))
-        declare_config(node, self.config, self._reconfigure, _PARAMETER_NAMES)
+        declare_config(node, self.config, self._reconfigure)
         self._commander = Commander(node, costmap, footprint, self.config)
         self._velocity = (0.0, 0.0)
         self._speed_limit: SpeedLimit | None = None

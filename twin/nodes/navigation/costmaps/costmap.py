@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 

@@ -41,7 +41,18 @@ from twin.nodes.navigation.docking.detection import DockDetection
 from twin.nodes.navigation.docking.drive import BlindError, DockDrive
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-from twin.parameters import Derived, DurationNs, Flat, Interval, Le, Metres, NotNegative, PeriodNs, Positive, Seconds
+from twin.parameters import (
+    Derived,
+    DurationNs,
+    Flat,
+    Interval,
+    Le,
+    Metres,
+    NotNegative,
+    PeriodNs,
+    Positive,
+    Seconds,
+)
 
 Work = Generator[None, None, Any]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from annotated_types import Len
 from numpy.typing import ArrayLike
 
 from twin.bridge.conversions import pose3_from_pose
@@ -46,7 +47,7 @@ class EkfSource:
 
     topic: str
     """Of Odometry, PoseWithCovarianceStamped, TwistWithCovarianceStamped or Imu messages."""
-    config: tuple[bool, ...]
+    config: Annotated[tuple[bool, ...], Len(SIZE, SIZE)]
     """Which of x y z, roll pitch yaw, their velocities, and accelerations to take from it."""
     differential: bool = False
     """Whether its pose counts by its changes only."""

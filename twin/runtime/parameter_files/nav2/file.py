@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
-from twin.nodes.node_parameters import overlay, parameter_names
+from twin.parameters.placed import overlay, parameters_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.lines import lines_of
 from twin.runtime.parameter_files.nav2.checks import refusals, sentence, wrong_critics
@@ -101,13 +101,14 @@ class Nav2Parameters:
         self._nodes.add(node)
         self._absent[node] = absent or Absent()
         values = self._values(node, config, names or {}, prefix, rename)
-        known = tuple(prefix + name for name in parameter_names(config, names or {}))
+        known = tuple(prefix + name for name in parameters_of(config, names or {}))
         taken = {
             name.removeprefix(prefix): entry.value
             for name, entry in values.items()
             if name in known and not keep & {name, *name.split(".")}
         }
         config, refused = overlay(config, taken, names or {})
+        refused = {name: why.removeprefix(f"{name} ") for name, why in refused.items()}
         if limits is not None:
             refused = refusals(limits, taken, refused)
         for name, why in refused.items():
@@ -216,7 +217,7 @@ class Nav2Parameters:
         """Return the node's values by the names that this config has for them."""
         values = converted(by_axis(renamed(self._said(node))))
         values = {rename(name): entry for name, entry in values.items()}
-        known = tuple(prefix + name for name in parameter_names(config, names))
+        known = tuple(prefix + name for name in parameters_of(config, names))
         if "costmap" in node or node == "behavior_server":
             values = flat(values, known)
         foreign = [name.removesuffix("plugin") for name in values if name.endswith(".plugin")]

@@ -1,0 +1,114 @@
+"""What the fields of a config declare."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Any, get_type_hints
+
+from twin.parameters.domain import Domain, domain_of, metadata_of
+from twin.parameters.forms import Derived, DurationNs, Form, Name, Nav2, PeriodNs, ReadOnly
+from twin.parameters.texts import texts_of
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """One field of a config, read from its annotation."""
+
+    owner: type
+    """The config."""
+    field: str
+    """Its attribute."""
+    name: str
+    """The parameter's, below the section that the config is; '' for a config inside that is no section."""
+    domain: Domain | None
+    """Which values it takes; None for configs inside, and for what is no parameter."""
+    form: Form | None
+    """How the value is told, if not as it is kept."""
+    nav2: str
+    """Nav2's name in files; mostly the same."""
+    config: type | None
+    """The config inside, if the annotation names just one."""
+    is_required: bool
+    """Whether it has no default."""
+    is_read_only: bool
+    is_derived: bool
+    """Whether it is made of others, so that scenarios have no key for it."""
+
+    @property
+    def text(self) -> str:
+        """The docstring below the field, with the unit if it does not tell it."""
+        text = texts_of(self.owner).get(self.field, "")
+        unit = self.domain.unit if self.domain is not None else None
+        if unit is None or "[" in text:
+            return text
+        end = next((end for end in (" ...", "...", ".") if text.endswith(end)), "")
+        return f"{text.removesuffix(end)} [{unit.si}]{end or '.'}".lstrip()
+
+    def tell(self, kept: Any) -> Any:
+        """Return a value of the config as others are told it: SI, lists for tuples."""
+        if isinstance(kept, tuple):
+            return list(kept)
+        return kept if self.form is None else self.form.tell(kept)
+
+    def read(self, told: Any) -> Any:
+        """Return a value as the config keeps it.
+
+        Raises:
+            ValueError: it is none; a sentence without its subject.
+        """
+        assert self.domain is not None
+        try:
+            value = self.domain.checked(told)
+        except ValueError as error:
+            raise ValueError(f"{error}, not {told!r}") from None
+        return self.kept(value)
+
+    def kept(self, checked: Any) -> Any:
+        """Return a valid value as the config keeps it."""
+        return checked if self.form is None or checked is None else self.form.read(checked)
+
+
+def fields_of(config: type | object) -> Mapping[str, Declaration]:
+    """Return what the fields of a frozen dataclass, or of an instance, declare: by field, in their order."""
+    return _fields_of(config if isinstance(config, type) else type(config))
+
+
+@cache
+def _fields_of(config: type) -> Mapping[str, Declaration]:
+    hints = get_type_hints(config, include_extras=True)
+    found = {field.name: _declaration(config, field, hints[field.name]) for field in _init(config)}
+    return MappingProxyType(found)
+
+
+def _init(config: type) -> list[dataclasses.Field[Any]]:
+    return [field for field in dataclasses.fields(config) if field.init]
+
+
+def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
+    field = of.name
+    metadata = metadata_of(hint)
+    if domain_of(hint) == Domain(int) and field.endswith("_ns"):
+        hint = PeriodNs if field.endswith("period_ns") else DurationNs
+        metadata = metadata_of(hint)
+    form = next((one for one in metadata if isinstance(one, Form)), None)
+    name = field
+    if form is not None and field.endswith(form.suffix):
+        name = field.removesuffix(form.suffix) + form.told_as
+    name = next((one.name for one in metadata if isinstance(one, Name)), name)
+    kind = getattr(hint, "__origin__", hint) if metadata else hint
+    return Declaration(
+        owner=owner,
+        field=field,
+        name=name,
+        domain=domain_of(hint),
+        form=form,
+        nav2=next((one.name for one in metadata if isinstance(one, Nav2)), name),
+        config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
+        is_required=of.default is of.default_factory is dataclasses.MISSING,
+        is_read_only=ReadOnly in metadata,
+        is_derived=Derived in metadata,
+    )
