@@ -14,6 +14,23 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.goal_checker import (
+    GoalCheckerConfig,
+    PositionGoalCheckerConfig,
+    StoppedGoalCheckerConfig,
+)
+from twin.navigation.control.mppi.config import MPPIConfig
+from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
+from twin.navigation.planning.config import (
+    HybridConfig,
+    PlannerConfig,
+    SavitzkyGolayConfig,
+    SmootherConfig,
+    ThetaStarConfig,
+)
 from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
@@ -29,44 +46,49 @@ T = TypeVar("T")
 CONTROLLERS: Kind[Controller] = Kind(
     "controller", base="twin.navigation.control.controller:Controller", group="twin.controllers"
 )
-CONTROLLERS.register(
-    "regulated_pure_pursuit",
-    "twin.navigation.control.regulated_pure_pursuit.controller:RegulatedPurePursuit",
-)
-CONTROLLERS.register("dwb", "twin.navigation.control.dwb.controller:DWB")
-CONTROLLERS.register("mppi", "twin.navigation.control.mppi.controller:MPPI")
-CONTROLLERS.register("rotation_shim", "twin.navigation.control.rotation_shim:RotationShim")
-
 CRITICS: Kind[Critic] = Kind("critic", base="twin.navigation.control.critic:Critic", group="twin.critics")
 """Of MPPI and DWB, beside those that are compiled into them."""
-
 GOAL_CHECKERS: Kind[GoalChecker] = Kind(
     "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
 )
-GOAL_CHECKERS.register("simple", "twin.navigation.control.goal_checker:SimpleGoalChecker")
-GOAL_CHECKERS.register("stopped", "twin.navigation.control.goal_checker:StoppedGoalChecker")
-GOAL_CHECKERS.register("position", "twin.navigation.control.goal_checker:PositionGoalChecker")
-
 PROGRESS_CHECKERS: Kind[ProgressChecker] = Kind(
     "progress checker",
     base="twin.navigation.control.progress_checker:ProgressChecker",
     group="twin.progress_checkers",
 )
-PROGRESS_CHECKERS.register("simple", "twin.navigation.control.progress_checker:SimpleProgressChecker")
-PROGRESS_CHECKERS.register("pose", "twin.navigation.control.progress_checker:PoseProgressChecker")
-
 PLANNERS: Kind[GlobalPlanner] = Kind(
     "planner", base="twin.navigation.planning.planner:GlobalPlanner", group="twin.planners"
 )
-PLANNERS.register("grid_based", "twin.navigation.planning.planner:Planner")
-PLANNERS.register("theta_star", "twin.navigation.planning.planner:ThetaStar")
-PLANNERS.register("smac_hybrid", "twin.navigation.planning.hybrid:HybridPlanner")
-
 SMOOTHERS: Kind[Smoother] = Kind(
     "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
 )
-SMOOTHERS.register("simple_smoother", "twin.navigation.planning.smoother:SimpleSmoother")
-SMOOTHERS.register("savitzky_golay", "twin.navigation.planning.smoother:SavitzkyGolaySmoother")
+_CONFIGS: dict[tuple[str, str], type] = {}
+"""Of what ships, by kind and name."""
+
+
+def _ship(kind: Kind[Any], name: str, target: str, config: type) -> None:
+    """Register what ships, with its parameters: to know those, nothing is compiled."""
+    kind.register(name, target)
+    _CONFIGS[kind.name, name] = config
+
+
+_CONTROL, _PLANNING = "twin.navigation.control", "twin.navigation.planning"
+_PURSUIT = f"{_CONTROL}.regulated_pure_pursuit.controller:RegulatedPurePursuit"
+_ship(CONTROLLERS, "regulated_pure_pursuit", _PURSUIT, RegulatedPurePursuitConfig)
+_ship(CONTROLLERS, "dwb", f"{_CONTROL}.dwb.controller:DWB", DWBConfig)
+_ship(CONTROLLERS, "mppi", f"{_CONTROL}.mppi.controller:MPPI", MPPIConfig)
+_ship(CONTROLLERS, "rotation_shim", f"{_CONTROL}.rotation_shim:RotationShim", RotationShimConfig)
+_ship(GOAL_CHECKERS, "simple", f"{_CONTROL}.goal_checker:SimpleGoalChecker", GoalCheckerConfig)
+_ship(GOAL_CHECKERS, "stopped", f"{_CONTROL}.goal_checker:StoppedGoalChecker", StoppedGoalCheckerConfig)
+_ship(GOAL_CHECKERS, "position", f"{_CONTROL}.goal_checker:PositionGoalChecker", PositionGoalCheckerConfig)
+_PROGRESS = f"{_CONTROL}.progress_checker"
+_ship(PROGRESS_CHECKERS, "simple", f"{_PROGRESS}:SimpleProgressChecker", ProgressCheckerConfig)
+_ship(PROGRESS_CHECKERS, "pose", f"{_PROGRESS}:PoseProgressChecker", PoseProgressCheckerConfig)
+_ship(PLANNERS, "grid_based", f"{_PLANNING}.planner:Planner", PlannerConfig)
+_ship(PLANNERS, "theta_star", f"{_PLANNING}.planner:ThetaStar", ThetaStarConfig)
+_ship(PLANNERS, "smac_hybrid", f"{_PLANNING}.hybrid:HybridPlanner", HybridConfig)
+_ship(SMOOTHERS, "simple_smoother", f"{_PLANNING}.smoother:SimpleSmoother", SmootherConfig)
+_ship(SMOOTHERS, "savitzky_golay", f"{_PLANNING}.smoother:SavitzkyGolaySmoother", SavitzkyGolayConfig)
 
 
 @dataclass(frozen=True)
@@ -76,8 +98,15 @@ class NoParameters:
 
 def config_of(plugin: Plugin[Any]) -> type:
     """Return the class of a plugin's parameters, by which `create` finds it."""
+    if plugin.ships:
+        return _CONFIGS[plugin.kind.name, plugin.name]
     loaded: Any = plugin.load()
-    return (loaded.Config or NoParameters) if plugin.ships else _bound(plugin, loaded)
+    return _bound(plugin, loaded)
+
+
+def configs_of(kind: Kind[Any]) -> dict[str, type]:
+    """Return the classes of parameters of what ships, by name."""
+    return {name: _CONFIGS[kind.name, name] for name in kind.shipped}
 
 
 @functools.cache
@@ -101,8 +130,7 @@ def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
     found: Plugin[T] | None = getattr(config, "plugin", None)
     if found is not None:
         return found
-    shipped = map(kind.find, kind.shipped)
-    return next(plugin for plugin in shipped if plugin.config is type(config))
+    return kind.find(next(name for name, of in configs_of(kind).items() if of is type(config)))
 
 
 def create(kind: Kind[T], config: Any, **setup: Any) -> T:
