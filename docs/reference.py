@@ -25,7 +25,7 @@ from twin.navigation.docking.dock_estimate import DockEstimateConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.planner import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
 from twin.nodes.navigation.docking.server import DockingServerConfig

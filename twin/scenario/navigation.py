@@ -9,12 +9,22 @@ from typing import Annotated
 
 from pydantic import Field
 
-from twin.parameters import Hertz, Metres, MetresPerSecond, NotNegative, Positive, RadiansPerSecond, Seconds
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
+from twin.parameters import (
+    Hertz,
+    Le,
+    Metres,
+    MetresPerSecond,
+    NotNegative,
+    Positive,
+    RadiansPerSecond,
+    Seconds,
+)
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
-from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.scenario.planners import PlannerParameters
 from twin.strict_yaml import StrictModel
 
@@ -62,14 +72,11 @@ class CostmapParameters(ParameterGroup):
     """Whether the grid follows the robot, without a static map."""
 
 
+@keys_of(BtNavigatorConfig)
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
-    default_nav_to_pose_bt_xml: NameOrPath | None = None
-    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
-    default_nav_through_poses_bt_xml: NameOrPath | None = None
-    """The same for goals through poses."""
-    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 
 

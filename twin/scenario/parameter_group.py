@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field, create_model
 
-from twin.parameters.declaration import Declaration, fields_of
+from twin.parameters.declaration import fields_of
+from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
 G = TypeVar("G", bound="ParameterGroup")
@@ -41,10 +42,7 @@ def keys_of(*configs: type) -> Callable[[type[G]], type[G]]:
     def decorate(group: type[G]) -> type[G]:
         keys: dict[str, Any] = {}
         for config in configs:
-            for declaration in fields_of(config).values():
-                key = None if declaration.is_derived else _key(declaration)
-                if key is not None and declaration.name not in group.model_fields:
-                    keys[declaration.name] = key
+            keys |= {name: key for name, key in _keys(config).items() if name not in group.model_fields}
         made = create_model(
             group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
         )
@@ -67,13 +65,20 @@ def _group_of(config: type) -> type[ParameterGroup]:
     return keys_of(config)(type(name, (ParameterGroup,), body))
 
 
-def _key(declaration: Declaration) -> tuple[Any, Any] | None:
-    """Return the type of a key, and what a schema says of it."""
-    if declaration.config is not None:
-        inner = group_of(declaration.config)
-        return (inner, Field(default=inner(), description=declaration.text)) if inner.model_fields else None
-    domain = declaration.domain
-    if domain is None:
-        return None
-    kind: Any = Annotated[domain.annotation, domain]
-    return kind | None, Field(default=None, description=declaration.text)
+def _keys(config: type) -> dict[str, tuple[Any, Any]]:
+    """Return type and description of every key; those of a config that is no section are among them."""
+    keys: dict[str, tuple[Any, Any]] = {}
+    for declaration in fields_of(config).values():
+        if declaration.is_derived:
+            continue
+        if declaration.config is not None and not declaration.name:
+            keys |= _keys(declaration.config)
+        elif declaration.config is not None:
+            inner = group_of(declaration.config)
+            field = Field(default=inner(), description=declaration.text)
+            keys |= {declaration.name: (inner, field)} if inner.model_fields else {}
+        elif declaration.domain is not None:
+            domain = declaration.domain
+            kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
+            keys[declaration.name] = kind | None, Field(default=None, description=declaration.text)
+    return keys
