@@ -49,6 +49,7 @@ from twin.parameters.forms import NameOrPath as NameOrPath
 from twin.parameters.forms import Nav2 as Nav2
 from twin.parameters.forms import PeriodNs as PeriodNs
 from twin.parameters.forms import ReadOnly as ReadOnly
+from twin.parameters.units import Amperes as Amperes
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
@@ -61,4 +62,6 @@ from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
 from twin.parameters.units import RadiansPerSecondSquared as RadiansPerSecondSquared
 from twin.parameters.units import Seconds as Seconds
+from twin.parameters.units import SquareMetres as SquareMetres
+from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit

@@ -32,6 +32,8 @@ class Declaration:
     """How Nav2's files write it, where it is otherwise."""
     config: type | None
     """The config inside, if the annotation names just one."""
+    is_required: bool
+    """Whether it has no default."""
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
@@ -80,7 +82,7 @@ def fields_of(config: type | object) -> Mapping[str, Declaration]:
 @cache
 def _fields_of(config: type) -> Mapping[str, Declaration]:
     hints = get_type_hints(config, include_extras=True)
-    found = {field.name: _declaration(config, field.name, hints[field.name]) for field in _init(config)}
+    found = {field.name: _declaration(config, field, hints[field.name]) for field in _init(config)}
     return MappingProxyType(found)
 
 
@@ -88,7 +90,8 @@ def _init(config: type) -> list[dataclasses.Field[Any]]:
     return [field for field in dataclasses.fields(config) if field.init]
 
 
-def _declaration(owner: type, field: str, hint: Any) -> Declaration:
+def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
+    field = of.name
     metadata = metadata_of(hint)
     if domain_of(hint) == Domain(int) and field.endswith("_ns"):
         hint = PeriodNs if field.endswith("period_ns") else DurationNs
@@ -107,6 +110,7 @@ def _declaration(owner: type, field: str, hint: Any) -> Declaration:
         form=form,
         nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
+        is_required=of.default is of.default_factory is dataclasses.MISSING,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
         is_path=NameOrPath in metadata,

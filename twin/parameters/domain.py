@@ -91,8 +91,10 @@ class Domain:
         Raises:
             ValueError: As `checked`.
         """
-        if self.item is not None or self.choices or value is None:
+        if self.choices or value is None:
             return value
+        if self.item is not None:
+            return tuple(value) if isinstance(value, list) else value  # what a strict schema asks for
         if self.unit is not None:
             if isinstance(value, str):
                 value = self.unit.parse(value)

@@ -114,11 +114,11 @@ def overridden(config: C, given: Mapping[str, Any]) -> C:
     """
     changes: dict[str, Any] = {}
     for declaration in fields_of(config).values():
-        value = given.get(declaration.name) if declaration.name else given
+        value = given.get(declaration.name)
         inner = getattr(config, declaration.field)
-        if declaration.config is None and not declaration.name:
-            continue  # several, or of a class that others choose: they are made by themselves
-        if isinstance(value, Mapping) and dataclasses.is_dataclass(inner):
+        if not declaration.name and dataclasses.is_dataclass(inner):
+            changes[declaration.field] = overridden(inner, given)
+        elif isinstance(value, Mapping) and dataclasses.is_dataclass(inner):
             changes[declaration.field] = overridden(inner, value)
         elif value is not None:
             changes[declaration.field] = declaration.kept(value)

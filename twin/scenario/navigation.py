@@ -10,16 +10,8 @@ from typing import Annotated
 from pydantic import Field
 
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
-from twin.parameters import (
-    Hertz,
-    Le,
-    Metres,
-    MetresPerSecond,
-    NotNegative,
-    Positive,
-    RadiansPerSecond,
-    Seconds,
-)
+from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
@@ -29,47 +21,9 @@ from twin.scenario.planners import PlannerParameters
 from twin.strict_yaml import StrictModel
 
 
+@keys_of(CostmapNodeConfig)
 class CostmapParameters(ParameterGroup):
     """Parameters of a costmap."""
-
-    resolution: Annotated[Metres, Positive] | None = None
-    """Cell size [m]."""
-    width: Annotated[Metres, Positive] | None = None
-    """Of a rolling costmap, along x [m]."""
-    height: Annotated[Metres, Positive] | None = None
-    """Of a rolling costmap, along y [m]."""
-    footprint_padding: Annotated[Metres, NotNegative] | None = None
-    """Added to the footprint on every side [m]; the robot's own has 0.01 m already."""
-    inflation_radius: Annotated[Metres, NotNegative] | None = None
-    """Distance from obstacles within which cells cost [m]."""
-    cost_scaling_factor: Annotated[float, Positive] | None = None
-    """Decay of that cost [1/m]."""
-    update_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of updates [Hz]."""
-    obstacle_min_range: Annotated[Metres, NotNegative] | None = None
-    """Range from which a beam marks obstacles [m]."""
-    obstacle_max_range: Annotated[Metres, Positive] | None = None
-    """Range within which a beam marks obstacles [m]."""
-    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
-    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
-    raytrace_min_range: Annotated[Metres, NotNegative] | None = None
-    """Range from which a beam clears cells [m]."""
-    raytrace_max_range: Annotated[Metres, Positive] | None = None
-    """Range within which a beam clears cells [m]."""
-    inf_is_valid: bool | None = None
-    """Whether a beam without return (inf) clears cells."""
-    footprint_clearing_enabled: bool | None = None
-    """Whether the cells under the robot are free."""
-    keepout_before_inflation: bool | None = None
-    """Whether keep-out zones are inflated, so that no part of the robot enters them."""
-    scan_topics: tuple[str, ...] | None = None
-    """Topics of sensor_msgs/LaserScan for the obstacle layer; absent: `scan`."""
-    range_topics: tuple[str, ...] | None = None
-    """Topics of sensor_msgs/Range for the range sensor layer."""
-    robot_radius: Annotated[Metres, Positive] | None = None
-    """Takes the robot as a circle of this radius instead of by its footprint [m]."""
-    rolling_window: bool | None = None
-    """Whether the grid follows the robot, without a static map."""
 
 
 @keys_of(BtNavigatorConfig)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field, create_model
 
-from twin.parameters.declaration import fields_of
+from twin.parameters.declaration import Declaration, fields_of
 from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
@@ -36,13 +36,21 @@ class ParameterGroup(StrictModel):
         }
 
 
-def keys_of(*configs: type) -> Callable[[type[G]], type[G]]:
-    """Return a decorator that gives a group an optional key for every parameter of some configs."""
+def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:
+    """Return a decorator that gives a group an optional key for every parameter of some configs.
+
+    Args:
+        configs: What the keys are of.
+        whole: Whether the group is all that a config is made of: what that has no default of is required.
+    """
 
     def decorate(group: type[G]) -> type[G]:
         keys: dict[str, Any] = {}
         for config in configs:
-            keys |= {name: key for name, key in _keys(config).items() if name not in group.model_fields}
+            for declaration in _keyed(config):
+                key = _key(declaration, required=whole and declaration.is_required)
+                if key is not None and declaration.name not in group.model_fields:
+                    keys[declaration.name] = key
         made = create_model(
             group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
         )
@@ -65,20 +73,24 @@ def _group_of(config: type) -> type[ParameterGroup]:
     return keys_of(config)(type(name, (ParameterGroup,), body))
 
 
-def _keys(config: type) -> dict[str, tuple[Any, Any]]:
-    """Return type and description of every key; those of a config that is no section are among them."""
-    keys: dict[str, tuple[Any, Any]] = {}
+def _keyed(config: type) -> Iterator[Declaration]:
+    """Yield the fields of a config that scenarios have keys for, and those of configs without a section."""
     for declaration in fields_of(config).values():
-        if declaration.is_derived:
-            continue
         if declaration.config is not None and not declaration.name:
-            keys |= _keys(declaration.config)
-        elif declaration.config is not None:
-            inner = group_of(declaration.config)
-            field = Field(default=inner(), description=declaration.text)
-            keys |= {declaration.name: (inner, field)} if inner.model_fields else {}
-        elif declaration.domain is not None:
-            domain = declaration.domain
-            kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
-            keys[declaration.name] = kind | None, Field(default=None, description=declaration.text)
-    return keys
+            yield from _keyed(declaration.config)
+        elif not declaration.is_derived:
+            yield declaration
+
+
+def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any] | None:
+    """Return the type of a key, and what a schema says of it."""
+    if declaration.config is not None:
+        inner = group_of(declaration.config)
+        return (inner, Field(default=inner(), description=declaration.text)) if inner.model_fields else None
+    domain = declaration.domain
+    if domain is None:
+        return None
+    kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
+    if required:
+        return kind, Field(description=declaration.text)
+    return kind | None, Field(default=None, description=declaration.text)

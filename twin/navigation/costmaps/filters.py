@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from twin.navigation.costmaps.costmap import (
 )
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
+from twin.parameters import Interval
 
 KEEPOUT_FILTER, SPEED_FILTER_PERCENT, SPEED_FILTER_ABSOLUTE = 0, 1, 2
 """Types of nav2_msgs/msg/CostmapFilterInfo."""
@@ -33,7 +35,8 @@ class KeepoutConfig:
 
     override_lethal_cost: bool = False
     """Whether a robot in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
-    lethal_override_cost: int = MAX_NON_OBSTACLE
+    lethal_override_cost: Annotated[int, Interval(ge=0, le=MAX_NON_OBSTACLE)] = MAX_NON_OBSTACLE
+    """What a cell of the zone costs then."""
 
 
 @dataclass(kw_only=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +18,24 @@ from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
 from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
+from twin.parameters import Fraction, Interval, Metres, NotNegative
+
+Refinements = Annotated[int, Interval(ge=0, le=10)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SmootherConfig:
     """Parameters of the smoother; names and defaults are those of nav2_smoother's SimpleSmoother."""
 
-    w_data: float = 0.2
+    w_data: Annotated[float, Fraction] = 0.2
     """Pull towards the planned path."""
-    w_smooth: float = 0.3
-    """Pull towards the middle of the neighbours."""
-    tolerance: float = 1e-6
-    """Stop when a sweep moves all points together by less [m]."""
-    max_its: int = 1000
-    refinement_num: int = 2
+    w_smooth: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.3
+    """Pull towards the middle of the neighbours; a stronger one than 0.5 leaps over it."""
+    tolerance: Annotated[Metres, NotNegative] = 1e-6
+    """Stop when a sweep moves all points together by less."""
+    max_its: Annotated[int, Interval(ge=1, le=5000)] = 1000
+    """Stop after so many sweeps."""
+    refinement_num: Refinements = 2
     """How often the result is smoothed again."""
 
 
@@ -74,7 +79,7 @@ class SimpleSmoother:
 class SavitzkyGolayConfig:
     """Parameters of the filter; names and defaults are those of nav2_smoother's SavitzkyGolaySmoother."""
 
-    refinement_num: int = 2
+    refinement_num: Refinements = 2
     """How often the result is filtered again."""
     do_refinement: bool = True
     """Whether it is."""

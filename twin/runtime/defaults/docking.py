@@ -30,5 +30,4 @@ def docking_config(group: DockingParameters) -> DockingServerConfig:
             database.type_of(dock.type)
         except DockError as error:
             raise ScenarioError(f"dock '{name}': {error}") from error
-    rest = {name: value for name, value in group.overrides().items() if name not in ("types", "docks")}
-    return overridden(DockingServerConfig(database=database), rest)
+    return overridden(DockingServerConfig(database=database), group.overrides())

@@ -25,13 +25,10 @@ from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.runtime.defaults.docking import docking_config
 from twin.runtime.defaults.overrides import overridden as overridden
-from twin.scenario.navigation import NavigationConfig, NavigatorParameters
-from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
 
 C = TypeVar("C")
 
-_GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
-_LOCAL_COSTMAP_PERIOD_NS = 200_000_000
 _MISSED_SCANS = 3.5
 """After so many scan periods without a scan the robot stops: three in a row are missing."""
 
@@ -75,7 +72,7 @@ def navigation_parameters(
         scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
-    layers = CostmapConfig(
+    in_map = CostmapConfig(
         footprint=polygon,
         footprint_padding=0.0,  # it is in the footprint already
         inflation_radius=0.8,
@@ -83,8 +80,8 @@ def navigation_parameters(
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
-    rolling = replace(
-        layers,
+    around = replace(
+        in_map,
         rolling_window=True,
         width=4.0,
         height=4.0,
@@ -95,12 +92,18 @@ def navigation_parameters(
     return NavigationParameters(
         smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
-        global_costmap=replace(
-            _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
-            publish_period_ns=2_000_000_000,
+        global_costmap=_costmap(
+            CostmapNodeConfig(
+                name="global_costmap",
+                frame=frames.map,
+                layers=in_map,
+                update_period_ns=500_000_000,
+                publish_period_ns=2_000_000_000,
+            ),
+            config.global_costmap,
         ),
         local_costmap=_costmap(
-            "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
+            CostmapNodeConfig(name="local_costmap", frame=frames.odom, layers=around), config.local_costmap
         ),
         planner=overridden(
             PLUGINS[config.planner.plugin](tolerance=0.1, allow_unknown=mapping), config.planner.overrides()
@@ -152,21 +155,7 @@ def _limits(speed: float, acceleration: float, deceleration: float, drive: float
     )
 
 
-def _costmap(
-    name: str, frame: str, layers: CostmapConfig, group: ParameterGroup, period_ns: int
-) -> CostmapNodeConfig:
-    overrides = group.overrides()
-    return CostmapNodeConfig(
-        name=name,
-        frame=frame,
-        layers=overridden(
-            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
-        ),
-        scan_topics=tuple(overrides.get("scan_topics") or ("scan",)),
-        range_topics=tuple(overrides.get("range_topics") or ()),
-        update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
-    )
-
-
-def _period_ns(frequency: float | None, default: int) -> int:
-    return default if frequency is None else round(1e9 / frequency)
+def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
+    if group.robot_radius is not None:
+        config = replace(config, layers=replace(config.layers, footprint=()))
+    return overridden(config, group.overrides())

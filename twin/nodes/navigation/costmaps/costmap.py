@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from twin.nodes.navigation.costmaps.services import CostmapServices
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.scan_input import ScanInput
+from twin.parameters import Derived, Flat, Le, PeriodNs, Positive
 
 
 def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
@@ -55,21 +57,26 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
 class CostmapNodeConfig:
     """Rates, frame and inputs of a costmap."""
 
-    name: str
+    name: Annotated[str, Derived]
     """global_costmap or local_costmap."""
-    frame: str
-    layers: CostmapConfig
+    frame: Annotated[str, Derived]
+    """In which its cells lie."""
+    layers: Annotated[CostmapConfig, Flat]
+    """Of the grid and its layers."""
     scan_topics: tuple[str, ...] = ("scan",)
-    """Topics of sensor_msgs/LaserScan: the obstacle layer's `observation_sources`."""
+    """Topics of sensor_msgs/LaserScan for the obstacle layer: its `observation_sources`."""
     range_topics: tuple[str, ...] = ()
-    """Topics of sensor_msgs/Range: the range sensor layer."""
-    keepout_filter_info_topic: str = ""
+    """Topics of sensor_msgs/Range for the range sensor layer."""
+    keepout_filter_info_topic: Annotated[str, Derived] = ""
     """Where the keep-out mask is announced; empty: no keep-out filter."""
-    speed_filter_info_topic: str = ""
+    speed_filter_info_topic: Annotated[str, Derived] = ""
     """Where the mask of speed limits is announced; empty: no speed filter."""
-    speed_limit_topic: str = "speed_limit"
-    update_period_ns: int = 200_000_000
-    publish_period_ns: int = 1_000_000_000
+    speed_limit_topic: Annotated[str, Derived] = "speed_limit"
+    """Where the limit is published in which the robot is."""
+    update_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 200_000_000
+    """Rate of updates."""
+    publish_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
+    """Rate at which the whole grid is published."""
 
 
 class _ScanSource:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -41,6 +41,18 @@ from twin.nodes.navigation.docking.detection import DockDetection
 from twin.nodes.navigation.docking.drive import BlindError, DockDrive
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import (
+    Derived,
+    DurationNs,
+    Flat,
+    Interval,
+    Le,
+    Metres,
+    NotNegative,
+    PeriodNs,
+    Positive,
+    Seconds,
+)
 
 Work = Generator[None, None, Any]
 
@@ -49,31 +61,32 @@ Work = Generator[None, None, Any]
 class DockingServerConfig:
     """Parameters; names are those of opennav_docking, defaults too unless said otherwise."""
 
-    controller_period_ns: int = 60_000_000
-    """Nav2: 50 Hz."""
-    initial_perception_timeout_ns: int = 5_000_000_000
-    """For the first sight of the dock [ns]."""
-    wait_charge_timeout_ns: int = 5_000_000_000
-    """For charging to begin [ns]."""
-    dock_approach_timeout: float = 30.0
-    """For one approach [s]."""
-    max_retries: int = 3
+    controller_period_ns: Annotated[PeriodNs, Interval(ge=0.1, le=1000.0)] = 60_000_000
+    """Rate of the velocity commands; Nav2: 50 Hz."""
+    initial_perception_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=3600.0)] = 5_000_000_000
+    """For the first sight of the dock."""
+    wait_charge_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=3600.0)] = 5_000_000_000
+    """For charging to begin."""
+    dock_approach_timeout: Annotated[Seconds, Positive, Le(3600.0)] = 30.0
+    """For one approach."""
+    max_retries: Annotated[int, Interval(ge=0, le=1000)] = 3
     """Approaches after the first one."""
-    dock_prestaging_tolerance: float = 0.15
-    """A robot so near to the staging pose is not driven there first [m]; Nav2: 0.5."""
-    database: DockDatabase = field(default_factory=DockDatabase)
+    dock_prestaging_tolerance: Annotated[Metres, NotNegative] = 0.15
+    """A robot so near to the staging pose is not driven there first; Nav2: 0.5."""
+    database: Annotated[DockDatabase, Flat, Derived] = field(default_factory=DockDatabase)
+    """Which docks there are."""
     estimate: DockEstimateConfig = field(default_factory=DockEstimateConfig)
+    """What of the scans is believed to be the dock."""
     dock: LineApproachConfig = field(default_factory=LineApproachConfig)
+    """How a dock is approached."""
     undock: LineApproachConfig = field(
         default_factory=lambda: LineApproachConfig(
             lateral_tolerance=0.2, yaw_tolerance=0.3, turn_first_above=0.3
         )
     )
+    """How it is left."""
     controller: DockCollisionConfig = field(default_factory=DockCollisionConfig)
-
-
-NAMES = {"database": "", "types": "", "docks": ""}
-"""Levels of the config that are none of the parameters' names."""
+    """What is looked at on the way."""
 
 
 class DockingServerNode:
@@ -91,7 +104,7 @@ class DockingServerNode:
     ) -> None:
         self.node = bus.create_node("docking_server", namespace)
         self.config = config or DockingServerConfig()
-        declare_config(self.node, self.config, names=NAMES)
+        declare_config(self.node, self.config)
         self._robot_pose = robot_pose
         self._detection = DockDetection(self.node, robot_pose, self.config.estimate)
         self._current = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from twin.navigation.localisation.ekf import SIZE, Ekf, EkfConfig
 from twin.navigation.localisation.gyro_bias import GyroBias
 from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource, SourceReader
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Derived, DurationNs, Flat, Interval, Le, PeriodNs, Positive
 
 
 def _which(*chosen: int) -> tuple[bool, ...]:
@@ -60,16 +61,21 @@ _ON_A_FLOOR = EkfConfig(
 class EkfNodeConfig:
     """Parameters; names are robot_localization's. Defaults fit a wheeled robot with an IMU."""
 
-    ekf: EkfConfig = _ON_A_FLOOR
-    period_ns: int = 20_000_000
-    """Between outputs; as `frequency` [Hz]."""
+    ekf: Annotated[EkfConfig, Flat] = _ON_A_FLOOR
+    """Of the filter itself."""
+    period_ns: Annotated[PeriodNs, Positive, Le(1000.0)] = 20_000_000
+    """How often it publishes; in scenarios once per period of the drive's controller."""
     publish_tf: bool = True
-    transform_time_offset_ns: int = 0
-    """The transform is stamped this far ahead [ns]."""
-    map_frame: str = "map"
-    odom_frame: str = "odom"
-    base_link_frame: str = "base_footprint"
-    world_frame: str = "odom"
+    """Whether it publishes odom → base; if not, the drive's controller does."""
+    transform_time_offset_ns: Annotated[DurationNs, Interval(ge=-60.0, le=60.0)] = 0
+    """That transform is stamped this far ahead."""
+    map_frame: Annotated[str, Derived] = "map"
+    """Fixed in the world; of the filter it publishes nothing in it."""
+    odom_frame: Annotated[str, Derived] = "odom"
+    """In which it estimates."""
+    base_link_frame: Annotated[str, Derived] = "base_footprint"
+    """Of the robot."""
+    world_frame: Annotated[str, Derived] = "odom"
     """Parent of the transform that is published."""
     sources: Mapping[str, EkfSource] = field(default_factory=lambda: _WHEELS_AND_IMU)
     """By robot_localization's names: `odomN`, `poseN`, `twistN`, `imuN`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -35,26 +35,29 @@ from twin.nodes.navigation.mapping.map_server import grid_msg
 from twin.nodes.navigation.mapping.slam_services import SlamServices
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Derived, DurationNs, Flat, Interval
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlamNodeConfig:
     """Rates of what is published, and what is known at the start; names are slam_toolbox's."""
 
-    mode: Mode = "mapping"
+    mode: Annotated[Mode, Derived] = "mapping"
     """mapping, or localization in a pose graph that stays as it is."""
-    map_file_name: str = ""
+    map_file_name: Annotated[str, Derived] = ""
     """A pose graph to go on with or to localise in; empty: nothing is known."""
-    map_start_pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    map_start_pose: Annotated[tuple[float, float, float], Derived] = (0.0, 0.0, 0.0)
     """The robot's pose in the map frame at the start: x, y [m], yaw [rad]."""
-    map_update_interval_ns: int = 5_000_000_000
-    """Time between two maps [ns]."""
-    transform_timeout_ns: int = 200_000_000
-    """map → odom is stamped this far ahead, so that it holds until the next scan [ns]."""
-    throttle_scans: int = 1
+    map_update_interval_ns: Annotated[DurationNs, Interval(ge=0.01, le=1e6)] = 5_000_000_000
+    """Time between two maps."""
+    transform_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=60.0)] = 200_000_000
+    """map → odom is stamped this far ahead, so that it holds until the next scan."""
+    throttle_scans: Annotated[int, Interval(ge=1, le=10_000)] = 1
     """Every so many scans one is looked at."""
     scan_topic: str = "scan"
-    slam: SlamConfig = field(default_factory=SlamConfig)
+    """Of the lidar."""
+    slam: Annotated[SlamConfig, Flat] = field(default_factory=SlamConfig)
+    """Of the mapping itself."""
 
 
 class SlamToolboxNode:
@@ -79,7 +82,7 @@ class SlamToolboxNode:
         self._count = 0
         self._started = False
         """Whether a scan was taken since everything was forgotten: the first one is shown at once."""
-        declare_config(node, self.config, names={"slam": ""})
+        declare_config(node, self.config)
         warm_up()
         self.slam = self._begin()
         self._tf = TransformBroadcaster(node)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat, Interval, Metres, Name, NotNegative, Positive, ReadOnly
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
@@ -38,25 +39,31 @@ DEFAULT_ID = "GridBased"
 class PlannerServerConfig:
     """Parameters of the server itself."""
 
-    compute_alternatives: int = 0
+    compute_alternatives: Annotated[int, Interval(ge=0, le=100)] = 0
     """How many other ways are tried when a goal is asked for again from the same place, which tells that the
     path could not be followed. For trees that plan anew only when they must."""
-    path_distance: float = 1.0
-    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
-    same_place: float = 0.5
-    """How far the robot may have moved meanwhile [m]."""
+    path_distance: Annotated[Metres, Positive] = 1.0
+    """A path farther from the robot than this is not valid: it was carried away, or localised anew."""
+    same_place: Annotated[Metres, NotNegative] = 0.5
+    """How far the robot may have moved meanwhile."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerParameters:
     """Parameters of the server and its plugins."""
 
-    planner_plugins: tuple[str, ...]
-    server: PlannerServerConfig
-    planner: PlannerPluginConfig
-    commitment: CommitmentConfig
-    goal_access: GoalAccessConfig
+    planner_plugins: Annotated[tuple[str, ...], ReadOnly]
+    """Names of the planners."""
+    server: Annotated[PlannerServerConfig, Flat]
+    """Of the server itself."""
+    planner: Annotated[PlannerPluginConfig, Name(DEFAULT_ID)]
+    """Of the planner that is used unless a request names another one."""
+    commitment: Annotated[CommitmentConfig, Name(DEFAULT_ID)]
+    """How strongly it stays with the last path."""
+    goal_access: Annotated[GoalAccessConfig, Flat]
+    """What becomes of goals that somebody stands on."""
     smoother: SmootherConfig
+    """How paths are smoothed."""
 
 
 def _by_id(chosen: PlannerPluginConfig) -> dict[str, PlannerPluginConfig]:
@@ -112,12 +119,7 @@ class PlannerServerNode:
         self._polygon = np.array(costmap.config.layers.polygon, order="C")
         self._access = GoalAccess(footprint=self._polygon)
         self._apply(parameters)
-        declare_config(
-            self.node,
-            parameters,
-            self._apply,
-            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "goal_access": "", "server": ""},
-        )
+        declare_config(self.node, parameters, self._apply)
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)

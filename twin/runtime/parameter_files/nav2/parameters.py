@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking.server import NAMES as DOCKING_NAMES
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
+from twin.parameters import Flat
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
@@ -19,7 +20,6 @@ from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
-from twin.scenario.planners import PlannerParameters
 
 _CONTROLLERS = {
     "RegulatedPurePursuitController": "regulated_pure_pursuit",
@@ -71,8 +71,8 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
 class AmclParameters:
     """All of `/amcl`."""
 
-    filter: AmclConfig
-    node: AmclNodeConfig
+    filter: Annotated[AmclConfig, Flat]
+    node: Annotated[AmclNodeConfig, Flat]
 
 
 def amcl_with_file(
@@ -93,7 +93,7 @@ def amcl_with_file(
     if params_file is None:
         return parameters, []
     file = Nav2Parameters(Path(params_file), namespace)
-    parameters = file.applied("amcl", parameters, {"filter": "", "node": ""}, keep=given)
+    parameters = file.applied("amcl", parameters, keep=given)
     return parameters, file.ignored()
 
 
@@ -149,7 +149,6 @@ def with_file(
             parameters.planner,
             prefix="GridBased.",
             keep=nav2_given.for_planner(config.planner),
-            limits=PlannerParameters,
         ),
         controller_server=file.applied(
             "controller_server",
@@ -157,9 +156,7 @@ def with_file(
             keep=nav2_given.for_controllers(config),
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
-        docking=file.applied(
-            "docking_server", docking, DOCKING_NAMES, keep=nav2_given.for_docking(config.docking)
-        ),
+        docking=file.applied("docking_server", docking, keep=nav2_given.for_docking(config.docking)),
         path_smoother=file.applied("smoother_server", parameters.path_smoother),
         navigator=file.applied(
             "bt_navigator",
@@ -183,7 +180,7 @@ def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapPara
         scan_topics=scans if scans and "scan_topics" not in keep else config.scan_topics,
         range_topics=ranges if ranges and "range_topics" not in keep else config.range_topics,
     )
-    changed = file.applied(node, config, {"layers": ""}, keep=keep, limits=CostmapParameters)
+    changed = file.applied(node, config, keep=keep)
     if file.is_round(node) and "robot_radius" not in keep:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))
     return changed
