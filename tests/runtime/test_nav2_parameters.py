@@ -17,7 +17,7 @@ from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
 from twin.navigation.docking.docks import Dock
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file, monitor_with_file
@@ -473,7 +473,7 @@ def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
 
 def test_what_a_scenario_gives_must_fit_together() -> None:
     assert overridden(AmclConfig(), {"min_particles": 900}).min_particles == 900
-    with pytest.raises(ScenarioError, match="amcl: min_particles is 5000, more than max_particles"):
+    with pytest.raises(ScenarioError, match="min_particles is 5000, more than max_particles"):
         overridden(AmclConfig(), {"min_particles": 5000})
 
 

@@ -28,7 +28,8 @@ from twin.navigation.localisation.particles import clusters, regularised, temper
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.odometry_watch import OdometryWatch
-from twin.navigation.planning.planner import Planner, ThetaStarConfig
+from twin.navigation.planning.config import ThetaStarConfig
+from twin.navigation.planning.planner import Planner
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.recovery import DriveOnHeading
 

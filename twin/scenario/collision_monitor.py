@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from twin.navigation.control.collision_monitor import CollisionMonitorConfig, MonitorPolygon
+from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorPolygon
+from twin.parameters.placed import overridden
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 
 
@@ -19,7 +20,7 @@ class MonitorPolygonParameters(ParameterGroup):
 
     def config(self) -> MonitorPolygon:
         """Return the polygon."""
-        return MonitorPolygon(**self.overrides())
+        return overridden(MonitorPolygon(name=self.name, action_type=self.action_type), self.overrides())
 
 
 @keys_of(CollisionMonitorConfig)

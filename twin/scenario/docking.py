@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from twin.navigation.docking.docks import DockType
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.scenario.fields import PoseConfig
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.strict_yaml import StrictModel

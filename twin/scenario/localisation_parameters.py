@@ -10,9 +10,8 @@ from pydantic import AfterValidator, model_validator
 
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.ekf import EkfConfig
-from twin.nodes.navigation.localisation.ekf import EkfNodeConfig
-from twin.nodes.navigation.localisation.ekf_sources import EkfSource
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.parameters.placed import overridden
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 
@@ -21,10 +20,20 @@ from twin.scenario.parameter_group import ParameterGroup, keys_of
 class AmclParameters(ParameterGroup):
     """Parameters of `/amcl`."""
 
+    @model_validator(mode="after")
+    def _can_be(self) -> AmclParameters:
+        overridden(AmclConfig(), self.overrides())
+        return self
+
 
 @keys_of(SlamNodeConfig)
 class SlamParameters(ParameterGroup):
     """Parameters of `/slam_toolbox`."""
+
+    @model_validator(mode="after")
+    def _can_be(self) -> SlamParameters:
+        overridden(SlamNodeConfig(), self.overrides())
+        return self
 
 
 @keys_of(EkfSource)
@@ -49,6 +58,6 @@ class EkfParameters(ParameterGroup):
     """What it listens to besides, or instead of, `odom0` (wheels) and `imu0`."""
 
     @model_validator(mode="after")
-    def _are_covariances(self) -> EkfParameters:
+    def _can_be(self) -> EkfParameters:
         overridden(EkfConfig(), self.overrides())
         return self

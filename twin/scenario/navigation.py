@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import Field
 
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters

@@ -6,10 +6,8 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from twin.navigation.planning.commitment import CommitmentConfig
-from twin.navigation.planning.goal_access import GoalAccessConfig
-from twin.navigation.planning.plugins import PLUGINS
-from twin.nodes.navigation.planning.planner_server import PlannerServerConfig
+from twin.navigation.planning.config import PLUGINS, CommitmentConfig, GoalAccessConfig
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
 
 

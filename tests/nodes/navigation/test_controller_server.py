@@ -33,7 +33,8 @@ from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPureP
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 
 
 @pytest.fixture

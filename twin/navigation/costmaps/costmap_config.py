@@ -9,12 +9,47 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.navigation.costmaps import footprint as footprints
-from twin.navigation.costmaps.filters import KeepoutConfig
-from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
-from twin.parameters import Derived, Interval, Le, Metres, NotNegative, PerMetre, Positive, Seconds
+from twin.parameters import Derived, Fraction, Interval, Le, Metres, NotNegative, PerMetre, Positive, Seconds
 
 _MOST_CELLS = 4000
 """Along an edge of a rolling costmap."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeSensorConfig:
+    """Parameters of the layer; names and defaults are those of nav2_costmap_2d's RangeSensorLayer.
+
+    Raises:
+        ValueError: the thresholds are out of order.
+    """
+
+    phi: Annotated[Metres, Interval(gt=0.0, le=100.0)] = 1.2
+    """Distance at which a reading counts half."""
+    inflate_cone: Annotated[float, Fraction] = 1.0
+    """How far beside the cone cells are looked at, as a share of it; 1: in its whole bounding box."""
+    clear_threshold: Annotated[float, Fraction] = 0.2
+    """Cells less probable than this are free."""
+    mark_threshold: Annotated[float, Fraction] = 0.8
+    """Cells more probable than this are lethal."""
+    clear_on_max_reading: bool = False
+    """Whether a reading of the maximal range frees the whole cone."""
+
+    def __post_init__(self) -> None:
+        if self.clear_threshold > self.mark_threshold:
+            raise ValueError(
+                f"clear_threshold is {self.clear_threshold:g}, more than mark_threshold, "
+                f"{self.mark_threshold:g}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeepoutConfig:
+    """Parameters of nav2_costmap_2d's KeepoutFilter."""
+
+    override_lethal_cost: bool = False
+    """Whether a robot in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
+    lethal_override_cost: Annotated[int, Interval(ge=0, le=252)] = 252
+    """What a cell of the zone costs then."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,9 @@ from twin.navigation.costmaps.costmap import (
     MAX_NON_OBSTACLE,
     NO_INFORMATION,
 )
+from twin.navigation.costmaps.costmap_config import KeepoutConfig
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
-from twin.parameters import Interval
 
 KEEPOUT_FILTER, SPEED_FILTER_PERCENT, SPEED_FILTER_ABSOLUTE = 0, 1, 2
 """Types of nav2_msgs/msg/CostmapFilterInfo."""
@@ -27,16 +26,6 @@ NO_SPEED_LIMIT = 0.0
 """Of nav2_msgs/msg/SpeedLimit."""
 
 _SAME_FRAME = Pose2(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class KeepoutConfig:
-    """Parameters of nav2_costmap_2d's KeepoutFilter."""
-
-    override_lethal_cost: bool = False
-    """Whether a robot in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
-    lethal_override_cost: Annotated[int, Interval(ge=0, le=MAX_NON_OBSTACLE)] = MAX_NON_OBSTACLE
-    """What a cell of the zone costs then."""
 
 
 @dataclass(kw_only=True)

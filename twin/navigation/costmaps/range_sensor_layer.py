@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +10,12 @@ from numpy.typing import NDArray
 from twin.geometry import Pose2
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION
+from twin.navigation.costmaps.costmap_config import RangeSensorConfig
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, shifted
-from twin.parameters import Fraction, Interval, Metres
 
 _EVEN = int(0.5 * LETHAL_OBSTACLE)
 """A probability of one half, as nav2's layer stores it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeSensorConfig:
-    """Parameters of the layer; names and defaults are those of nav2_costmap_2d's RangeSensorLayer.
-
-    Raises:
-        ValueError: the thresholds are out of order.
-    """
-
-    phi: Annotated[Metres, Interval(gt=0.0, le=100.0)] = 1.2
-    """Distance at which a reading counts half."""
-    inflate_cone: Annotated[float, Fraction] = 1.0
-    """How far beside the cone cells are looked at, as a share of it; 1: in its whole bounding box."""
-    clear_threshold: Annotated[float, Fraction] = 0.2
-    """Cells less probable than this are free."""
-    mark_threshold: Annotated[float, Fraction] = 0.8
-    """Cells more probable than this are lethal."""
-    clear_on_max_reading: bool = False
-    """Whether a reading of the maximal range frees the whole cone."""
-
-    def __post_init__(self) -> None:
-        if self.clear_threshold > self.mark_threshold:
-            raise ValueError(
-                f"clear_threshold is {self.clear_threshold:g}, more than mark_threshold, "
-                f"{self.mark_threshold:g}"
-            )
 
 
 class RangeSensorLayer:

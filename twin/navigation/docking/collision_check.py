@@ -3,27 +3,11 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
-from typing import Annotated
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap, collision_step
+from twin.navigation.docking.config import DockCollisionConfig
 from twin.navigation.docking.line_approach import LineApproach
-from twin.parameters import Interval, Metres, NotNegative, Seconds
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockCollisionConfig:
-    """Names and defaults are those of opennav_docking's controller."""
-
-    use_collision_detection: bool = True
-    """Whether the way is looked at at all."""
-    projection_time: Annotated[Seconds, Interval(ge=0.0, le=30.0)] = 5.0
-    """So much of the approach to come ..."""
-    simulation_time_step: Annotated[Seconds, Interval(ge=0.01, le=10.0)] = 0.1
-    """... in steps of this."""
-    dock_collision_threshold: Annotated[Metres, NotNegative] = 0.3
-    """So near to the docked pose nothing is looked for: that the dock is there is no news."""
 
 
 def collision_ahead(

@@ -10,46 +10,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.docking.config import DockEstimateConfig
 from twin.navigation.docking.faces import fit_wall
-from twin.parameters import Interval, Metres, NotNegative, Positive, Radians
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockEstimateConfig:
-    """How far things may be from where the plan says, and how many sights are looked at.
-
-    Raises:
-        ValueError: more sights are wanted than are looked at.
-    """
-
-    search_half_width: Annotated[Metres, Positive] = 0.7
-    """Points of the face are looked for so far to each side of the expected point."""
-    search_depth: Annotated[Metres, Positive] = 0.25
-    """And so far before and behind it."""
-    max_yaw: Annotated[Radians, Interval(gt=0.0, le=math.pi)] = 0.2
-    """A line turned further than this against the expected face is another thing."""
-    min_length: Annotated[Metres, NotNegative] = 0.3
-    """A shorter line is another thing."""
-    tote_reach: Annotated[Metres, NotNegative] = 0.2
-    """A tote further aside of the expected point is another one; less than half of totes' spacing."""
-    tote_depth: Annotated[Metres, NotNegative] = 0.2
-    """So is one further behind the face than this, or before it."""
-    width_tolerance: Annotated[Metres, NotNegative] = 0.08
-    """A face of known width that differs by more is not all in sight; two beams' distance or more."""
-    min_sights: Annotated[int, Interval(ge=1, le=1000)] = 3
-    """Fewer are not believed."""
-    max_sights: Annotated[int, Interval(ge=1, le=1000)] = 9
-    """Older ones count no more: they were made from further away."""
-
-    def __post_init__(self) -> None:
-        if self.min_sights > self.max_sights:
-            raise ValueError(f"min_sights is {self.min_sights}, more than max_sights, {self.max_sights}")
 
 
 class DockEstimate:

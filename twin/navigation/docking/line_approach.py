@@ -8,74 +8,17 @@ heading leaves the line's by no more than 1.5 times the lateral error over the w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Annotated
 
 from twin.geometry import Pose2
+from twin.navigation.docking.config import LineApproachConfig
 from twin.navigation.recovery import TIMEOUT, BehaviorStep
-from twin.parameters import (
-    Interval,
-    Le,
-    Metres,
-    MetresPerSecond,
-    MetresPerSecondSquared,
-    NotNegative,
-    Positive,
-    Radians,
-    RadiansPerSecond,
-    RadiansPerSecondSquared,
-    Seconds,
-)
 
 MISSED = "missed"
 
-_DEGREE = math.pi / 180.0
 
 _LATERAL_GAIN, _HEADING_GAIN = 6.0, 4.0
 """Of the law; with these the lateral error is a sum of the square and the cube of the way left."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LineApproachConfig:
-    """How calmly, and how exactly, a pose is approached.
-
-    Raises:
-        ValueError: speeds are out of order.
-    """
-
-    v_linear_min: Annotated[MetresPerSecond, Positive, Le(10.0)] = 0.02
-    """Least speed."""
-    v_linear_max: Annotated[MetresPerSecond, Positive, Le(10.0)] = 0.25
-    """Greatest speed."""
-    v_angular_min: Annotated[RadiansPerSecond, Positive, Le(100.0)] = 0.04
-    """Least speed of turning on the spot."""
-    v_angular_max: Annotated[RadiansPerSecond, Positive, Le(100.0)] = 0.5
-    """Greatest speed of turning."""
-    acceleration: Annotated[MetresPerSecondSquared, Positive, Le(1000.0)] = 0.3
-    """Of driving off."""
-    deceleration: Annotated[MetresPerSecondSquared, Positive, Le(1000.0)] = 0.1
-    """Of slowing down at the end: low, so that a drive that lags stops in time all the same."""
-    angular_acceleration: Annotated[RadiansPerSecondSquared, Positive, Le(1000.0)] = 0.5
-    """Of turning on the spot."""
-    turn_first_above: Annotated[Radians, NotNegative] = 3.0 * _DEGREE
-    """A heading further off than this is corrected on the spot before driving."""
-    settle_distance: Annotated[Metres, Interval(ge=0.01, le=10.0)] = 0.15
-    """The robot is to be on the line so far before the pose; from there on the gains grow no more."""
-    stop_tolerance: Annotated[Metres, NotNegative] = 0.003
-    """Stop so far before the pose."""
-    lateral_tolerance: Annotated[Metres, NotNegative] = 0.01
-    """A robot further aside of the pose has missed it."""
-    yaw_tolerance: Annotated[Radians, Positive] = 0.5 * _DEGREE
-    """At the pose the robot turns on the spot until it is within this."""
-    time_allowance: Annotated[Seconds, Positive, Le(3600.0)] = 30.0
-    """After so long the approach has failed."""
-
-    def __post_init__(self) -> None:
-        for axis in ("v_linear", "v_angular"):
-            low, high = getattr(self, f"{axis}_min"), getattr(self, f"{axis}_max")
-            if low > high:
-                raise ValueError(f"{axis}_min is {low:g}, more than {axis}_max, {high:g}")
 
 
 class _Phase(Enum):

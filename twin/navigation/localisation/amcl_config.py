@@ -97,5 +97,5 @@ class AmclConfig:
     def __post_init__(self) -> None:
         if self.min_particles > self.max_particles:
             raise ValueError(
-                f"amcl: min_particles is {self.min_particles}, more than max_particles, {self.max_particles}"
+                f"min_particles is {self.min_particles}, more than max_particles, {self.max_particles}"
             )

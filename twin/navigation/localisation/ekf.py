@@ -48,10 +48,10 @@ class EkfConfig:
         for name in ("process_noise_covariance", "initial_estimate_covariance"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             if len(values) not in (SIZE, SIZE * SIZE) or not np.isfinite(values).all():
-                raise ValueError(f"ekf: {name} must be {SIZE} numbers, or {SIZE}² of a matrix by rows")
+                raise ValueError(f"{name} must be {SIZE} numbers, or {SIZE}² of a matrix by rows")
             matrix = _matrix(values)
             if np.linalg.eigvalsh(matrix).min() < -1e-12 or np.abs(matrix - matrix.T).max() > 1e-12:
-                raise ValueError(f"ekf: {name} must be a covariance: symmetric, no variance negative")
+                raise ValueError(f"{name} must be a covariance: symmetric, no variance negative")
 
 
 class Ekf:

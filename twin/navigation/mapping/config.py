@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from twin.parameters import (
     Fraction,
@@ -23,6 +23,7 @@ _MOST_CELLS = 4000
 
 Cell = Annotated[Metres, Interval(ge=0.005, le=1.0)]
 Deviation = Annotated[Metres, Interval(ge=0.001, le=1.0)]
+Mode = Literal["mapping", "localization"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,22 +19,10 @@ from twin.navigation.costmaps.costmap import (
 from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import footprint_hits
 from twin.navigation.failures import GoalOccupied
-from twin.parameters import Le, Metres, NotNegative, Seconds
+from twin.navigation.planning.config import GoalAccessConfig
 
 _STALE_S = 3.0
 """A goal that nobody has asked for, longer than patience by so much, is another one when it comes again."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class GoalAccessConfig:
-    """How long an occupied goal is hoped for."""
-
-    goal_near: Annotated[Metres, NotNegative] = 3.0
-    """From here on it matters whether the goal is free: what is seen there from afar will have moved."""
-    goal_patience: Annotated[Seconds, NotNegative] = 4.0
-    """How long something may be on the goal when the robot is near, until it is given up."""
-    goal_surroundings: Annotated[Metres, NotNegative, Le(100.0)] = 1.2
-    """How far around an occupied goal only what the map shows is planned around."""
 
 
 @dataclass(kw_only=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +17,7 @@ from twin.navigation.costmaps.costmap import (
     inflation_costs,
 )
 from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
+from twin.navigation.planning.config import HybridConfig
 from twin.navigation.planning.curves import advance
 from twin.navigation.planning.grid_search import GridSearch
 from twin.navigation.planning.hybrid_kernel import (
@@ -28,45 +28,10 @@ from twin.navigation.planning.hybrid_kernel import (
     expand,
     pose_cost,
 )
-from twin.navigation.planning.planner import Tolerance, Weight, check_inside
-from twin.parameters import Interval, Metres
+from twin.navigation.planning.planner import check_inside
 
 _SLACK = 1.3
 """The cost to the goal is known for cells of so many times the start's; the others cost more."""
-
-Penalty = Annotated[float, Interval(ge=1.0, le=1000.0)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class HybridConfig:
-    """Parameters of the planner; names and defaults are those of nav2_smac_planner's SmacPlannerHybrid."""
-
-    motion_model_for_search: Literal["DUBIN", "REEDS_SHEPP"] = "DUBIN"
-    """Whether the robot only drives forwards, or backwards too."""
-    minimum_turning_radius: Annotated[Metres, Interval(gt=0.0, le=100.0)] = 0.4
-    """Of the robot."""
-    tolerance: Tolerance = 0.25
-    """If the goal is occupied, how far from it the path may end."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    angle_quantization_bins: Annotated[int, Interval(ge=4, le=720)] = 72
-    """Headings that are told apart."""
-    analytic_expansion_ratio: Annotated[float, Interval(ge=0.01, le=1000.0)] = 3.5
-    """How often a curve straight to the goal is tried."""
-    analytic_expansion_max_length: Annotated[Metres, Interval(gt=0.0, le=1000.0)] = 3.0
-    """It is no longer than this; 4 to 5 turning radii at least."""
-    reverse_penalty: Penalty = 2.0
-    """What a metre backwards counts."""
-    change_penalty: Weight = 0.0
-    """What is added where a turn to one side follows one to the other."""
-    non_straight_penalty: Penalty = 1.2
-    """What a metre of a turn counts."""
-    cost_penalty: Weight = 2.0
-    """A metre at cost 252 counts as 1 + cost_penalty metres of free space."""
-    max_iterations: Annotated[int, Interval(ge=1, le=1_000_000_000)] = 1_000_000
-    """Poses that are expanded at most."""
-    smooth_path: bool = True
-    """Whether parts of the path give way to single curves where those are cheaper."""
 
 
 @dataclass(frozen=True)

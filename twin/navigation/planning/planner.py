@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,8 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
+from twin.navigation.planning.config import PlannerConfig, ThetaStarConfig
 from twin.navigation.planning.grid_search import GridSearch
-from twin.parameters import Interval, Metres
-
-Tolerance = Annotated[Metres, Interval(ge=0.0, le=10.0)]
-"""Every cell within it is looked at."""
-Weight = Annotated[float, Interval(ge=0.0, le=1000.0)]
 
 
 class GlobalPlanner(Protocol):
@@ -38,48 +34,6 @@ class GlobalPlanner(Protocol):
     def plan(self, costmap: Costmap, start: Pose2, goal: Pose2) -> Array:
         """Return a path, shape (n, 3): x, y [m], yaw [rad]; raise a PlanningFailure if there is none."""
         ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlannerConfig:
-    """Parameters of the 8-connected planner; names are those of Nav2's NavFn and Smac 2-D planners."""
-
-    any_angle: ClassVar[bool] = False
-
-    tolerance: Tolerance = 0.5
-    """If the goal cannot be reached, how far from it the path may end."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    cost_factor: Weight = 3.0
-    """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
-    escape_factor: Annotated[float, Interval(ge=1.0, le=1000.0)] = 20.0
-    """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
-
-    def price(self, level: Array) -> Array:
-        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
-        return 1.0 + self.cost_factor * level
-
-
-@dataclass(frozen=True, kw_only=True)
-class ThetaStarConfig:
-    """Parameters of the any-angle planner; names are those of nav2_theta_star_planner."""
-
-    any_angle: ClassVar[bool] = True
-
-    tolerance: Tolerance = 0.5
-    """If the goal cannot be reached, how far from it the path may end."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    w_euc_cost: Annotated[float, Interval(ge=0.001, le=1000.0)] = 1.0
-    """Weight of a path's length."""
-    w_traversal_cost: Weight = 2.0
-    """Weight of the squared costs under it."""
-    escape_factor: Annotated[float, Interval(ge=1.0, le=1000.0)] = 20.0
-    """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
-
-    def price(self, level: Array) -> Array:
-        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
-        return 1.0 + self.w_traversal_cost / self.w_euc_cost * level**2
 
 
 @dataclass(kw_only=True)

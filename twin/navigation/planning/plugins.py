@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from numpy.typing import ArrayLike
 
-from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
-from twin.navigation.planning.planner import GlobalPlanner, Planner, PlannerConfig, ThetaStarConfig
-
-PlannerPluginConfig = PlannerConfig | ThetaStarConfig | HybridConfig
-
-PLUGINS: Mapping[str, type[PlannerConfig] | type[ThetaStarConfig] | type[HybridConfig]] = {
-    "grid_based": PlannerConfig,
-    "theta_star": ThetaStarConfig,
-    "smac_hybrid": HybridConfig,
-}
-"""Nav2's NavFn or Smac 2-D, Theta* and SmacPlannerHybrid."""
-
-DEFAULT = "theta_star"
+from twin.navigation.planning.config import HybridConfig, PlannerPluginConfig
+from twin.navigation.planning.hybrid import HybridPlanner
+from twin.navigation.planning.planner import GlobalPlanner, Planner
 
 
 def make_planner(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twin.errors import ScenarioError
 from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.docking import DockingParameters
 

@@ -10,15 +10,13 @@ from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.commitment import CommitmentConfig
-from twin.navigation.planning.goal_access import GoalAccessConfig
-from twin.navigation.planning.plugins import PLUGINS, PlannerPluginConfig
+from twin.navigation.planning.config import PLUGINS, CommitmentConfig, GoalAccessConfig, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking.server import DockingServerConfig
-from twin.nodes.navigation.planning.planner_server import PlannerServerConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig

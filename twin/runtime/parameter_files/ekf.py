@@ -8,8 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from twin.navigation.localisation.ekf import SIZE
-from twin.nodes.navigation.localisation.ekf import EkfNodeConfig
-from twin.nodes.navigation.localisation.ekf_sources import EkfSource
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import EKF, corrects_map, differing, file_for
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters

@@ -10,9 +10,9 @@ from typing import Any, get_args
 from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.geometry import Pose2
-from twin.navigation.mapping.slam import Mode
+from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.storage import unpack
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import SLAM, differing, file_for

@@ -8,7 +8,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec, LidarSpec
-from twin.navigation.control.collision_monitor import (
+from twin.navigation.control.collision_monitor_config import (
     FOOTPRINT_APPROACH,
     CollisionMonitorConfig,
     MonitorPolygon,

@@ -10,9 +10,10 @@ from twin.geometry import Pose2
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.localisation.static import StaticLocalisationNode
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.mapping.map_saver import MapSaverNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig, SlamToolboxNode
+from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file

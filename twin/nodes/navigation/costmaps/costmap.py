@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import Annotated
 
 import numpy as np
 
@@ -24,17 +22,17 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.costmaps.layered_costmap import LayeredCostmap
 from twin.navigation.maps.occupancy_map import OCCUPIED
 from twin.navigation.odometry_watch import OdometryWatch
 from twin.navigation.warm_up import warm_up_costmap, warm_up_odometry_watch, warm_up_ranges
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmaps.messages import costmap_msg, occupancy_grid, polygon_msg
 from twin.nodes.navigation.costmaps.services import CostmapServices
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.scan_input import ScanInput
-from twin.parameters import Derived, Flat, Le, PeriodNs, Positive
 
 
 def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
@@ -51,32 +49,6 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
     ranges[silent] = no_return if inf_is_valid else np.nan
     ranges[ranges < message.range_min] = np.nan
     return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostmapNodeConfig:
-    """Rates, frame and inputs of a costmap."""
-
-    name: Annotated[str, Derived]
-    """global_costmap or local_costmap."""
-    frame: Annotated[str, Derived]
-    """In which its cells lie."""
-    layers: Annotated[CostmapConfig, Flat]
-    """Of the grid and its layers."""
-    scan_topics: tuple[str, ...] = ("scan",)
-    """Topics of sensor_msgs/LaserScan for the obstacle layer: its `observation_sources`."""
-    range_topics: tuple[str, ...] = ()
-    """Topics of sensor_msgs/Range for the range sensor layer."""
-    keepout_filter_info_topic: Annotated[str, Derived] = ""
-    """Where the keep-out mask is announced; empty: no keep-out filter."""
-    speed_filter_info_topic: Annotated[str, Derived] = ""
-    """Where the mask of speed limits is announced; empty: no speed filter."""
-    speed_limit_topic: Annotated[str, Derived] = "speed_limit"
-    """Where the limit is published in which the robot is."""
-    update_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 200_000_000
-    """Rate of updates."""
-    publish_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
-    """Rate at which the whole grid is published."""
 
 
 class _ScanSource:

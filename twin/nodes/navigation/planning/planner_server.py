@@ -18,34 +18,29 @@ from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
-from twin.navigation.planning.commitment import CommitmentConfig, committed
-from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
-from twin.navigation.planning.hybrid import HybridConfig
+from twin.navigation.planning.commitment import committed
+from twin.navigation.planning.config import (
+    DEFAULT,
+    PLUGINS,
+    CommitmentConfig,
+    GoalAccessConfig,
+    HybridConfig,
+    PlannerPluginConfig,
+)
+from twin.navigation.planning.goal_access import GoalAccess
 from twin.navigation.planning.path_validity import blocked_poses
-from twin.navigation.planning.plugins import DEFAULT, PLUGINS, PlannerPluginConfig, make_planner
+from twin.navigation.planning.plugins import make_planner
 from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
 from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-from twin.parameters import Flat, Interval, Metres, Name, NotNegative, Positive, ReadOnly
+from twin.parameters import Flat, Name, ReadOnly
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlannerServerConfig:
-    """Parameters of the server itself."""
-
-    compute_alternatives: Annotated[int, Interval(ge=0, le=100)] = 0
-    """How many other ways are tried when a goal is asked for again from the same place, which tells that the
-    path could not be followed. For trees that plan anew only when they must."""
-    path_distance: Annotated[Metres, Positive] = 1.0
-    """A path farther from the robot than this is not valid: it was carried away, or localised anew."""
-    same_place: Annotated[Metres, NotNegative] = 0.5
-    """How far the robot may have moved meanwhile."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,12 +33,14 @@ def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
     fitting = [name for name in active if values.get(f"{name}.type") != "velocity_polygon"]
     polygons = tuple(found for name in fitting if (found := _polygon(name, file, values)))
     try:
-        return CollisionMonitorParameters(
-            # A file of other polygons alone leaves the robot its usual guard.
-            polygons=polygons if fitting or not active else None,
-            source_timeout=values.get("source_timeout", 2.0),
-            scan_topics=_topics(file, values, "scan") or None,
-            range_topics=_topics(file, values, "range"),
+        return CollisionMonitorParameters.model_validate(
+            {
+                # A file of other polygons alone leaves the robot its usual guard.
+                "polygons": polygons if fitting or not active else None,
+                "source_timeout": values.get("source_timeout", 2.0),
+                "scan_topics": _topics(file, values, "scan") or None,
+                "range_topics": _topics(file, values, "range"),
+            }
         )
     except ValidationError as error:
         file.wrong(_NODE, str(error.errors()[0]["loc"][0]), said_of(error))
@@ -87,7 +89,8 @@ def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> Moni
     try:
         return MonitorPolygonParameters.model_validate({**given, "name": name, "points": points})
     except ValidationError as error:
-        file.wrong(_NODE, f"{name}.{error.errors()[0]['loc'][0]}", said_of(error))
+        at = error.errors()[0]["loc"]
+        file.wrong(_NODE, f"{name}.{at[0]}" if at else name, said_of(error))
         return None
 
 

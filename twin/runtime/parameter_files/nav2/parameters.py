@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
 from twin.runtime.defaults.navigation import NavigationParameters
