@@ -11,11 +11,11 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
-from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.dwb.config import DWBConfig, ScaleConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
-from twin.navigation.control.mppi.scoring import ROWS
+from twin.navigation.control.mppi.config import CriticConfig, MPPIConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
-from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
+from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, configs_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.parameters.declaration import fields_of
 from twin.plugins import Kind
@@ -73,11 +73,17 @@ class PluginParameters(GoalCheckerParameters):
     `mppi`."""
 
 
-_OF_PLUGIN = {name: group_of(config_of(CONTROLLERS.find(name))) for name in CONTROLLERS.shipped}
+def _critic_names(controller: type, critic: type) -> list[str]:
+    """Return the names of the critics that are compiled into a controller."""
+    inside = fields_of(controller).values()
+    return [one.name for one in inside if one.config is not None and issubclass(one.config, critic)]
+
+
+_OF_PLUGIN = {name: group_of(config) for name, config in configs_of(CONTROLLERS).items()}
 _OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
 _CRITICS = {
-    "mppi": tuple(ROWS),
-    "dwb": tuple(one.name for one in fields_of(DWBConfig).values() if one.config is not None),
+    "mppi": _critic_names(MPPIConfig, CriticConfig),
+    "dwb": _critic_names(DWBConfig, ScaleConfig),
 }
 """Those that are compiled into a controller, by its name."""
 
@@ -90,7 +96,7 @@ def _valid_with(name: str) -> str:
     return " or ".join(owners)
 
 
-@keys_of(*(config_of(CONTROLLERS.find(name)) for name in CONTROLLERS.shipped))
+@keys_of(*configs_of(CONTROLLERS).values())
 class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, ServerParameters):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
 
@@ -143,7 +149,7 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
 
         kinds: dict[str, Kind[Any]] = {"goal_checker": GOAL_CHECKERS, "progress_checker": PROGRESS_CHECKERS}
         for key, configs in kinds.items():
-            having = {kind: group_of(config_of(configs.find(kind))).model_fields for kind in configs.shipped}
+            having = {kind: group_of(config).model_fields for kind, config in configs_of(configs).items()}
             chosen = getattr(self, key) or "simple"
             own = {} if isinstance(chosen, PluginUse) else having[chosen]
             for name in dict.fromkeys(name for names in having.values() for name in names):

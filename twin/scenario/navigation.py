@@ -9,14 +9,15 @@ from typing import Annotated
 
 from pydantic import Field
 
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
-from twin.parameters import Hertz, MetresPerSecond, Positive, RadiansPerSecond
+from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
 from twin.scenario.parameter_group import ParameterGroup, keys_of
-from twin.scenario.planners import PlannerParameters
+from twin.scenario.planners import PlannerParameters, SmootherParameters
 from twin.strict_yaml import StrictModel
 
 
@@ -25,14 +26,11 @@ class CostmapParameters(ParameterGroup):
     """Parameters of a costmap."""
 
 
+@keys_of(BtNavigatorConfig)
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
-    default_nav_to_pose_bt_xml: NameOrPath | None = None
-    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
-    default_nav_through_poses_bt_xml: NameOrPath | None = None
-    """The same for goals through poses."""
-    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 
 
@@ -61,6 +59,8 @@ class NavigationConfig(StrictModel):
     """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
+    smoother: SmootherParameters = SmootherParameters()
+    """Overrides of the path smoother."""
     controller: ControllerParameters = ControllerParameters()
     """Overrides of the path follower."""
     controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)

@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any
 
 from pydantic import model_validator
 
-from twin.navigation.planning.config import PLUGINS, CommitmentConfig, GoalAccessConfig
+from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
+from twin.navigation.plugins import PLANNERS, SMOOTHERS, configs_of
 from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
+from twin.scenario.plugin_groups import PluginGroup, plugin_name
 
 
 @keys_of(PlannerServerConfig, CommitmentConfig, GoalAccessConfig)
 class PlannerServerParameters(ParameterGroup):
     """What holds for every planner."""
 
-    plugin: Literal["grid_based", "theta_star", "smac_hybrid"] = "theta_star"
-    """8-connected A*; any-angle Theta*; Hybrid-A* for robots with a turning circle."""
+    plugin: plugin_name(PLANNERS) = "theta_star"  # type: ignore[valid-type]
+    """8-connected A* (`grid_based`); any-angle Theta* (`theta_star`); Hybrid-A* for robots with a turning
+    circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
 
 
-@keys_of(*PLUGINS.values())
-class PlannerParameters(PlannerServerParameters):
+@keys_of(*configs_of(PLANNERS).values())
+class PlannerParameters(PluginGroup, PlannerServerParameters):
     """Parameters of `/planner_server`: which planner `GridBased` is, and that planner's own."""
+
+    of = PLANNERS
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the keys of the server."""
+        return set(PlannerServerParameters.model_fields)
 
     @model_validator(mode="after")
     def _belongs_to_the_plugin(self) -> PlannerParameters:
-        keys = {plugin: group_of(config).model_fields for plugin, config in PLUGINS.items()}
+        if self.users is not None:
+            return self
+        keys = {plugin: group_of(config).model_fields for plugin, config in configs_of(PLANNERS).items()}
         valid = {*PlannerServerParameters.model_fields, *keys[self.plugin]}
         for name in sorted(self.model_fields_set - valid):
             others = " or ".join(plugin for plugin, own in keys.items() if name in own)
@@ -33,3 +46,17 @@ class PlannerParameters(PlannerServerParameters):
                 f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
             )
         return self
+
+
+@keys_of(*configs_of(SMOOTHERS).values())
+class SmootherParameters(PluginGroup):
+    """Parameters of `/smoother_server`: its first smoother, which also smooths what a planner has planned."""
+
+    of = SMOOTHERS
+    plugin: plugin_name(SMOOTHERS) = "simple_smoother"  # type: ignore[valid-type]
+    """`simple_smoother`, `savitzky_golay`, or a plugin of yours, whose parameters stand beside it."""
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the key that names the plugin."""
+        return {"plugin"}

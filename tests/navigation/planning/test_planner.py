@@ -23,11 +23,10 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
-from twin.navigation.planning.config import PlannerConfig, ThetaStarConfig
+from twin.navigation.planning.config import PlannerConfig, SmootherConfig, ThetaStarConfig
 from twin.navigation.planning.direction import cusps, one_way_pieces
 from twin.navigation.planning.grid_search import GridSearch
 from twin.navigation.planning.planner import Planner, filled, path_length, with_headings
-from twin.navigation.planning.config import SmootherConfig
 from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother
 
 EXACT = PlannerConfig(tolerance=0.0)

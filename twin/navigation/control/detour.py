@@ -16,9 +16,8 @@ from twin.navigation._jit import fast_jit
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.failures import PlanningFailure
-from twin.navigation.planning.config import PlannerConfig
+from twin.navigation.planning.config import PlannerConfig, SmootherConfig
 from twin.navigation.planning.planner import Planner
-from twin.navigation.planning.config import SmootherConfig
 from twin.navigation.planning.smoother import SimpleSmoother
 
 _PAST = 16

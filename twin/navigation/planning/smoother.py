@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
 from twin.navigation.planning.config import SavitzkyGolayConfig, SmootherConfig
 from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
-from twin.parameters import Fraction, Interval, Metres, NotNegative
+
 
 class Smoother(Configured, ABC):
     """Makes a path smoother (nav2_core::Smoother)."""

@@ -10,7 +10,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
     GoalCriticConfig,
@@ -18,7 +18,7 @@ from twin.navigation.control.mppi.config import (
     PathAlignCriticConfig,
 )
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.runtime.defaults.overrides import overridden

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -12,9 +11,9 @@ from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
-from twin.navigation.plugins import PLANNERS, config_of
+from twin.navigation.plugins import PLANNERS, SMOOTHERS, config_of, configs_of
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.docking.config import DockingServerConfig
@@ -25,7 +24,9 @@ from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.runtime.defaults.docking import docking_config
 from twin.runtime.defaults.overrides import overridden as overridden
-from twin.scenario.navigation import CostmapParameters, NavigationConfig
+from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
+from twin.scenario.planners import PlannerParameters, SmootherParameters
+from twin.scenario.plugin_groups import config_of_use
 
 C = TypeVar("C")
 
@@ -105,20 +106,37 @@ def navigation_parameters(
         local_costmap=_costmap(
             CostmapNodeConfig(name="local_costmap", frame=frames.odom, layers=around), config.local_costmap
         ),
-        planner=overridden(
-            config_of(PLANNERS.find(config.planner.plugin))(tolerance=0.1, allow_unknown=mapping),
-            config.planner.overrides(),
-        ),
+        planner=_planner(config.planner, mapping=mapping),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         goal_access=overridden(GoalAccessConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
-        path_smoother=SmootherServerConfig(),
+        path_smoother=_path_smoother(config.smoother),
         docking=docking_config(config.docking),
-        navigator=_navigator(config.navigator.overrides()),
+        navigator=_navigator(config.navigator),
         waypoints=WaypointFollowerConfig(),
     )
+
+
+def _planner(parameters: PlannerParameters, *, mapping: bool) -> Any:
+    if parameters.users is not None:
+        return config_of_use(PLANNERS, parameters.users)
+    planner = config_of(PLANNERS.find(parameters.plugin))(tolerance=0.1, allow_unknown=mapping)
+    return overridden(planner, parameters.overrides())
+
+
+def _path_smoother(parameters: SmootherParameters) -> SmootherServerConfig:
+    """Return the smoothers, the chosen one first."""
+    shipped = {name: config() for name, config in configs_of(SMOOTHERS).items()}
+    if parameters.users is not None:
+        chosen = config_of_use(SMOOTHERS, parameters.users)
+        name = parameters.users.reference.rpartition(":")[2]
+    else:
+        name = parameters.plugin
+        chosen = overridden(shipped[name], parameters.overrides())
+    shipped.pop(name, None)
+    return SmootherServerConfig(smoothers={name: chosen, **shipped})
 
 
 def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherConfig:
@@ -143,13 +161,9 @@ def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherCon
     )
 
 
-def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
-    defaults = BtNavigatorConfig()
-    frequency = overrides.get("bt_loop_frequency")
-    return replace(
-        overridden(defaults, overrides),
-        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
-    )
+def _navigator(group: NavigatorParameters) -> BtNavigatorConfig:
+    config, frequency = overridden(BtNavigatorConfig(), group.overrides()), group.bt_loop_frequency
+    return config if frequency is None else replace(config, bt_loop_duration=max(1, round(1e3 / frequency)))
 
 
 def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:

@@ -19,13 +19,16 @@ from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.commitment import committed
-from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig, ThetaStarConfig
+from twin.navigation.planning.config import (
+    CommitmentConfig,
+    GoalAccessConfig,
+    SmootherConfig,
+    ThetaStarConfig,
+)
 from twin.navigation.planning.goal_access import GoalAccess
 from twin.navigation.planning.path_validity import blocked_poses
 from twin.navigation.planning.planner import GlobalPlanner
-from twin.navigation.planning.config import SmootherConfig
-from twin.navigation.planning.smoother import SimpleSmoother
-from twin.navigation.plugins import PLANNERS, config_of, create, plugin_of
+from twin.navigation.plugins import PLANNERS, SMOOTHERS, config_of, create, plugin_of
 from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
@@ -52,7 +55,7 @@ class PlannerParameters:
     """How strongly it stays with the last path."""
     goal_access: Annotated[GoalAccessConfig, Flat]
     """What becomes of goals that somebody stands on."""
-    smoother: SmootherConfig
+    smoother: Annotated[Any, Name("smoother")]
     """How paths are smoothed."""
 
 
@@ -84,7 +87,7 @@ class PlannerServerNode:
         *,
         config: Any = None,
         server: PlannerServerConfig | None = None,
-        smoother: SmootherConfig | None = None,
+        smoother: Any = None,
         commitment: CommitmentConfig | None = None,
         goal_access: GoalAccessConfig | None = None,
         namespace: str = "",
@@ -125,7 +128,7 @@ class PlannerServerNode:
         self._server = parameters.server
         self._commitment = parameters.commitment
         self._access.config = parameters.goal_access
-        self._smoother = SimpleSmoother(config=parameters.smoother)
+        self._smoother = create(SMOOTHERS, parameters.smoother)
         if parameters.planner != self._configs[DEFAULT_ID]:
             self._configs[DEFAULT_ID] = parameters.planner
             self._planners[DEFAULT_ID] = self._made(parameters.planner)

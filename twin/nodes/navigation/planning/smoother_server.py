@@ -16,10 +16,10 @@ from twin.geometry import Array
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.planning.config import SavitzkyGolayConfig, SmootherConfig
 from twin.navigation.plugins import SMOOTHERS, create
-from twin.parameters import Flat
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat
 
 _INVALID_SMOOTHER, _IN_COLLISION, _INVALID_PATH = 501, 503, 505
 """Codes of nav2_msgs/action/SmoothPath."""
