@@ -20,15 +20,14 @@ from twin.bridge.topics import Publisher, Subscription
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.docking.collision_check import DockCollisionConfig
-from twin.navigation.docking.dock_estimate import DockEstimateConfig
+from twin.navigation.docking.config import DockCollisionConfig, DockEstimateConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.navigation.planning.planner import ThetaStarConfig
+from twin.navigation.planning.config import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.parameters import units
 from twin.parameters.declaration import fields_of

@@ -21,7 +21,8 @@ from twin.navigation.costmaps.costmap import Costmap, footprint_cost
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.config import PlannerConfig
+from twin.navigation.planning.planner import Planner
 from twin.navigation.planning.smoother import SimpleSmoother
 from twin.navigation.plugins import CONTROLLERS, create
 from twin.navigation.warm_up import warm_up_controller

@@ -6,8 +6,7 @@ from pydantic import ValidationError
 
 from twin.models import load
 from twin.models.catalogue import catalogue
-from twin.navigation.planning.hybrid import HybridConfig
-from twin.navigation.planning.planner import PlannerConfig, ThetaStarConfig
+from twin.navigation.planning.config import HybridConfig, PlannerConfig, ThetaStarConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
 from twin.scenario.navigation import NavigationConfig

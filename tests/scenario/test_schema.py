@@ -102,7 +102,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("- mission_succeeded:", "- tote_slip: {max: 3 mm, tote: tote_b}", "demo.yaml:15: the mission carries no tote 'tote_b'; did you mean 'tote_a'? Valid: tote_a"),
         ("- mission_succeeded:", "- map_accuracy: {mean: 1}", "demo.yaml:15: map_accuracy needs the localisation of robot 'bot' of type slam"),
         ("{arena: warehouse}", "{arena: warehouse, obstacles: [{name: a, size: [1, 1, 1]}, {name: a, size: [1, 1, 1]}]}", "demo.yaml:3: the name 'a' is taken by world.obstacles.0; names must differ"),
-        ("    navigation: {}", "    navigation: {collision_monitor: {polygons: [{name: a, action_type: stop, points: [[0, 0], [1, 1]]}]}}", "demo.yaml:9: robots.0.navigation.collision_monitor.polygons.0.points: must be three corners or more, not [[0,0],[1,1]]"),
+        ("    navigation: {}", "    navigation: {collision_monitor: {polygons: [{name: a, action_type: stop, points: [[0, 0], [1, 1]]}]}}", "demo.yaml:9: robots.0.navigation.collision_monitor.polygons.0: points must be three corners or more"),
         ("checks:\n  - mission_succeeded:\n", "checks: []\n", "demo.yaml:14: checks: must have at least 1 items, not []"),
     ],
 )  # fmt: skip

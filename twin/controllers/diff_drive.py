@@ -7,27 +7,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from twin.controllers.limiter import AxisLimits, SpeedLimiter
+from twin.parameters import MayBeInfinite, Metres, Name, Positive, RadiansPerSecond, Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiffDriveConfig:
     """Geometry and limits of a drive."""
 
-    wheel_separation: float
-    """Distance of the left and right wheels' contact points [m]."""
-    wheel_radius: float
-    """[m]"""
-    wheel_separation_multiplier: float = 1.0
+    wheel_separation: Annotated[Metres, Positive]
+    """Distance of the left and right wheels' contact points."""
+    wheel_radius: Annotated[Metres, Positive]
+    """Of every driven wheel."""
+    wheel_separation_multiplier: Annotated[float, Positive] = 1.0
     """Effective track over geometric track: 1 for two wheels; for skid steer calibrated once, near 1 + (a/b)²
     (half wheelbase a, half track b; isotropic Coulomb friction, equal load)."""
-    linear: AxisLimits = AxisLimits(max_velocity=1.0, max_acceleration=1.0)
-    angular: AxisLimits = AxisLimits(max_velocity=2.0, max_acceleration=3.0)
-    max_wheel_velocity: float = math.inf
-    """[rad/s]; both wheels are scaled together, so that the curvature is kept."""
-    cmd_vel_timeout: float = 0.5
-    """Without a command for this long the robot is brought to a stop [s]."""
+    linear: Annotated[AxisLimits, Name("linear.x")] = AxisLimits(max_velocity=1.0, max_acceleration=1.0)
+    """Limits along x."""
+    angular: Annotated[AxisLimits, Name("angular.z")] = AxisLimits(max_velocity=2.0, max_acceleration=3.0)
+    """Limits about z."""
+    max_wheel_velocity: Annotated[RadiansPerSecond, Positive, MayBeInfinite] = math.inf
+    """Both wheels are scaled together, so that the curvature is kept."""
+    cmd_vel_timeout: Annotated[Seconds, Positive] = 0.5
+    """Without a command for this long the robot is brought to a stop."""
 
 
 @dataclass(frozen=True)

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.parameters import Metres, Positive
 
 
 @dataclass(frozen=True, kw_only=True)
 class OdometryConfig:
     """Geometry and error model."""
 
-    wheel_radius: float
-    """[m]"""
-    track: float
-    """Effective wheel separation [m]."""
+    wheel_radius: Annotated[Metres, Positive]
+    """Of every driven wheel."""
+    track: Annotated[Metres, Positive]
+    """Effective wheel separation."""
     noise: OdometryNoise = DIFF_DRIVE
     """How wrong it is."""
 

@@ -3,6 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from twin.parameters import (
+    Le,
+    Metres,
+    MetresPerSecondSquared,
+    NotNegative,
+    Positive,
+    RadiansPerSecond,
+    Seconds,
+)
+
+Growth = Annotated[float, NotNegative, Le(1e6)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,26 +26,26 @@ class OdometryNoise:
     the numbers are those of the drift over twenty seconds, which is larger than that of single steps.
     """
 
-    distance_variance: float = 5e-6
+    distance_variance: Growth = 5e-6
     """Of the driven distance, and of what was slid aside meanwhile, per metre [m²/m]."""
-    turn_distance_variance: float = 1e-6
+    turn_distance_variance: Growth = 1e-6
     """Of the place, per radian turned [m²/rad]."""
-    angle_variance: float = 5e-6
+    angle_variance: Growth = 5e-6
     """Of the heading, per radian turned [rad²/rad]."""
-    drift_variance: float = 1e-4
+    drift_variance: Growth = 1e-4
     """Of the heading, per metre driven [rad²/m]."""
-    turn_slip: float = 0.005
+    turn_slip: Growth = 0.005
     """Standard deviation of the turn rate a(1 + a) of centripetal acceleration a [rad/s per m/s²]."""
-    side_shift: float = 0.0
-    """A skid steer slides outwards at this times its yaw rate times centripetal acceleration / `grip` [m]."""
-    turn_gain: float = 0.0
+    side_shift: Annotated[Metres, NotNegative, Le(1e6)] = 0.0
+    """A skid steer slides outwards at this times its yaw rate times centripetal acceleration / `grip`."""
+    turn_gain: Growth = 0.0
     """And turns faster by this times (centripetal acceleration / `grip`)²."""
-    grip: float = 9.8
-    """Acceleration that friction can hold [m/s²]."""
-    slip_time: float = 3.0
-    """How long slip keeps its direction [s]."""
-    gyro_bias: float = 1e-3
-    """Standard deviation of a gyroscope's bias, where it is believed instead of the wheels [rad/s]."""
+    grip: Annotated[MetresPerSecondSquared, Positive] = 9.8
+    """Acceleration that friction can hold."""
+    slip_time: Annotated[Seconds, Positive] = 3.0
+    """How long slip keeps its direction."""
+    gyro_bias: Annotated[RadiansPerSecond, NotNegative] = 1e-3
+    """Standard deviation of a gyroscope's bias, where it is believed instead of the wheels."""
 
 
 DIFF_DRIVE = OdometryNoise()

@@ -14,10 +14,28 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.goal_checker import (
+    GoalCheckerConfig,
+    PositionGoalCheckerConfig,
+    StoppedGoalCheckerConfig,
+)
+from twin.navigation.control.mppi.config import MPPIConfig
+from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
+from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
+from twin.navigation.planning.config import (
+    HybridConfig,
+    PlannerConfig,
+    SavitzkyGolayConfig,
+    SmootherConfig,
+    ThetaStarConfig,
+)
 from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
     from twin.navigation.control.controller import Controller
+    from twin.navigation.control.critic import Critic, Trajectories
     from twin.navigation.control.goal_checker import GoalChecker
     from twin.navigation.control.progress_checker import ProgressChecker
     from twin.navigation.planning.planner import GlobalPlanner
@@ -28,41 +46,49 @@ T = TypeVar("T")
 CONTROLLERS: Kind[Controller] = Kind(
     "controller", base="twin.navigation.control.controller:Controller", group="twin.controllers"
 )
-CONTROLLERS.register(
-    "regulated_pure_pursuit",
-    "twin.navigation.control.regulated_pure_pursuit.controller:RegulatedPurePursuit",
-)
-CONTROLLERS.register("dwb", "twin.navigation.control.dwb.controller:DWB")
-CONTROLLERS.register("mppi", "twin.navigation.control.mppi.controller:MPPI")
-CONTROLLERS.register("rotation_shim", "twin.navigation.control.rotation_shim:RotationShim")
-
+CRITICS: Kind[Critic] = Kind("critic", base="twin.navigation.control.critic:Critic", group="twin.critics")
+"""Of MPPI and DWB, beside those that are compiled into them."""
 GOAL_CHECKERS: Kind[GoalChecker] = Kind(
     "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
 )
-GOAL_CHECKERS.register("simple", "twin.navigation.control.goal_checker:SimpleGoalChecker")
-GOAL_CHECKERS.register("stopped", "twin.navigation.control.goal_checker:StoppedGoalChecker")
-GOAL_CHECKERS.register("position", "twin.navigation.control.goal_checker:PositionGoalChecker")
-
 PROGRESS_CHECKERS: Kind[ProgressChecker] = Kind(
     "progress checker",
     base="twin.navigation.control.progress_checker:ProgressChecker",
     group="twin.progress_checkers",
 )
-PROGRESS_CHECKERS.register("simple", "twin.navigation.control.progress_checker:SimpleProgressChecker")
-PROGRESS_CHECKERS.register("pose", "twin.navigation.control.progress_checker:PoseProgressChecker")
-
 PLANNERS: Kind[GlobalPlanner] = Kind(
     "planner", base="twin.navigation.planning.planner:GlobalPlanner", group="twin.planners"
 )
-PLANNERS.register("grid_based", "twin.navigation.planning.planner:Planner")
-PLANNERS.register("theta_star", "twin.navigation.planning.planner:ThetaStar")
-PLANNERS.register("smac_hybrid", "twin.navigation.planning.hybrid:HybridPlanner")
-
 SMOOTHERS: Kind[Smoother] = Kind(
     "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
 )
-SMOOTHERS.register("simple_smoother", "twin.navigation.planning.smoother:SimpleSmoother")
-SMOOTHERS.register("savitzky_golay", "twin.navigation.planning.smoother:SavitzkyGolaySmoother")
+_CONFIGS: dict[tuple[str, str], type] = {}
+"""Of what ships, by kind and name."""
+
+
+def _ship(kind: Kind[Any], name: str, target: str, config: type) -> None:
+    """Register what ships, with its parameters: to know those, nothing is compiled."""
+    kind.register(name, target)
+    _CONFIGS[kind.name, name] = config
+
+
+_CONTROL, _PLANNING = "twin.navigation.control", "twin.navigation.planning"
+_PURSUIT = f"{_CONTROL}.regulated_pure_pursuit.controller:RegulatedPurePursuit"
+_ship(CONTROLLERS, "regulated_pure_pursuit", _PURSUIT, RegulatedPurePursuitConfig)
+_ship(CONTROLLERS, "dwb", f"{_CONTROL}.dwb.controller:DWB", DWBConfig)
+_ship(CONTROLLERS, "mppi", f"{_CONTROL}.mppi.controller:MPPI", MPPIConfig)
+_ship(CONTROLLERS, "rotation_shim", f"{_CONTROL}.rotation_shim:RotationShim", RotationShimConfig)
+_ship(GOAL_CHECKERS, "simple", f"{_CONTROL}.goal_checker:SimpleGoalChecker", GoalCheckerConfig)
+_ship(GOAL_CHECKERS, "stopped", f"{_CONTROL}.goal_checker:StoppedGoalChecker", StoppedGoalCheckerConfig)
+_ship(GOAL_CHECKERS, "position", f"{_CONTROL}.goal_checker:PositionGoalChecker", PositionGoalCheckerConfig)
+_PROGRESS = f"{_CONTROL}.progress_checker"
+_ship(PROGRESS_CHECKERS, "simple", f"{_PROGRESS}:SimpleProgressChecker", ProgressCheckerConfig)
+_ship(PROGRESS_CHECKERS, "pose", f"{_PROGRESS}:PoseProgressChecker", PoseProgressCheckerConfig)
+_ship(PLANNERS, "grid_based", f"{_PLANNING}.planner:Planner", PlannerConfig)
+_ship(PLANNERS, "theta_star", f"{_PLANNING}.planner:ThetaStar", ThetaStarConfig)
+_ship(PLANNERS, "smac_hybrid", f"{_PLANNING}.hybrid:HybridPlanner", HybridConfig)
+_ship(SMOOTHERS, "simple_smoother", f"{_PLANNING}.smoother:SimpleSmoother", SmootherConfig)
+_ship(SMOOTHERS, "savitzky_golay", f"{_PLANNING}.smoother:SavitzkyGolaySmoother", SavitzkyGolayConfig)
 
 
 @dataclass(frozen=True)
@@ -72,8 +98,15 @@ class NoParameters:
 
 def config_of(plugin: Plugin[Any]) -> type:
     """Return the class of a plugin's parameters, by which `create` finds it."""
+    if plugin.ships:
+        return _CONFIGS[plugin.kind.name, plugin.name]
     loaded: Any = plugin.load()
-    return (loaded.Config or NoParameters) if plugin.ships else _bound(plugin, loaded)
+    return _bound(plugin, loaded)
+
+
+def configs_of(kind: Kind[Any]) -> dict[str, type]:
+    """Return the classes of parameters of what ships, by name."""
+    return {name: _CONFIGS[kind.name, name] for name in kind.shipped}
 
 
 @functools.cache
@@ -97,8 +130,7 @@ def plugin_of(kind: Kind[T], config: Any) -> Plugin[T]:
     found: Plugin[T] | None = getattr(config, "plugin", None)
     if found is not None:
         return found
-    shipped = map(kind.find, kind.shipped)
-    return next(plugin for plugin in shipped if plugin.config is type(config))
+    return kind.find(next(name for name, of in configs_of(kind).items() if of is type(config)))
 
 
 def create(kind: Kind[T], config: Any, **setup: Any) -> T:
@@ -134,7 +166,7 @@ def _answering(
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
         said = method(self, *args, **kwargs)
         try:
-            return answer(plugin, said)
+            return answer(plugin, said, *args)
         except (TypeError, ValueError):
             shown = f"answers {method.__name__} with {said!r:.200}"
             raise plugin.error(f"{shown}; it must return {valid}") from None
@@ -142,13 +174,13 @@ def _answering(
     return call
 
 
-def _command(plugin: Plugin[Any], answer: Any) -> tuple[float, float]:
+def _command(plugin: Plugin[Any], answer: Any, *_: Any) -> tuple[float, float]:
     v, w = map(float, answer)
     require_finite(plugin, "a command", (v, w))
     return v, w
 
 
-def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
+def _path(plugin: Plugin[Any], answer: Any, *_: Any) -> np.ndarray:
     path = np.array(answer, dtype=np.float64, order="C")
     if path.ndim != 2 or path.shape[1] != 3 or not len(path):
         raise ValueError
@@ -156,10 +188,24 @@ def _path(plugin: Plugin[Any], answer: Any) -> np.ndarray:
     return path
 
 
-def _truth(plugin: Plugin[Any], answer: Any) -> bool:
+def own_critics(config: Any) -> list[Critic]:
+    """Return the critics of MPPI's or DWB's parameters that a user brings, and that score."""
+    names = [name for name in config.critics if name in config.own_critics]
+    return [create(CRITICS, config.own_critics[name]) for name in names]
+
+
+def _truth(plugin: Plugin[Any], answer: Any, *_: Any) -> bool:
     if not isinstance(answer, bool | np.bool_):
         raise TypeError
     return bool(answer)
+
+
+def _score(plugin: Plugin[Any], answer: Any, trajectories: Trajectories) -> np.ndarray:
+    score = np.array(answer, dtype=np.float64)
+    if score.shape != trajectories.poses.shape[:1]:
+        raise ValueError
+    require_finite(plugin, "a score", score[~np.isfinite(score)])
+    return score
 
 
 _A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
@@ -167,10 +213,11 @@ _A_TRUTH = (_truth, "True or False")
 _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
     {
         "compute_velocity_commands": (_command, "(v [m/s], w [rad/s])"),
+        "score": (_score, "one number per trajectory: an array of shape (n,)"),
         "create_plan": _A_PATH,
         "smooth": _A_PATH,
         "is_goal_reached": _A_TRUTH,
         "check": _A_TRUTH,
     }
 )
-"""What methods must return: what reads the answer of a plugin, and raises a ValueError; in words."""
+"""What methods must return: what reads an answer, and raises a ValueError; the same in words."""

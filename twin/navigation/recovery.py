@@ -7,13 +7,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.costmaps.costmap import Costmap, collision_step
 from twin.navigation.costmaps.kernels import escapes
+from twin.parameters import (
+    Interval,
+    Le,
+    Metres,
+    MetresPerSecond,
+    MetresPerSecondSquared,
+    NotNegative,
+    Positive,
+    RadiansPerSecond,
+    RadiansPerSecondSquared,
+    Seconds,
+)
 
 COLLISION_AHEAD = "collision_ahead"
 TIMEOUT = "timeout"
@@ -35,26 +47,26 @@ class BehaviorStep(NamedTuple):
 class BehaviorConfig:
     """Parameters; names and defaults are those of nav2_behaviors."""
 
-    simulate_ahead_time: float = 2.0
-    """How far ahead collisions are looked for [s]."""
-    max_rotational_vel: float = 1.0
-    """[rad/s]"""
-    min_rotational_vel: float = 0.4
-    """[rad/s]"""
-    rotational_acc_lim: float = 3.2
-    """[rad/s²]"""
-    acceleration_limit: float = 2.5
-    """[m/s²]"""
-    deceleration_limit: float = 2.5
-    """As a magnitude [m/s²]."""
-    minimum_speed: float = 0.05
-    """[m/s]"""
-    projection_time: float = 1.0
-    """How far ahead assisted teleop looks for collisions [s]."""
-    simulation_time_step: float = 0.1
-    """In steps of this [s]."""
-    footprint: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
-    """[m]; the single corner (0, 0) checks the centre for inscribed cost instead."""
+    simulate_ahead_time: Annotated[Seconds, Interval(ge=0.0, le=60.0)] = 2.0
+    """How far ahead collisions are looked for."""
+    max_rotational_vel: Annotated[RadiansPerSecond, Positive, Le(100.0)] = 1.0
+    """Greatest speed of turning."""
+    min_rotational_vel: Annotated[RadiansPerSecond, NotNegative, Le(100.0)] = 0.4
+    """Least speed of turning."""
+    rotational_acc_lim: Annotated[RadiansPerSecondSquared, Positive, Le(1000.0)] = 3.2
+    """Of speeding up and slowing down a turn."""
+    acceleration_limit: Annotated[MetresPerSecondSquared, Positive, Le(1000.0)] = 2.5
+    """Of driving off."""
+    deceleration_limit: Annotated[MetresPerSecondSquared, Positive, Le(1000.0)] = 2.5
+    """Of slowing down, as a magnitude."""
+    minimum_speed: Annotated[MetresPerSecond, NotNegative, Le(100.0)] = 0.05
+    """Least speed of driving."""
+    projection_time: Annotated[Seconds, Interval(ge=0.0, le=60.0)] = 1.0
+    """How far ahead assisted teleop looks for collisions ..."""
+    simulation_time_step: Annotated[Seconds, Interval(ge=0.01, le=60.0)] = 0.1
+    """... in steps of this."""
+    footprint: tuple[tuple[Metres, Metres], ...] = ((0.0, 0.0),)
+    """Corners in the base frame; the single one (0, 0) checks the centre for inscribed cost instead."""
 
 
 @dataclass(kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -31,23 +32,31 @@ from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
 from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat, Le, PeriodNs, Positive
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiffDriveNodeConfig:
     """Wiring of the drive."""
 
-    drive: DiffDriveConfig
+    drive: Annotated[DiffDriveConfig, Flat]
+    """Of the wheels."""
     left_joints: tuple[str, ...]
+    """Driven wheels on the left."""
     right_joints: tuple[str, ...]
+    """Driven wheels on the right."""
     odom_frame: str = "odom"
+    """In which the pose is told."""
     base_frame: str = "base_footprint"
+    """Of the robot."""
     noise: OdometryNoise = DIFF_DRIVE
     """How wrong odometry is."""
-    period_ns: int = 20_000_000
+    period_ns: Annotated[PeriodNs, Positive, Le(1000.0)] = 20_000_000
+    """Rate of wheel commands and of odometry."""
     use_imu: bool = False
     """Whether odometry takes its heading from the gyroscope (`odometry.use_imu` of turtlebot3_node)."""
     imu_topic: str = "imu"
+    """Of the gyroscope."""
     enable_odom_tf: bool = True
     """Whether odom → base is published; not where a filter does."""
 
@@ -66,7 +75,7 @@ class DiffDriveControllerNode:
                 wheel_radius=config.drive.wheel_radius, track=self.controller.track, noise=config.noise
             )
         )
-        declare_config(self.node, config, names={"drive": "", "linear": "linear.x", "angular": "angular.z"})
+        declare_config(self.node, config)
         self._hardware = hardware
         index = {name: i for i, name in enumerate(hardware.joint_names)}
         self._left = [index[name] for name in config.left_joints]

@@ -21,9 +21,10 @@ its bounds in the same words, and NaN, infinity, and sizes beyond `Unit.sizes` i
   le=1000)]` the parameter is `controller_frequency`, and its bounds are in Hz; `timeout_ns:
   Annotated[DurationNs, Positive]` is `timeout`, in seconds.
 - `Name("...")`: the parameter's name, where the field's cannot be it; `Nav2("...")`: Nav2's name in files,
-  where it is another one; `ReadOnly`; `MayBeInfinite`; `Derived`: no key of scenarios.
+  and how the value is read, where that is otherwise; `ReadOnly`; `MayBeInfinite`; `NameOrPath`; `Derived`: no
+  key of scenarios.
 - A config inside, or a mapping of configs by name, is a section of its own name, or of `Name("...")`; with
-  `Flat` it is none: `controllers: Annotated[Mapping[str, ControllerConfig], Flat]` gives 'FollowPath.xy'.
+  `Flat` it is none: `controllers: Annotated[Mapping[str, Any], Flat]` gives 'FollowPath.xy'.
 
 A config's annotations must be resolvable at run time: no names that are imported for type checkers only.
 """
@@ -44,9 +45,11 @@ from twin.parameters.forms import DurationNs as DurationNs
 from twin.parameters.forms import Flat as Flat
 from twin.parameters.forms import MayBeInfinite as MayBeInfinite
 from twin.parameters.forms import Name as Name
+from twin.parameters.forms import NameOrPath as NameOrPath
 from twin.parameters.forms import Nav2 as Nav2
 from twin.parameters.forms import PeriodNs as PeriodNs
 from twin.parameters.forms import ReadOnly as ReadOnly
+from twin.parameters.units import Amperes as Amperes
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
@@ -59,4 +62,6 @@ from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
 from twin.parameters.units import RadiansPerSecondSquared as RadiansPerSecondSquared
 from twin.parameters.units import Seconds as Seconds
+from twin.parameters.units import SquareMetres as SquareMetres
+from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from twin.parameters.domain import Domain, domain_of, metadata_of
-from twin.parameters.forms import Derived, DurationNs, Form, Name, Nav2, PeriodNs, ReadOnly
+from twin.parameters.forms import Derived, DurationNs, Form, Name, NameOrPath, Nav2, PeriodNs, ReadOnly
 from twin.parameters.texts import texts_of
 
 
@@ -28,13 +28,17 @@ class Declaration:
     """Which values it takes; None for configs inside, and for what is no parameter."""
     form: Form | None
     """How the value is told, if not as it is kept."""
-    nav2: str
-    """Nav2's name in files; mostly the same."""
+    nav2: tuple[Nav2, ...]
+    """How Nav2's files write it, where it is otherwise."""
     config: type | None
     """The config inside, if the annotation names just one."""
+    is_required: bool
+    """Whether it has no default."""
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
+    is_path: bool
+    """Whether it is the name of what ships, or a path."""
 
     @property
     def text(self) -> str:
@@ -59,11 +63,7 @@ class Declaration:
             ValueError: it is none; a sentence without its subject.
         """
         assert self.domain is not None
-        try:
-            value = self.domain.checked(told)
-        except ValueError as error:
-            raise ValueError(f"{error}, not {told!r}") from None
-        return self.kept(value)
+        return self.kept(self.domain.checked(told))
 
     def kept(self, checked: Any) -> Any:
         """Return a valid value as the config keeps it."""
@@ -78,7 +78,7 @@ def fields_of(config: type | object) -> Mapping[str, Declaration]:
 @cache
 def _fields_of(config: type) -> Mapping[str, Declaration]:
     hints = get_type_hints(config, include_extras=True)
-    found = {field.name: _declaration(config, field.name, hints[field.name]) for field in _init(config)}
+    found = {field.name: _declaration(config, field, hints[field.name]) for field in _init(config)}
     return MappingProxyType(found)
 
 
@@ -86,7 +86,8 @@ def _init(config: type) -> list[dataclasses.Field[Any]]:
     return [field for field in dataclasses.fields(config) if field.init]
 
 
-def _declaration(owner: type, field: str, hint: Any) -> Declaration:
+def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
+    field = of.name
     metadata = metadata_of(hint)
     if domain_of(hint) == Domain(int) and field.endswith("_ns"):
         hint = PeriodNs if field.endswith("period_ns") else DurationNs
@@ -103,8 +104,10 @@ def _declaration(owner: type, field: str, hint: Any) -> Declaration:
         name=name,
         domain=domain_of(hint),
         form=form,
-        nav2=next((one.name for one in metadata if isinstance(one, Nav2)), name),
+        nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
+        is_required=of.default is of.default_factory is dataclasses.MISSING,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
+        is_path=NameOrPath in metadata,
     )

@@ -116,7 +116,9 @@ def overridden(config: C, given: Mapping[str, Any]) -> C:
     for declaration in fields_of(config).values():
         value = given.get(declaration.name)
         inner = getattr(config, declaration.field)
-        if isinstance(value, Mapping) and dataclasses.is_dataclass(inner):
+        if not declaration.name and dataclasses.is_dataclass(inner):
+            changes[declaration.field] = overridden(inner, given)
+        elif isinstance(value, Mapping) and dataclasses.is_dataclass(inner):
             changes[declaration.field] = overridden(inner, value)
         elif value is not None:
             changes[declaration.field] = declaration.kept(value)

@@ -90,3 +90,8 @@ PerMetre = Annotated[float, Unit("inverse length", (("1/m", "1"),))]
 Newtons = Annotated[float, Unit("force", (("N", "1"), ("mN", "1/1000"), ("kN", "1000")))]
 Hertz = Annotated[float, Unit("frequency", (("Hz", "1"), ("kHz", "1000")), sizes=(1e-9, 1e9))]
 Joules = Annotated[float, Unit("energy", (("J", "1"), ("kJ", "1000"), ("Wh", "3600"), ("kWh", "3600000")))]
+SquareMetres = Annotated[
+    float, Unit("area", (("m²", "1"), ("m^2", "1"), ("cm²", "1/10000"), ("cm^2", "1/10000")))
+]
+SquareRadians = Annotated[float, Unit("squared angle", (("rad²", "1"), ("rad^2", "1")))]
+Amperes = Annotated[float, Unit("current", (("A", "1"), ("mA", "1/1000")))]

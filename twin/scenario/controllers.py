@@ -6,18 +6,21 @@ plugin does not have is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
+from twin.navigation.control.dwb.config import DWBConfig, ScaleConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
+from twin.navigation.control.mppi.config import CriticConfig, MPPIConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
-from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
+from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, configs_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.parameters.declaration import fields_of
 from twin.plugins import Kind
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
-from twin.scenario.plugin_groups import PluginGroup, plugin_choice, plugin_name
+from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_choice, plugin_name
 from twin.scenario.plugins import PluginUse
 from twin.strict_yaml import Fault, Faults
 
@@ -70,8 +73,19 @@ class PluginParameters(GoalCheckerParameters):
     `mppi`."""
 
 
-_OF_PLUGIN = {name: group_of(config_of(CONTROLLERS.find(name))) for name in CONTROLLERS.shipped}
+def _critic_names(controller: type, critic: type) -> list[str]:
+    """Return the names of the critics that are compiled into a controller."""
+    inside = fields_of(controller).values()
+    return [one.name for one in inside if one.config is not None and issubclass(one.config, critic)]
+
+
+_OF_PLUGIN = {name: group_of(config) for name, config in configs_of(CONTROLLERS).items()}
 _OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
+_CRITICS = {
+    "mppi": _critic_names(MPPIConfig, CriticConfig),
+    "dwb": _critic_names(DWBConfig, ScaleConfig),
+}
+"""Those that are compiled into a controller, by its name."""
 
 
 def _valid_with(name: str) -> str:
@@ -82,17 +96,23 @@ def _valid_with(name: str) -> str:
     return " or ".join(owners)
 
 
-@keys_of(*(config_of(CONTROLLERS.find(name)) for name in CONTROLLERS.shipped))
-class ControllerParameters(PluginGroup, PluginParameters, ServerParameters):
+@keys_of(*configs_of(CONTROLLERS).values())
+class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, ServerParameters):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
 
-    of = CONTROLLERS
+    of, list_of, list_key = CONTROLLERS, CRITICS, "critics"
 
     @classmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys of the server, the checkers, and the rotation shim if it is asked for."""
         shim = _OF_SHIM.model_fields if data.get("rotation_shim") is True else {}
         return {*ServerParameters.model_fields, *PluginParameters.model_fields, *shim}
+
+    @classmethod
+    def ships(cls, data: Mapping[str, Any]) -> Collection[str] | None:
+        """Return the names of the critics that ship for the plugin; None: it has no list of them."""
+        plugin = data.get("plugin")
+        return _CRITICS.get(plugin) if isinstance(plugin, str) else None
 
     @property
     def chosen(self) -> str:
@@ -129,7 +149,7 @@ class ControllerParameters(PluginGroup, PluginParameters, ServerParameters):
 
         kinds: dict[str, Kind[Any]] = {"goal_checker": GOAL_CHECKERS, "progress_checker": PROGRESS_CHECKERS}
         for key, configs in kinds.items():
-            having = {kind: group_of(config_of(configs.find(kind))).model_fields for kind in configs.shipped}
+            having = {kind: group_of(config).model_fields for kind, config in configs_of(configs).items()}
             chosen = getattr(self, key) or "simple"
             own = {} if isinstance(chosen, PluginUse) else having[chosen]
             for name in dict.fromkeys(name for names in having.values() for name in names):

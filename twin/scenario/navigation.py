@@ -9,67 +9,28 @@ from typing import Annotated
 
 from pydantic import Field
 
-from twin.parameters import Hertz, Metres, MetresPerSecond, NotNegative, Positive, RadiansPerSecond, Seconds
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
-from twin.scenario.parameter_group import ParameterGroup
-from twin.scenario.planners import PlannerParameters
+from twin.scenario.parameter_group import ParameterGroup, keys_of
+from twin.scenario.planners import PlannerParameters, SmootherParameters
 from twin.strict_yaml import StrictModel
 
 
+@keys_of(CostmapNodeConfig)
 class CostmapParameters(ParameterGroup):
     """Parameters of a costmap."""
 
-    resolution: Annotated[Metres, Positive] | None = None
-    """Cell size [m]."""
-    width: Annotated[Metres, Positive] | None = None
-    """Of a rolling costmap, along x [m]."""
-    height: Annotated[Metres, Positive] | None = None
-    """Of a rolling costmap, along y [m]."""
-    footprint_padding: Annotated[Metres, NotNegative] | None = None
-    """Added to the footprint on every side [m]; the robot's own has 0.01 m already."""
-    inflation_radius: Annotated[Metres, NotNegative] | None = None
-    """Distance from obstacles within which cells cost [m]."""
-    cost_scaling_factor: Annotated[float, Positive] | None = None
-    """Decay of that cost [1/m]."""
-    update_frequency: Annotated[Hertz, Positive] | None = None
-    """Rate of updates [Hz]."""
-    obstacle_min_range: Annotated[Metres, NotNegative] | None = None
-    """Range from which a beam marks obstacles [m]."""
-    obstacle_max_range: Annotated[Metres, Positive] | None = None
-    """Range within which a beam marks obstacles [m]."""
-    expected_update_rate: Annotated[Seconds, NotNegative] | None = None
-    """Longest time between two scans of use [s]; later nobody drives by it. 0: none need come."""
-    raytrace_min_range: Annotated[Metres, NotNegative] | None = None
-    """Range from which a beam clears cells [m]."""
-    raytrace_max_range: Annotated[Metres, Positive] | None = None
-    """Range within which a beam clears cells [m]."""
-    inf_is_valid: bool | None = None
-    """Whether a beam without return (inf) clears cells."""
-    footprint_clearing_enabled: bool | None = None
-    """Whether the cells under the robot are free."""
-    keepout_before_inflation: bool | None = None
-    """Whether keep-out zones are inflated, so that no part of the robot enters them."""
-    scan_topics: tuple[str, ...] | None = None
-    """Topics of sensor_msgs/LaserScan for the obstacle layer; absent: `scan`."""
-    range_topics: tuple[str, ...] | None = None
-    """Topics of sensor_msgs/Range for the range sensor layer."""
-    robot_radius: Annotated[Metres, Positive] | None = None
-    """Takes the robot as a circle of this radius instead of by its footprint [m]."""
-    rolling_window: bool | None = None
-    """Whether the grid follows the robot, without a static map."""
 
-
+@keys_of(BtNavigatorConfig)
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
-    default_nav_to_pose_bt_xml: NameOrPath | None = None
-    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
-    default_nav_through_poses_bt_xml: NameOrPath | None = None
-    """The same for goals through poses."""
-    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 
 
@@ -98,6 +59,8 @@ class NavigationConfig(StrictModel):
     """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
     planner: PlannerParameters = PlannerParameters()
     """Overrides of the global planner."""
+    smoother: SmootherParameters = SmootherParameters()
+    """Overrides of the path smoother."""
     controller: ControllerParameters = ControllerParameters()
     """Overrides of the path follower."""
     controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)

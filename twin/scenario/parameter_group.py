@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
-from pydantic import Field, Strict, create_model
+from pydantic import Field, create_model
 
 from twin.parameters.declaration import Declaration, fields_of
+from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
 G = TypeVar("G", bound="ParameterGroup")
@@ -35,14 +36,19 @@ class ParameterGroup(StrictModel):
         }
 
 
-def keys_of(*configs: type) -> Callable[[type[G]], type[G]]:
-    """Return a decorator that gives a group an optional key for every parameter of some configs."""
+def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:
+    """Return a decorator that gives a group an optional key for every parameter of some configs.
+
+    Args:
+        configs: What the keys are of.
+        whole: Whether the group is all that a config is made of: what that has no default of is required.
+    """
 
     def decorate(group: type[G]) -> type[G]:
         keys: dict[str, Any] = {}
         for config in configs:
-            for declaration in fields_of(config).values():
-                key = None if declaration.is_derived else _key(declaration)
+            for declaration in _keyed(config):
+                key = _key(declaration, required=whole and declaration.is_required)
                 if key is not None and declaration.name not in group.model_fields:
                     keys[declaration.name] = key
         made = create_model(
@@ -67,7 +73,16 @@ def _group_of(config: type) -> type[ParameterGroup]:
     return keys_of(config)(type(name, (ParameterGroup,), body))
 
 
-def _key(declaration: Declaration) -> tuple[Any, Any] | None:
+def _keyed(config: type) -> Iterator[Declaration]:
+    """Yield the fields of a config that scenarios have keys for, and those of configs without a section."""
+    for declaration in fields_of(config).values():
+        if declaration.config is not None and not declaration.name:
+            yield from _keyed(declaration.config)
+        elif not declaration.is_derived:
+            yield declaration
+
+
+def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any] | None:
     """Return the type of a key, and what a schema says of it."""
     if declaration.config is not None:
         inner = group_of(declaration.config)
@@ -75,7 +90,7 @@ def _key(declaration: Declaration) -> tuple[Any, Any] | None:
     domain = declaration.domain
     if domain is None:
         return None
-    kind: Any = Annotated[domain.annotation, domain]
-    if domain.item is not None:  # a group's validator may hand a list on
-        kind = Annotated[kind, Strict(False)]
+    kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
+    if required:
+        return kind, Field(description=declaration.text)
     return kind | None, Field(default=None, description=declaration.text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import (
@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from twin.errors import nearest
 from twin.navigation.plugins import bound
 from twin.plugins import Kind
 from twin.scenario.parameter_group import ParameterGroup
@@ -53,6 +54,58 @@ class PluginGroup(ParameterGroup):
         used = use(cls.of, name, params, info, named_at=("plugin",))
         made = handler({key: data[key] for key in data if key in beside} | {"plugin": used.reference})
         made._params = used.params
+        return made
+
+
+class PluginListGroup(ParameterGroup):
+    """Parameters with a list of plugins; those of a user's stand beside it, by the name of the class."""
+
+    list_of: ClassVar[Kind[Any]]
+    list_key: ClassVar[str]
+    _listed: Mapping[str, PluginUse] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def ships(cls, data: Mapping[str, Any]) -> Collection[str] | None:
+        """Return what the list may name that ships; None: there is no such list."""
+        return cls.list_of.shipped
+
+    @property
+    def listed(self) -> Mapping[str, PluginUse]:
+        """What a user brings, by the names that the list has for it."""
+        return self._listed
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_a_user_each(
+        cls, data: Any, handler: ModelWrapValidatorHandler[PluginListGroup], info: ValidationInfo
+    ) -> PluginListGroup:
+        names = data.get(cls.list_key) if isinstance(data, Mapping) else None
+        ships = cls.ships(data) if isinstance(names, list) else None
+        if names is None or ships is None:
+            return handler(data)
+        found, called, faults = dict[str, PluginUse](), list(names), list[Fault]()
+        for i, name in enumerate(names):
+            at, kind = (cls.list_key, i), cls.list_of
+            if not isinstance(name, str) or name in ships:
+                continue
+            called[i] = own = name.rpartition(":")[2]
+            if own in ships or own in found:
+                faults.append(Fault(at, f"two {kind.name}s are called '{own}'; rename one of them"))
+            elif ":" not in name and name not in kind.names():
+                valid = nearest(name, [*ships, *kind.names()])
+                faults.append(Fault(at, f"there is no {kind.name} '{name}'; {valid}"))
+            else:
+                try:
+                    found[own] = use(kind, name, data.get(own), info, named_at=at)
+                except Faults as wrong:
+                    faults += [
+                        Fault(fault.loc if fault.loc == at else (own, *fault.loc), fault.message)
+                        for fault in wrong.faults
+                    ]
+        if faults:
+            raise Faults(faults)
+        made = handler({key: data[key] for key in data if key not in found} | {cls.list_key: called})
+        made._listed = found
         return made
 
 

@@ -23,9 +23,10 @@ from twin.navigation.control.mppi.config import PathAngleCriticConfig, Trajector
 from twin.navigation.control.mppi.controller import MPPI
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
+from twin.navigation.planning.config import HybridConfig, PlannerConfig
 from twin.navigation.planning.direction import cusps
-from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.hybrid import HybridPlanner
+from twin.navigation.planning.planner import Planner
 from twin.navigation.planning.smoother import SimpleSmoother
 
 pytestmark = pytest.mark.xdist_group("planning")

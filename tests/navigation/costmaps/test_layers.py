@@ -12,10 +12,10 @@ from scipy import ndimage
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import inflation_costs
+from twin.navigation.costmaps.costmap_config import KeepoutConfig, RangeSensorConfig
 from twin.navigation.costmaps.filters import (
     SPEED_FILTER_ABSOLUTE,
     SPEED_FILTER_PERCENT,
-    KeepoutConfig,
     KeepoutFilter,
     SpeedFilter,
     SpeedLimit,
@@ -23,7 +23,7 @@ from twin.navigation.costmaps.filters import (
 from twin.navigation.costmaps.footprint import padded, rectangle
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
-from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig, RangeSensorLayer
+from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
 from twin.navigation.costmaps.window import Window
 from twin.navigation.maps.occupancy_map import OccupancyMap
 

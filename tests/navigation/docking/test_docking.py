@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twin.geometry import Pose2
-from twin.navigation.docking.dock_estimate import DockEstimate, DockEstimateConfig
+from twin.navigation.docking.config import DockEstimateConfig, LineApproachConfig
+from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.faces import BoxFace, find_box_faces, fit_wall
-from twin.navigation.docking.line_approach import MISSED, LineApproach, LineApproachConfig
+from twin.navigation.docking.line_approach import MISSED, LineApproach
 from twin.navigation.recovery import TIMEOUT
 
 

@@ -226,9 +226,16 @@ def test_a_file_that_is_no_graph_is_told(tmp_path: Path, content: bytes | None):
         Slam.load(file)
 
 
-def test_a_parameter_out_of_range_is_told():
-    with pytest.raises(MapError, match="resolution is 0; valid is a number above 0"):
-        SlamConfig(resolution=0)
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"min_laser_range": 9.0, "max_laser_range": 8.0}, "min_laser_range is 9, not less than"),
+        ({"resolution": 0.005, "max_laser_range": 30.0}, "max_laser_range is 30, more than 4000 cells"),
+    ],
+)
+def test_ranges_that_cannot_be_together_are_told(values, said):
+    with pytest.raises(ValueError, match=said):
+        SlamConfig(**values)
 
 
 def test_entropy_falls_as_covariance_does():

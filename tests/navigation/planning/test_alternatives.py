@@ -5,7 +5,8 @@ import numpy as np
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
-from twin.navigation.planning.planner import Planner, ThetaStarConfig
+from twin.navigation.planning.config import ThetaStarConfig
+from twin.navigation.planning.planner import Planner
 
 START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(9.5, 2.5, 0.0)
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.planning.commitment import CommitmentConfig, committed
-from twin.navigation.planning.planner import Planner, PlannerConfig
+from twin.navigation.planning.commitment import committed
+from twin.navigation.planning.config import CommitmentConfig, PlannerConfig
+from twin.navigation.planning.planner import Planner
 
 START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(4.5, 2.5, 0.0)
 

@@ -11,8 +11,9 @@ from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.failures import GoalOccupied
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
-from twin.navigation.planning.planner import Planner, ThetaStarConfig
+from twin.navigation.planning.config import GoalAccessConfig, ThetaStarConfig
+from twin.navigation.planning.goal_access import GoalAccess
+from twin.navigation.planning.planner import Planner
 
 S = 1_000_000_000
 LONG = rectangle(0.9, 0.6)

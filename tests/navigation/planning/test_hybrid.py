@@ -16,7 +16,8 @@ from twin.navigation.failures import (
     StartOccupied,
 )
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.planning.hybrid import HybridConfig, HybridPlanner
+from twin.navigation.planning.config import HybridConfig
+from twin.navigation.planning.hybrid import HybridPlanner
 from twin.navigation.planning.planner import path_length
 
 pytestmark = pytest.mark.xdist_group("planning")

@@ -23,17 +23,11 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
+from twin.navigation.planning.config import PlannerConfig, SmootherConfig, ThetaStarConfig
 from twin.navigation.planning.direction import cusps, one_way_pieces
 from twin.navigation.planning.grid_search import GridSearch
-from twin.navigation.planning.planner import (
-    Planner,
-    PlannerConfig,
-    ThetaStarConfig,
-    filled,
-    path_length,
-    with_headings,
-)
-from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother, SmootherConfig
+from twin.navigation.planning.planner import Planner, filled, path_length, with_headings
+from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother
 
 EXACT = PlannerConfig(tolerance=0.0)
 

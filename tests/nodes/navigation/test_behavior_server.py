@@ -31,7 +31,8 @@ from twin.geometry import wrap_angle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LONG = duration(30_000_000_000)

@@ -22,14 +22,15 @@ from twin.geometry import Pose2
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.planner import PlannerConfig
+from twin.navigation.planning.config import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.messages import path_msg, pose_stamped
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig, BtNavigatorNode
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig, BtNavigatorNode
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
 from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 

@@ -38,14 +38,15 @@ from twin.bridge.srvs import (
 )
 from twin.geometry import Pose2
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.costmaps.costmap_config import RangeSensorConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.costmaps.range_sensor_layer import RangeSensorConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.maps.zones import empty_mask, rectangle, with_zone
 from twin.nodes.messages import path_msg, pose_stamped
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.costmaps.filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
 from twin.nodes.navigation.mapping.map_saver import MapSaverNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode, grid_msg, occupancy_map

@@ -18,7 +18,8 @@ from twin.bridge.srvs import ClearEntireCostmap, GetMap
 from twin.geometry import Pose2
 from twin.navigation.planning.planner import path_length
 from twin.nodes.messages import path_array, path_msg
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode, occupancy_map
 from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 

@@ -13,8 +13,8 @@ from twin.bridge.topics import Sample
 from twin.errors import NavigationError
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import Slam
-from twin.nodes.navigation.localisation.ekf import EkfNodeConfig, for_robot
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, for_robot
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.parameter_files.ekf import ekf_with_file
 from twin.runtime.parameter_files.localisation import localisation_nodes

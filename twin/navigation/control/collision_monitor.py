@@ -4,54 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from twin.geometry import Array
 from twin.navigation._jit import jit
+from twin.navigation.control.collision_monitor_config import (
+    ActionType,
+    CollisionMonitorConfig,
+    MonitorPolygon,
+)
 
-ActionType = Literal["stop", "slowdown", "limit", "approach"]
 _ESCAPE_S = 0.3
 """How far a command is looked ahead that may lead out of a collision."""
 INVALID_SOURCE = "invalid source"
 """What the action's polygon is called while a sensor is silent."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MonitorPolygon:
-    """One polygon about the robot and what is done about points in it; names and defaults are Nav2's."""
-
-    name: str
-    action_type: ActionType
-    points: tuple[tuple[float, float], ...] = ()
-    """Corners in the base frame [m]; empty: the robot's footprint."""
-    min_points: int = 4
-    """Fewer points inside are none."""
-    slowdown_ratio: float = 0.5
-    """What `slowdown` multiplies the command with."""
-    linear_limit: float = 0.5
-    """Of `limit` [m/s]."""
-    angular_limit: float = 0.5
-    """Of `limit` [rad/s]."""
-    time_before_collision: float = 2.0
-    """`approach` scales a command down that would collide sooner, by what is left of this time [s]."""
-    simulation_time_step: float = 0.1
-    """Of the projection that `approach` makes [s]."""
-    enabled: bool = True
-
-
-FOOTPRINT_APPROACH = MonitorPolygon(name="FootprintApproach", action_type="approach", min_points=3)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CollisionMonitorConfig:
-    """Parameters of the monitor; names are Nav2's."""
-
-    polygons: tuple[MonitorPolygon, ...] = (FOOTPRINT_APPROACH,)
-    source_timeout_ns: int = 1_000_000_000
-    """Data older than this is none, and stops the robot; 0: it does not [ns]."""
-    enabled: bool = True
 
 
 @dataclass(frozen=True)

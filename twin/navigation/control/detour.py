@@ -16,8 +16,9 @@ from twin.navigation._jit import fast_jit
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.failures import PlanningFailure
-from twin.navigation.planning.planner import Planner, PlannerConfig
-from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
+from twin.navigation.planning.config import PlannerConfig, SmootherConfig
+from twin.navigation.planning.planner import Planner
+from twin.navigation.planning.smoother import SimpleSmoother
 
 _PAST = 16
 """Poses of the path behind the obstacle, 5 cm apart, that a way around need not lead back to."""

@@ -16,6 +16,7 @@ from twin.navigation.costmaps.costmap import (
     MAX_NON_OBSTACLE,
     NO_INFORMATION,
 )
+from twin.navigation.costmaps.costmap_config import KeepoutConfig
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 
@@ -25,15 +26,6 @@ NO_SPEED_LIMIT = 0.0
 """Of nav2_msgs/msg/SpeedLimit."""
 
 _SAME_FRAME = Pose2(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class KeepoutConfig:
-    """Parameters of nav2_costmap_2d's KeepoutFilter."""
-
-    override_lethal_cost: bool = False
-    """Whether a robot in a zone may drive out of it: the zone costs `lethal_override_cost` then."""
-    lethal_override_cost: int = MAX_NON_OBSTACLE
 
 
 @dataclass(kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,27 +10,12 @@ from numpy.typing import NDArray
 from twin.geometry import Pose2
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION
+from twin.navigation.costmaps.costmap_config import RangeSensorConfig
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, shifted
 
 _EVEN = int(0.5 * LETHAL_OBSTACLE)
 """A probability of one half, as nav2's layer stores it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeSensorConfig:
-    """Parameters of the layer; names and defaults are those of nav2_costmap_2d's RangeSensorLayer."""
-
-    phi: float = 1.2
-    """Distance at which a reading counts half [m]."""
-    inflate_cone: float = 1.0
-    """How far beside the cone cells are looked at, as a share of it; 1: in its whole bounding box."""
-    clear_threshold: float = 0.2
-    """Cells less probable than this are free."""
-    mark_threshold: float = 0.8
-    """Cells more probable than this are lethal."""
-    clear_on_max_reading: bool = False
-    """Whether a reading of the maximal range frees the whole cone."""
 
 
 class RangeSensorLayer:

@@ -3,25 +3,11 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap, collision_step
+from twin.navigation.docking.config import DockCollisionConfig
 from twin.navigation.docking.line_approach import LineApproach
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockCollisionConfig:
-    """Names and defaults are those of opennav_docking's controller."""
-
-    use_collision_detection: bool = True
-    """Whether the way is looked at at all."""
-    projection_time: float = 5.0
-    """So much of the approach to come [s] ..."""
-    simulation_time_step: float = 0.1
-    """... in steps of this [s]."""
-    dock_collision_threshold: float = 0.3
-    """So near to the docked pose nothing is looked for: that the dock is there is no news [m]."""
 
 
 def collision_ahead(

@@ -10,36 +10,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation.docking.config import DockEstimateConfig
 from twin.navigation.docking.faces import fit_wall
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockEstimateConfig:
-    """How far things may be from where the plan says, and how many sights are looked at."""
-
-    search_half_width: float = 0.7
-    """Points of the face are looked for so far to each side of the expected point [m]."""
-    search_depth: float = 0.25
-    """And so far before and behind it [m]."""
-    max_yaw: float = 0.2
-    """A line turned further than this against the expected face is another thing [rad]."""
-    min_length: float = 0.3
-    """A shorter line is another thing [m]."""
-    tote_reach: float = 0.2
-    """A tote further aside of the expected point is another one; less than half of totes' spacing [m]."""
-    tote_depth: float = 0.2
-    """So is one further behind the face than this, or before it [m]."""
-    width_tolerance: float = 0.08
-    """A face of known width that differs by more is not all in sight; two beams' distance or more [m]."""
-    min_sights: int = 3
-    """Fewer are not believed."""
-    max_sights: int = 9
-    """Older ones count no more: they were made from further away."""
 
 
 class DockEstimate:

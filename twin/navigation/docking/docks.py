@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Annotated, Literal
 
 from twin.errors import nearest
 from twin.geometry import Pose2
+from twin.parameters import Amperes, Flat, Interval, Le, Metres, NotNegative, Positive, Radians, Seconds
 
-DETECTIONS = ("none", "face", "tote")
+Detection = Literal["none", "face", "tote"]
+Offset = Annotated[Metres, Interval(ge=-10.0, le=10.0)]
+Turn = Annotated[Radians, Interval(ge=-math.tau, le=math.tau)]
 DOCK_NOT_IN_DB, DOCK_NOT_VALID = 901, 902
 
 
@@ -19,34 +24,31 @@ class DockType:
 
     is_charger: bool = False
     """Whether docking ends only when the battery is charged."""
-    detection: str = "face"
+    detection: Detection = "face"
     """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a tote)."""
     use_external_detection_pose: bool = False
     """Whether `detected_dock_pose` tells instead."""
-    face_width: float = 0.0
-    """Of a box whose edges tell where its middle is [m]; 0: its middle is where the map says."""
-    external_detection_timeout: float = 1.0
-    """A pose on `detected_dock_pose` older than this is none [s]."""
-    external_detection_translation_x: float = -0.55
-    """From the detected pose to where the base stands when docked, along x into the dock [m]; Nav2: -0.2."""
-    external_detection_translation_y: float = 0.0
-    """The same to the left [m]."""
-    external_detection_rotation_yaw: float = 0.0
-    """The same as a rotation [rad]."""
-    staging_x_offset: float = -0.75
-    """From the docked pose to the staging pose, along x [m]; Nav2: -0.7."""
-    staging_yaw_offset: float = 0.0
-    """Heading at the staging pose, from that of the docked pose [rad]."""
-    docking_threshold: float = 0.05
-    """A robot so near to the docked pose is docked [m]."""
+    face_width: Annotated[Metres, NotNegative, Le(100.0)] = 0.0
+    """Of a box whose edges tell where its middle is; 0: its middle is where the map says."""
+    external_detection_timeout: Annotated[Seconds, Positive] = 1.0
+    """A pose on `detected_dock_pose` older than this is none."""
+    external_detection_translation_x: Offset = -0.55
+    """From the face, or the detected pose, to where the base stands when docked, along x into the dock; Nav2:
+    -0.2."""
+    external_detection_translation_y: Offset = 0.0
+    """The same to the left."""
+    external_detection_rotation_yaw: Turn = 0.0
+    """The same as a rotation."""
+    staging_x_offset: Annotated[Metres, Interval(ge=-10.0, lt=0.0)] = -0.75
+    """From the docked pose to the staging pose, along x; negative: before the dock. Nav2: -0.7."""
+    staging_yaw_offset: Turn = 0.0
+    """Heading at the staging pose, from that of the docked pose."""
+    docking_threshold: Annotated[Metres, Positive, Le(10.0)] = 0.05
+    """A robot so near to the docked pose is docked."""
     use_battery_status: bool = False
     """Whether `battery_state` tells that a charger charges, else being docked does; Nav2: true."""
-    charging_threshold: float = 0.5
-    """A larger current is charging [A]."""
-
-    def __post_init__(self) -> None:
-        if self.detection not in DETECTIONS:
-            raise ValueError(f"detection must be one of {', '.join(DETECTIONS)}, not '{self.detection}'")
+    charging_threshold: Annotated[Amperes, NotNegative] = 0.5
+    """A larger current is charging."""
 
     @property
     def T_detected_docked(self) -> Pose2:
@@ -66,6 +68,7 @@ class Dock:
     type: str = ""
     """Name of its type; may be empty if there is only one."""
     frame: str = "map"
+    """Of the pose."""
     pose: Pose2
     """Where the base stands when docked, in `frame`."""
 
@@ -92,8 +95,10 @@ _TYPES: Mapping[str, DockType] = MappingProxyType(
 class DockDatabase:
     """All docks by their ids, and their types by name."""
 
-    types: Mapping[str, DockType] = field(default_factory=lambda: dict(_TYPES))
-    docks: Mapping[str, Dock] = field(default_factory=dict)
+    types: Annotated[Mapping[str, DockType], Flat] = field(default_factory=lambda: dict(_TYPES))
+    """Kinds of docks by name."""
+    docks: Annotated[Mapping[str, Dock], Flat] = field(default_factory=dict)
+    """Docks by the name that `dock_robot` has in `dock_id`."""
 
     def find(self, dock_id: str) -> Dock:
         """Return a dock.

@@ -8,48 +8,17 @@ heading leaves the line's by no more than 1.5 times the lateral error over the w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum, auto
 
 from twin.geometry import Pose2
+from twin.navigation.docking.config import LineApproachConfig
 from twin.navigation.recovery import TIMEOUT, BehaviorStep
 
 MISSED = "missed"
 
+
 _LATERAL_GAIN, _HEADING_GAIN = 6.0, 4.0
 """Of the law; with these the lateral error is a sum of the square and the cube of the way left."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LineApproachConfig:
-    """How calmly, and how exactly, a pose is approached."""
-
-    v_linear_min: float = 0.02
-    """[m/s]"""
-    v_linear_max: float = 0.25
-    """[m/s]"""
-    v_angular_min: float = 0.04
-    """Of turning on the spot [rad/s]."""
-    v_angular_max: float = 0.5
-    """[rad/s]"""
-    acceleration: float = 0.3
-    """[m/s²]"""
-    deceleration: float = 0.1
-    """Of slowing down at the end: low, so that a drive that lags stops in time all the same [m/s²]."""
-    angular_acceleration: float = 0.5
-    """Of turning on the spot [rad/s²]."""
-    turn_first_above: float = math.radians(3.0)
-    """A heading further off than this is corrected on the spot before driving [rad]."""
-    settle_distance: float = 0.15
-    """The robot is to be on the line so far before the pose; from there on the gains grow no more [m]."""
-    stop_tolerance: float = 0.003
-    """Stop so far before the pose [m]."""
-    lateral_tolerance: float = 0.01
-    """[m]"""
-    yaw_tolerance: float = math.radians(0.5)
-    """At the pose the robot turns on the spot until it is within this [rad]."""
-    time_allowance: float = 30.0
-    """[s]"""
 
 
 class _Phase(Enum):

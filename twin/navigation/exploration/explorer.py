@@ -5,29 +5,32 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.exploration.frontiers import Frontier, FrontierConfig, FrontierMap
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.parameters import Flat, Interval, Metres, NotNegative, PerMetre, Positive, Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExplorerConfig:
     """Parameters of the choice; those that explore_lite has are named as there."""
 
-    potential_scale: float = 3.0
-    """Weight of the way to a frontier [1/m]."""
-    gain_scale: float = 1.0
-    """Weight of its length [1/m]: a long one promises much that is new."""
-    orientation_scale: float = 0.0
+    potential_scale: Annotated[PerMetre, Interval(ge=0.0, le=1e6)] = 3.0
+    """Weight of the way to a frontier."""
+    gain_scale: Annotated[PerMetre, Interval(ge=0.0, le=1e6)] = 1.0
+    """Weight of its length: a long one promises much that is new."""
+    orientation_scale: Annotated[float, Interval(ge=0.0, le=1e6)] = 0.0
     """Weight of the turn towards it [1/rad]."""
-    progress_timeout: float = 30.0
-    """A goal that gets no nearer for so long is given up [s]."""
-    standoff: float = 0.5
-    """So far before a frontier the robot stops and looks; the second time it drives up to it [m]."""
-    same_place: float = 0.5
-    """Frontiers within this distance of each other are one and the same [m]."""
-    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
+    progress_timeout: Annotated[Seconds, Positive] = 30.0
+    """A goal that gets no nearer for so long is given up."""
+    standoff: Annotated[Metres, NotNegative] = 0.5
+    """So far before a frontier the robot stops and looks; the second time it drives up to it."""
+    same_place: Annotated[Metres, NotNegative] = 0.5
+    """Frontiers within this distance of each other are one and the same."""
+    frontiers: Annotated[FrontierConfig, Flat] = field(default_factory=FrontierConfig)
+    """What counts as one."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from twin.geometry import Array, Pose2
 from twin.navigation.exploration.line_of_sight import seen_from
 from twin.navigation.exploration.wavefront import travel_distances, way_back
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
+from twin.parameters import Interval, Le, Metres, NotNegative, Positive
 
 _EIGHT = np.ones((3, 3), dtype=np.int8)
 _FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
@@ -23,17 +25,17 @@ _FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
 class FrontierConfig:
     """What counts as a frontier."""
 
-    min_frontier_size: float = 0.5
-    """Shorter ones are left alone [m]."""
-    robot_radius: float = 0.3
-    """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn [m]."""
-    inscribed_radius: float = 0.3
-    """Unknown cells this near to obstacles are none that matter [m]."""
-    view_distance: float = 2.0
-    """A frontier that the robot cannot drive up to is looked at from afar, so far away at most [m]."""
-    goal_clearance: float = 0.1
-    """Goals keep so much more than `robot_radius` from obstacles, where there is room [m]."""
-    lethal_threshold: int = 65
+    min_frontier_size: Annotated[Metres, NotNegative] = 0.5
+    """Shorter ones are left alone."""
+    robot_radius: Annotated[Metres, Positive] = 0.3
+    """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn."""
+    inscribed_radius: Annotated[Metres, NotNegative] = 0.3
+    """Unknown cells this near to obstacles are none that matter."""
+    view_distance: Annotated[Metres, NotNegative, Le(100.0)] = 2.0
+    """A frontier that the robot cannot drive up to is looked at from afar, so far away at most."""
+    goal_clearance: Annotated[Metres, NotNegative] = 0.1
+    """Goals keep so much more than `robot_radius` from obstacles, where there is room."""
+    lethal_threshold: Annotated[int, Interval(ge=1, le=100)] = 65
     """Occupancy from which a cell of the map is an obstacle."""
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from twin.errors import MapError
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.localisation.amcl_config import MOTION_MODELS, AmclConfig
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.annealing import annealed
 from twin.navigation.localisation.confidence import Confidence
 from twin.navigation.localisation.evidence import ScanError, ScanEvidence
@@ -170,7 +170,7 @@ class Amcl:
         config = self.config
         noise = self._random.standard_normal((3, len(self.particles)))
         alphas = (config.alpha1, config.alpha2, config.alpha3, config.alpha4)
-        if config.robot_model_type == MOTION_MODELS[0]:
+        if config.robot_model_type == "nav2_amcl::DifferentialMotionModel":
             self.particles = sample_motion(self.particles, before, now, alphas, noise)
         else:
             self.particles = sample_omni_motion(self.particles, before, now, (*alphas, config.alpha5), noise)

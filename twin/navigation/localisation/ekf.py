@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array
+from twin.parameters import Interval
 
 SIZE = 15
 X, Y, Z, ROLL, PITCH, YAW, VX, VY, VZ, VROLL, VPITCH, VYAW, AX, AY, AZ = range(SIZE)
@@ -22,6 +24,7 @@ VELOCITY, RATES, ACCELERATION = slice(VX, VZ + 1), slice(VROLL, VYAW + 1), slice
 OUT_OF_PLANE = (Z, ROLL, PITCH, VZ, VROLL, VPITCH, AZ)
 """What a robot on a flat floor does not have."""
 
+Covariance = tuple[Annotated[float, Interval(ge=-1e9, le=1e9)], ...]
 _LEAST_VARIANCE = 1e-9
 _FLAT_VARIANCE = 1e-6
 
@@ -32,22 +35,23 @@ class EkfConfig:
 
     two_d_mode: bool = False
     """Whether z, roll, pitch and what moves along them stay zero."""
-    process_noise_covariance: tuple[float, ...] = (
+    process_noise_covariance: Covariance = (
         *(0.05, 0.05, 0.06, 0.03, 0.03, 0.06),
         *(0.025, 0.025, 0.04, 0.01, 0.01, 0.02),
         *(0.01, 0.01, 0.015),
     )
-    """Variance that each state gains per second."""
-    initial_estimate_covariance: tuple[float, ...] = (1e-9,) * SIZE
+    """Variances that the states gain per second, 15 or a 15 x 15 matrix by rows."""
+    initial_estimate_covariance: Covariance = (1e-9,) * SIZE
+    """The same at the start."""
 
     def __post_init__(self) -> None:
         for name in ("process_noise_covariance", "initial_estimate_covariance"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             if len(values) not in (SIZE, SIZE * SIZE) or not np.isfinite(values).all():
-                raise ValueError(f"ekf: {name} must be {SIZE} numbers, or {SIZE}² of a matrix by rows")
+                raise ValueError(f"{name} must be {SIZE} numbers, or {SIZE}² of a matrix by rows")
             matrix = _matrix(values)
             if np.linalg.eigvalsh(matrix).min() < -1e-12 or np.abs(matrix - matrix.T).max() > 1e-12:
-                raise ValueError(f"ekf: {name} must be a covariance: symmetric, no variance negative")
+                raise ValueError(f"{name} must be a covariance: symmetric, no variance negative")
 
 
 class Ekf:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +12,7 @@ from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.files.writing import replaced
 from twin.geometry import Array, Pose2
-from twin.navigation.mapping.config import SlamConfig
+from twin.navigation.mapping.config import Mode, SlamConfig
 from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
 from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
@@ -28,8 +27,6 @@ from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 __all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
-
-Mode = Literal["mapping", "localization"]
 
 
 class Slam:

@@ -7,22 +7,13 @@ So every cell off the last path costs a little more. The path itself stays free 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import MAX_NON_OBSTACLE, Costmap
-
-
-@dataclass(frozen=True, kw_only=True)
-class CommitmentConfig:
-    """How strongly the last path binds; ours, Nav2 has nothing like it."""
-
-    commitment_cost: int = 0
-    """Added to the cost of each free cell off the last path, up to the dearest one; 0 switches this off."""
-    commitment_width: float = 0.4
-    """To each side of the last path that counts as on it [m]."""
+from twin.navigation.planning.config import CommitmentConfig
 
 
 def committed(costmap: Costmap, path: Array, config: CommitmentConfig) -> Costmap:

@@ -19,21 +19,10 @@ from twin.navigation.costmaps.costmap import (
 from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import footprint_hits
 from twin.navigation.failures import GoalOccupied
+from twin.navigation.planning.config import GoalAccessConfig
 
 _STALE_S = 3.0
 """A goal that nobody has asked for, longer than patience by so much, is another one when it comes again."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class GoalAccessConfig:
-    """How long an occupied goal is hoped for."""
-
-    goal_near: float = 3.0
-    """From here on it matters whether the goal is free [m]: what is seen there from afar will have moved."""
-    goal_patience: float = 4.0
-    """How long something may be on the goal when the robot is near [s]."""
-    goal_surroundings: float = 1.2
-    """How far around an occupied goal only what the map shows is planned around [m]."""
 
 
 @dataclass(kw_only=True)

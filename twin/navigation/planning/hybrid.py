@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from twin.navigation.costmaps.costmap import (
     inflation_costs,
 )
 from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
+from twin.navigation.planning.config import HybridConfig
 from twin.navigation.planning.curves import advance
 from twin.navigation.planning.grid_search import GridSearch
 from twin.navigation.planning.hybrid_kernel import (
@@ -32,38 +33,6 @@ from twin.navigation.planning.planner import GlobalPlanner, check_inside
 
 _SLACK = 1.3
 """The cost to the goal is known for cells of so many times the start's; the others cost more."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class HybridConfig:
-    """Parameters of the planner; names and defaults are those of nav2_smac_planner's SmacPlannerHybrid."""
-
-    motion_model_for_search: Literal["DUBIN", "REEDS_SHEPP"] = "DUBIN"
-    """Whether the robot only drives forwards, or backwards too."""
-    minimum_turning_radius: float = 0.4
-    """[m]"""
-    tolerance: float = 0.25
-    """If the goal is occupied, how far from it the path may end [m]."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    angle_quantization_bins: int = 72
-    """Headings that are told apart."""
-    analytic_expansion_ratio: float = 3.5
-    """How often a curve straight to the goal is tried."""
-    analytic_expansion_max_length: float = 3.0
-    """It is no longer than this [m]; 4 to 5 turning radii at least."""
-    reverse_penalty: float = 2.0
-    """What a metre backwards counts."""
-    change_penalty: float = 0.0
-    """What is added where a turn to one side follows one to the other."""
-    non_straight_penalty: float = 1.2
-    """What a metre of a turn counts."""
-    cost_penalty: float = 2.0
-    """A metre at cost 252 counts as 1 + cost_penalty metres of free space."""
-    max_iterations: int = 1_000_000
-    """Poses that are expanded at most."""
-    smooth_path: bool = True
-    """Whether parts of the path give way to single curves where those are cheaper."""
 
 
 @dataclass(frozen=True)

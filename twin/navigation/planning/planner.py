@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,6 +25,7 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
+from twin.navigation.planning.config import PlannerConfig, ThetaStarConfig
 from twin.navigation.planning.grid_search import GridSearch
 
 
@@ -61,48 +61,6 @@ class GlobalPlanner(Configured, ABC):
         Raises:
             PlanningFailure: there is none, for a reason that has an error code.
         """
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlannerConfig:
-    """Parameters of the 8-connected planner; names are those of Nav2's NavFn and Smac 2-D planners."""
-
-    any_angle: ClassVar[bool] = False
-
-    tolerance: float = 0.5
-    """If the goal cannot be reached, how far from it the path may end [m]."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    cost_factor: float = 3.0
-    """A metre at cost 252 counts as 1 + cost_factor metres of free space."""
-    escape_factor: float = 20.0
-    """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
-
-    def price(self, level: Array) -> Array:
-        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
-        return 1.0 + self.cost_factor * level
-
-
-@dataclass(frozen=True, kw_only=True)
-class ThetaStarConfig:
-    """Parameters of the any-angle planner; names are those of nav2_theta_star_planner."""
-
-    any_angle: ClassVar[bool] = True
-
-    tolerance: float = 0.5
-    """If the goal cannot be reached, how far from it the path may end [m]."""
-    allow_unknown: bool = True
-    """Whether a path may cross unknown cells; they cost as much as the most expensive free cell."""
-    w_euc_cost: float = 1.0
-    """Weight of a path's length."""
-    w_traversal_cost: float = 2.0
-    """Weight of the squared costs under it."""
-    escape_factor: float = 20.0
-    """A metre inside the inscribed zone (253), out of which a start may escape, counts as so many."""
-
-    def price(self, level: Array) -> Array:
-        """Return what a metre costs at a share of the highest cost, 0 free ... 1 (252)."""
-        return 1.0 + self.w_traversal_cost / max(self.w_euc_cost, 1e-6) * level**2
 
 
 class Planner(GlobalPlanner):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from twin.geometry import Array, wrap_angles
 from twin.navigation._jit import jit
 from twin.navigation.configured import Configured
 from twin.navigation.costmaps.costmap import FREE_SPACE, Costmap
+from twin.navigation.planning.config import SavitzkyGolayConfig, SmootherConfig
 from twin.navigation.planning.direction import one_way_pieces
 from twin.navigation.planning.planner import with_headings
 
@@ -35,21 +35,6 @@ class Smoother(Configured, ABC):
             path: Shape (n, 3), n >= 2: x, y [m], yaw [rad], in the costmap's frame, the map's.
             costmap: Where points may go; None lets them go anywhere.
         """
-
-
-@dataclass(frozen=True, kw_only=True)
-class SmootherConfig:
-    """Parameters of the smoother; names and defaults are those of nav2_smoother's SimpleSmoother."""
-
-    w_data: float = 0.2
-    """Pull towards the planned path."""
-    w_smooth: float = 0.3
-    """Pull towards the middle of the neighbours."""
-    tolerance: float = 1e-6
-    """Stop when a sweep moves all points together by less [m]."""
-    max_its: int = 1000
-    refinement_num: int = 2
-    """How often the result is smoothed again."""
 
 
 class SimpleSmoother(Smoother):
@@ -78,16 +63,6 @@ class SimpleSmoother(Smoother):
                 *frame,
             )
         return points
-
-
-@dataclass(frozen=True, kw_only=True)
-class SavitzkyGolayConfig:
-    """Parameters of the filter; names and defaults are those of nav2_smoother's SavitzkyGolaySmoother."""
-
-    refinement_num: int = 2
-    """How often the result is filtered again."""
-    do_refinement: bool = True
-    """Whether it is."""
 
 
 _WINDOW = np.array([-2.0, 3.0, 6.0, 7.0, 6.0, 3.0, -2.0]) / 21.0

@@ -10,7 +10,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
     GoalCriticConfig,
@@ -18,8 +18,8 @@ from twin.navigation.control.mppi.config import (
     PathAlignCriticConfig,
 )
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
-from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
+from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
@@ -79,6 +79,9 @@ def _controller(parameters: ControllerParameters, smoother: VelocitySmootherConf
     else:
         tolerance = getattr(_goal_checker(parameters), "xy_goal_tolerance", _TOLERANCE)
         controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
+    if parameters.listed:
+        own = {name: config_of_use(CRITICS, used) for name, used in parameters.listed.items()}
+        controller = replace(controller, own_critics=own)
     if not parameters.shim:
         return controller
     shim = RotationShimConfig(

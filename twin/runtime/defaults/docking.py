@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twin.errors import ScenarioError
 from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.docking import DockingParameters
 
@@ -30,5 +30,4 @@ def docking_config(group: DockingParameters) -> DockingServerConfig:
             database.type_of(dock.type)
         except DockError as error:
             raise ScenarioError(f"dock '{name}': {error}") from error
-    rest = {name: value for name, value in group.overrides().items() if name not in ("types", "docks")}
-    return overridden(DockingServerConfig(database=database), rest)
+    return overridden(DockingServerConfig(database=database), group.overrides())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -11,28 +10,26 @@ from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.commitment import CommitmentConfig
-from twin.navigation.planning.goal_access import GoalAccessConfig
-from twin.navigation.plugins import PLANNERS, config_of
+from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
+from twin.navigation.plugins import PLANNERS, SMOOTHERS, config_of, configs_of
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking.server import DockingServerConfig
-from twin.nodes.navigation.planning.planner_server import PlannerServerConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.runtime.defaults.docking import docking_config
 from twin.runtime.defaults.overrides import overridden as overridden
-from twin.scenario.navigation import NavigationConfig
-from twin.scenario.parameter_group import ParameterGroup
+from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
+from twin.scenario.planners import PlannerParameters, SmootherParameters
+from twin.scenario.plugin_groups import config_of_use
 
 C = TypeVar("C")
 
-_GLOBAL_COSTMAP_PERIOD_NS = 500_000_000
-_LOCAL_COSTMAP_PERIOD_NS = 200_000_000
 _MISSED_SCANS = 3.5
 """After so many scan periods without a scan the robot stops: three in a row are missing."""
 
@@ -76,7 +73,7 @@ def navigation_parameters(
         scan_rate: How often its lidar scans [Hz]; None: it has none.
     """
     polygon = tuple((float(x), float(y)) for x, y in footprint)
-    layers = CostmapConfig(
+    in_map = CostmapConfig(
         footprint=polygon,
         footprint_padding=0.0,  # it is in the footprint already
         inflation_radius=0.8,
@@ -84,8 +81,8 @@ def navigation_parameters(
         obstacle_max_range=4.0,
         raytrace_max_range=5.0,
     )
-    rolling = replace(
-        layers,
+    around = replace(
+        in_map,
         rolling_window=True,
         width=4.0,
         height=4.0,
@@ -96,27 +93,50 @@ def navigation_parameters(
     return NavigationParameters(
         smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
-        global_costmap=replace(
-            _costmap("global_costmap", frames.map, layers, config.global_costmap, _GLOBAL_COSTMAP_PERIOD_NS),
-            publish_period_ns=2_000_000_000,
+        global_costmap=_costmap(
+            CostmapNodeConfig(
+                name="global_costmap",
+                frame=frames.map,
+                layers=in_map,
+                update_period_ns=500_000_000,
+                publish_period_ns=2_000_000_000,
+            ),
+            config.global_costmap,
         ),
         local_costmap=_costmap(
-            "local_costmap", frames.odom, rolling, config.local_costmap, _LOCAL_COSTMAP_PERIOD_NS
+            CostmapNodeConfig(name="local_costmap", frame=frames.odom, layers=around), config.local_costmap
         ),
-        planner=overridden(
-            config_of(PLANNERS.find(config.planner.plugin))(tolerance=0.1, allow_unknown=mapping),
-            config.planner.overrides(),
-        ),
+        planner=_planner(config.planner, mapping=mapping),
         planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
         commitment=overridden(CommitmentConfig(), config.planner.overrides()),
         goal_access=overridden(GoalAccessConfig(), config.planner.overrides()),
         controller_server=controller_server_config(config.controller, smoother, config.controllers),
         behaviors=BehaviorConfig(footprint=polygon),
-        path_smoother=SmootherServerConfig(),
+        path_smoother=_path_smoother(config.smoother),
         docking=docking_config(config.docking),
-        navigator=_navigator(config.navigator.overrides()),
+        navigator=_navigator(config.navigator),
         waypoints=WaypointFollowerConfig(),
     )
+
+
+def _planner(parameters: PlannerParameters, *, mapping: bool) -> Any:
+    if parameters.users is not None:
+        return config_of_use(PLANNERS, parameters.users)
+    planner = config_of(PLANNERS.find(parameters.plugin))(tolerance=0.1, allow_unknown=mapping)
+    return overridden(planner, parameters.overrides())
+
+
+def _path_smoother(parameters: SmootherParameters) -> SmootherServerConfig:
+    """Return the smoothers, the chosen one first."""
+    shipped = {name: config() for name, config in configs_of(SMOOTHERS).items()}
+    if parameters.users is not None:
+        chosen = config_of_use(SMOOTHERS, parameters.users)
+        name = parameters.users.reference.rpartition(":")[2]
+    else:
+        name = parameters.plugin
+        chosen = overridden(shipped[name], parameters.overrides())
+    shipped.pop(name, None)
+    return SmootherServerConfig(smoothers={name: chosen, **shipped})
 
 
 def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherConfig:
@@ -141,13 +161,9 @@ def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherCon
     )
 
 
-def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
-    defaults = BtNavigatorConfig()
-    frequency = overrides.get("bt_loop_frequency")
-    return replace(
-        overridden(defaults, overrides),
-        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
-    )
+def _navigator(group: NavigatorParameters) -> BtNavigatorConfig:
+    config, frequency = overridden(BtNavigatorConfig(), group.overrides()), group.bt_loop_frequency
+    return config if frequency is None else replace(config, bt_loop_duration=max(1, round(1e3 / frequency)))
 
 
 def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:
@@ -158,21 +174,7 @@ def _limits(speed: float, acceleration: float, deceleration: float, drive: float
     )
 
 
-def _costmap(
-    name: str, frame: str, layers: CostmapConfig, group: ParameterGroup, period_ns: int
-) -> CostmapNodeConfig:
-    overrides = group.overrides()
-    return CostmapNodeConfig(
-        name=name,
-        frame=frame,
-        layers=overridden(
-            replace(layers, footprint=()) if "robot_radius" in overrides else layers, overrides
-        ),
-        scan_topics=tuple(overrides.get("scan_topics") or ("scan",)),
-        range_topics=tuple(overrides.get("range_topics") or ()),
-        update_period_ns=_period_ns(overrides.get("update_frequency"), period_ns),
-    )
-
-
-def _period_ns(frequency: float | None, default: int) -> int:
-    return default if frequency is None else round(1e9 / frequency)
+def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
+    if group.robot_radius is not None:
+        config = replace(config, layers=replace(config.layers, footprint=()))
+    return overridden(config, group.overrides())

@@ -8,12 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from twin.navigation.localisation.ekf import SIZE
-from twin.nodes.navigation.localisation.ekf import EkfNodeConfig
-from twin.nodes.navigation.localisation.ekf_sources import EkfSource
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import EKF, corrects_map, differing, file_for
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
-from twin.scenario.localisation_parameters import EkfParameters
 from twin.scenario.robots import RobotConfig
 
 _SOURCE = r"(odom|pose|twist|imu)\d+"
@@ -79,9 +77,7 @@ def ekf_with_file(
     config = file.applied(
         node,
         replace(config, sources={name: EkfSource(topic=name, config=nothing) for name in named}),
-        {"ekf": ""},
         keep=frozenset(_FRAMES),
-        limits=EkfParameters,
         rename=_renamed,
         absent=_absent(values),
     )

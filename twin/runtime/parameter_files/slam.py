@@ -10,15 +10,14 @@ from typing import Any, get_args
 from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.geometry import Pose2
-from twin.navigation.mapping.slam import Mode
+from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.storage import unpack
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import SLAM, differing, file_for
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.scenario.localisation import SlamLocalisation
-from twin.scenario.localisation_parameters import SlamParameters
 from twin.scenario.robots import RobotConfig
 
 _BY_ITSELF = ("mode", "map_file_name", "map_start_pose")
@@ -78,9 +77,7 @@ def slam_with_file(
     config = file.applied(
         node,
         config,
-        {"slam": ""},
         keep=given | frozenset(_BY_ITSELF),
-        limits=SlamParameters,
         absent=_absent(values),
     )
     config = replace(config, scan_topic=file.relative(config.scan_topic))

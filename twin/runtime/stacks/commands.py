@@ -8,7 +8,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
-from twin.navigation.control.collision_monitor import (
+from twin.navigation.control.collision_monitor_config import (
     FOOTPRINT_APPROACH,
     CollisionMonitorConfig,
     MonitorPolygon,
@@ -16,6 +16,7 @@ from twin.navigation.control.collision_monitor import (
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
+from twin.runtime.defaults.overrides import overridden
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.sensors.lidar import LidarSpec
@@ -48,18 +49,18 @@ def build_commands(
     if scans is None:
         there = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
         scans = (_SCAN,) if there else ()
-    if not config.enabled or not (scans or config.range_topics):
+    if config.enabled is False or not (scans or config.range_topics):
         TwistMuxNode(bus, namespace=namespace)
         return
     TwistMuxNode(bus, output=_GUARDED, namespace=namespace)
     polygons: tuple[MonitorPolygon, ...] = (_approach(brakes.linear),)
     if config.polygons is not None:
-        polygons = tuple(MonitorPolygon(**polygon.model_dump()) for polygon in config.polygons)
+        polygons = tuple(polygon.config() for polygon in config.polygons)
     CollisionMonitorNode(
         bus,
         pose,
         footprint,
-        CollisionMonitorConfig(polygons=polygons, source_timeout_ns=round(config.source_timeout * 1e9)),
+        replace(overridden(CollisionMonitorConfig(), config.overrides()), polygons=polygons),
         brakes=brakes,
         hardest=_hardest(brakes.linear, context.handle.description.drive),
         cmd_vel_in=_GUARDED,

@@ -8,12 +8,12 @@ from typing import Any
 
 from twin.geometry import Pose2
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.navigation.mapping.slam import SlamConfig
 from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.localisation.static import StaticLocalisationNode
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.mapping.map_saver import MapSaverNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig, SlamToolboxNode
+from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file
@@ -22,8 +22,8 @@ from twin.runtime.stacks.context import StackContext
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.sim.noise import NoiseStream
 
-_MAP_UPDATE_INTERVAL = 2.0
-"""Time between two maps that a robot plans on while it makes them [s]; slam_toolbox's own is 5 s."""
+_MAP_UPDATE_INTERVAL_NS = 2_000_000_000
+"""Time between two maps that a robot plans on while it makes them; slam_toolbox's own is 5 s."""
 
 
 def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNode | None:
@@ -66,15 +66,12 @@ def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, gues
 
 def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> SlamToolboxNode:
     """Create `/slam_toolbox`; its map's frame is the world's, unless the scenario gives another start."""
-    overrides = config.parameters.overrides()
-    overrides.setdefault("map_update_interval", _MAP_UPDATE_INTERVAL)
-    for name in ("map_update_interval", "transform_timeout"):
-        if overrides.get(name) is not None:
-            overrides[f"{name}_ns"] = round(overrides[name] * 1e9)
-    node_config = overridden(
-        SlamNodeConfig(mode=config.mode, map_file_name=config.pose_graph or ""), overrides
+    node_config = SlamNodeConfig(
+        mode=config.mode,
+        map_file_name=config.pose_graph or "",
+        map_update_interval_ns=_MAP_UPDATE_INTERVAL_NS,
     )
-    node_config = replace(node_config, slam=overridden(SlamConfig(), overrides))
+    node_config = overridden(node_config, config.parameters.overrides())
     node_config, in_map, told = slam_with_file(node_config, context.config, pose.frames, context.namespace)
     start = config.map_start_pose.pose if config.map_start_pose else in_map or context.start
     guess = _initial_guess(start, config.initial_pose_error, context.seed, context.handle.name)

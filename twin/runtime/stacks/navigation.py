@@ -55,6 +55,7 @@ def build_navigation(
     global_costmap = CostmapNode(bus, pose, in_map, namespace=namespace)
     around = with_filters(parameters.local_costmap, config, speed=True)
     local_costmap = CostmapNode(bus, pose, around, namespace=namespace)
+    smoothers = parameters.path_smoother.smoothers
     PlannerServerNode(
         bus,
         pose,
@@ -63,6 +64,8 @@ def build_navigation(
         server=parameters.planner_server,
         commitment=parameters.commitment,
         goal_access=parameters.goal_access,
+        # One that is asked for smooths what is planned, too.
+        smoother=next(iter(smoothers.values())) if config.smoother.model_fields_set else None,
         namespace=namespace,
     )
     SmootherServerNode(bus, global_costmap, parameters.path_smoother, namespace=namespace)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from twin.errors import ScenarioError
-from twin.nodes.navigation.localisation.ekf import EkfNode, EkfNodeConfig, for_robot
-from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource
+from twin.nodes.navigation.localisation.ekf import EkfNode
+from twin.nodes.navigation.localisation.ekf_config import KINDS, EkfNodeConfig, EkfSource, for_robot
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.ekf import ekf_with_file
@@ -87,10 +87,4 @@ def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNode
             sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
         except TypeError:
             raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
-    overrides = parameters.overrides()
-    if parameters.frequency is not None:
-        overrides["period_ns"] = round(1e9 / parameters.frequency)
-    if parameters.transform_time_offset is not None:
-        overrides["transform_time_offset_ns"] = round(parameters.transform_time_offset * 1e9)
-    ekf = overridden(config.ekf, overrides)
-    return replace(overridden(config, {**overrides, "sources": None}), ekf=ekf, sources=sources)
+    return replace(overridden(config, parameters.overrides()), sources=sources)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from twin.bridge.bus import Bus
 from twin.navigation.costmaps.filters import KEEPOUT_FILTER, SPEED_FILTER_PERCENT
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
 from twin.scenario.navigation import NavigationConfig

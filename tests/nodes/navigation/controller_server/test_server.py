@@ -26,14 +26,15 @@ from twin.bridge.msgs import (
 )
 from twin.bridge.parameters.values import Parameter
 from twin.geometry import Pose2
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 
 
 @pytest.fixture

@@ -21,8 +21,10 @@ from twin.bridge.msgs import (
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.nodes.messages import pose_stamped
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
-from twin.nodes.navigation.docking.server import DockingServerConfig, DockingServerNode
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
+from twin.nodes.navigation.docking.config import DockingServerConfig
+from twin.nodes.navigation.docking.server import DockingServerNode
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LOCAL_COSTMAP = CostmapNodeConfig(

@@ -27,7 +27,7 @@ from twin.geometry import Pose2
 from twin.navigation.docking.docks import Dock as DockEntry
 from twin.navigation.docking.docks import DockDatabase, DockType
 from twin.nodes.messages import pose_stamped
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 
 CHARGER = DockType(is_charger=True, face_width=0.6)
 

@@ -13,7 +13,7 @@ from twin.bridge.action_types import DockRobot, UndockRobot
 from twin.bridge.msgs import GoalStatus, new
 from twin.geometry import Pose2
 from twin.nodes.messages import pose_stamped
-from twin.nodes.navigation.docking.server import DockingServerConfig
+from twin.nodes.navigation.docking.config import DockingServerConfig
 
 
 def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:

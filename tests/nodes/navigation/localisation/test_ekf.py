@@ -28,8 +28,8 @@ from twin.controllers.diff_drive import DiffDriveConfig
 from twin.geometry import Pose2, Pose3
 from twin.navigation.localisation.ekf import SIZE, VX, VY, VYAW, X, Y
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
-from twin.nodes.navigation.localisation.ekf import EkfNode, EkfNodeConfig
-from twin.nodes.navigation.localisation.ekf_sources import EkfSource
+from twin.nodes.navigation.localisation.ekf import EkfNode
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
 from twin.nodes.transforms import TransformListenerNode
 
 

@@ -35,7 +35,8 @@ from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.navigation.mapping.slam import SlamConfig
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.nodes.navigation.mapping.slam_toolbox import SlamNodeConfig, SlamToolboxNode
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
+from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 
 pytestmark = pytest.mark.xdist_group("slam")
 

@@ -15,11 +15,14 @@ from twin.bridge.msgs import GoalStatus, Path, new
 from twin.bridge.srvs import IsPathValid
 from twin.geometry import Pose2
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
-from twin.navigation.planning.planner import ThetaStarConfig, path_length
+from twin.navigation.planning.config import ThetaStarConfig
+from twin.navigation.planning.planner import path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
-from twin.nodes.navigation.costmaps.costmap import CostmapNode, CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
-from twin.nodes.navigation.planning.planner_server import PlannerServerConfig, PlannerServerNode
+from twin.nodes.navigation.planning.config import PlannerServerConfig
+from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 from twin.nodes.navigation.planning.smoother_server import SmootherServerNode
 
 pytestmark = pytest.mark.xdist_group("planning")

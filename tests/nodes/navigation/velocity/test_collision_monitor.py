@@ -16,13 +16,8 @@ from twin.bridge.srvs import Toggle
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Pose2
-from twin.navigation.control.collision_monitor import (
-    Action,
-    CollisionMonitor,
-    CollisionMonitorConfig,
-    MonitorPolygon,
-    time_to_collision,
-)
+from twin.navigation.control.collision_monitor import Action, CollisionMonitor, time_to_collision
+from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorPolygon
 from twin.navigation.costmaps.footprint import rectangle
 from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 

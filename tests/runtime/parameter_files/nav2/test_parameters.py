@@ -17,7 +17,7 @@ from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
 from twin.navigation.docking.docks import Dock
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file, monitor_with_file
@@ -433,8 +433,8 @@ waypoint_follower: {ros__parameters: {loop_rate: 0}}
 """
     assert _said(tmp_path, text) == [
         "velocity_smoother: max_decel must be greater than 0, not 0.0",
-        "bt_navigator: bt_loop_duration must be greater than 0, not 0",
-        "waypoint_follower: loop_rate must be greater than 0, not 0",
+        "bt_navigator: bt_loop_duration must be at least 1 and at most 1000000, not 0",
+        "waypoint_follower: loop_rate must be at least 1 and at most 1000, not 0",
     ]
 
 
@@ -473,7 +473,7 @@ def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
 
 def test_what_a_scenario_gives_must_fit_together() -> None:
     assert overridden(AmclConfig(), {"min_particles": 900}).min_particles == 900
-    with pytest.raises(ScenarioError, match="amcl: min_particles is 5000, more than max_particles"):
+    with pytest.raises(ScenarioError, match="min_particles is 5000, more than max_particles"):
         overridden(AmclConfig(), {"min_particles": 5000})
 
 

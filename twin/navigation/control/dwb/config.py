@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from twin.parameters import (
+    Flat,
     Interval,
     Metres,
     MetresPerSecond,
@@ -125,6 +127,8 @@ class DWBConfig:
     """Whether a cusp of the path is driven to before what comes after it."""
     critics: tuple[str, ...] = CRITICS
     """Which of them score."""
+    own_critics: Annotated[Mapping[str, Any], Flat] = field(default_factory=dict)
+    """Parameters of critics that a user brings, by the names that `critics` has for them."""
     BaseObstacle: ObstacleConfig = field(default_factory=ObstacleConfig)
     ObstacleFootprint: ObstacleConfig = field(default_factory=ObstacleConfig)
     GoalAlign: AlignConfig = field(default_factory=lambda: AlignConfig(scale=24.0))

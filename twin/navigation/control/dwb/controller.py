@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2, wrap_angles
 from twin.navigation.control.controller import Controller, Situation
+from twin.navigation.control.critic import Trajectories
 from twin.navigation.control.dwb import kernels
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.dwb.oscillation import Oscillation
 from twin.navigation.control.footprint_cover import CoverOf
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
 from twin.navigation.failures import NoValidControl
+from twin.navigation.plugins import own_critics
 
 
 class DWB(Controller):
@@ -46,6 +48,7 @@ class DWB(Controller):
     def _build(self) -> None:
         config = self.config
         self._oscillation = Oscillation(config=config.Oscillation)
+        self._critics = own_critics(config)
         self._cover = CoverOf(self.footprint, consider_footprint="ObstacleFootprint" in config.critics)
         self._handler = PathHandler(
             config=PathHandlerConfig(
@@ -164,6 +167,10 @@ class DWB(Controller):
             if name in listed:
                 summed = getattr(critic, "sum_scores", False)
                 total += factor * critic.scale * raw[:, kernels.FOOTPRINT if summed else column]
+        if self._critics:
+            trajectories = _trajectories(samples, ends, now, local)
+            for critic in self._critics:
+                total += critic.score(trajectories)
         if "RotateToGoal" in listed and self._at_goal:
             allowed, score = self._rotate_to_goal(samples, ends, now, local)
             total += score
@@ -184,6 +191,19 @@ class DWB(Controller):
             return samples[:, 0] == 0.0, critic.scale * off
         slower = np.abs(samples[:, 0]) < abs(now.velocity[0])
         return slower, critic.scale * (samples[:, 0] ** 2 * critic.slowing_factor + off)
+
+
+def _trajectories(samples: Array, ends: Array, now: Situation, local: LocalPath) -> Trajectories:
+    """Return the samples as critics of users see them: with their ends, shape (n, 3), in the base frame."""
+    to_grid = now.at @ now.pose.inverse()
+    return Trajectories(
+        poses=np.column_stack([now.at.apply(ends[:, :2]), ends[:, 2] + now.at.yaw])[:, None, :],
+        commands=samples[:, None, :],
+        start=now.at,
+        velocity=now.velocity,
+        path=np.column_stack([to_grid.apply(local.poses[:, :2]), local.poses[:, 2] + to_grid.yaw]),
+        costmap=now.grid,
+    )
 
 
 def _with_zero(low: float, high: float, count: int) -> Array:

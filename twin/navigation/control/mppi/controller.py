@@ -156,6 +156,7 @@ class MPPI(Controller):
                 tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits.vx_max)),
                 cover=self._cover.on(grid),
             ),
+            costmap=grid,
             to_grid=to_grid,
         )
 
@@ -172,7 +173,7 @@ class MPPI(Controller):
             self._rollouts.simulate(scene, noise, self._mean, self._under_way)
             if self._rollouts.batch.hit.all():
                 return False
-            at = self._rollouts.score(scene)
+            at = self._rollouts.score(scene, noise, self._mean)
             self.carrot = float(scene.local.poses[at, 0]), float(scene.local.poses[at, 1])
             before = self._mean.copy()
             config = self.config

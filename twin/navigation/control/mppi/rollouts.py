@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.geometry import Array
+from twin.geometry import Array, Pose2
+from twin.navigation.control.critic import Trajectories
 from twin.navigation.control.footprint_cover import F32
 from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.arrays import Batch, Commands, Wanted
@@ -19,6 +20,7 @@ from twin.navigation.control.mppi.path_critics import (
 from twin.navigation.control.mppi.rollout_kernel import roll_out
 from twin.navigation.control.mppi.scene import Scene
 from twin.navigation.control.mppi.scoring import Totals
+from twin.navigation.plugins import own_critics
 
 
 class Rollouts:
@@ -27,6 +29,7 @@ class Rollouts:
     def __init__(self, config: MPPIConfig) -> None:
         self._config = config
         self._totals = Totals(config)
+        self._critics = own_critics(config)
         steps, batch = config.time_steps, config.batch_size
         self.batch = Batch(
             state=np.zeros((8, batch), dtype=np.float32),
@@ -70,8 +73,14 @@ class Rollouts:
             near_cost=np.float32(config.CostCritic.critical_cost),
         )
 
-    def score(self, scene: Scene) -> int:
-        """Write `total`; return the pose of the local path that the rollouts are drawn to."""
+    def score(self, scene: Scene, noise: F32, mean: F32) -> int:
+        """Write `total`; return the pose of the local path that the rollouts are drawn to.
+
+        Args:
+            scene: Where; as the others as for `simulate`.
+            noise: Shape (2, time_steps, batch_size).
+            mean: Shape (2, time_steps).
+        """
         config, length = self._config, scene.local.length
         state, points, raw, hit = self.batch
         stride = max(1, config.batch_size // 256)
@@ -87,7 +96,24 @@ class Rollouts:
             and not scene.local.reversing,
         }
         self._totals.write(raw, hit, active, self.total)
+        if self._critics:
+            trajectories = self._trajectories(scene, noise + mean[:, :, None])
+            for critic in self._critics:
+                self.total += critic.score(trajectories).astype(np.float32)
         return at
+
+    def _trajectories(self, scene: Scene, commands: F32) -> Trajectories:
+        """Return the rollouts as a user's critics see them; commands: shape (2, time_steps, batch)."""
+        corner = np.array([*scene.costmap.origin, 0.0])
+        x, y, yaw, v, w = map(float, scene.start)
+        return Trajectories(
+            poses=self.batch.points.transpose(2, 1, 0) + corner,
+            commands=commands.transpose(2, 1, 0).astype(np.float64),
+            start=Pose2(x + corner[0], y + corner[1], yaw),
+            velocity=(v, w),
+            path=scene.path.T + corner,
+            costmap=scene.costmap,
+        )
 
     def every(self, trajectories: int, steps: int) -> Array:
         """Return x, y from the costmap's corner [m] of every so many rollouts at every so many steps.

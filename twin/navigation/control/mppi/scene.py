@@ -11,6 +11,7 @@ from twin.navigation.control.footprint_cover import F32
 from twin.navigation.control.mppi.arrays import Ground, Limits
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.path_handler import LocalPath
+from twin.navigation.costmaps.costmap import Costmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,8 @@ class Scene:
     local: LocalPath
     limits: Limits
     ground: Ground
+    costmap: Costmap
+    """Of the ground, in its own frame."""
     to_grid: Pose2
     """From the path's frame to the costmap's corner."""
 

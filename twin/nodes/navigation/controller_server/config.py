@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from twin.navigation.control.goal_checker import GoalCheckerConfig
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.parameters import (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -23,10 +22,11 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.costmaps.layered_costmap import LayeredCostmap
 from twin.navigation.maps.occupancy_map import OCCUPIED
 from twin.navigation.odometry_watch import OdometryWatch
 from twin.navigation.warm_up import warm_up_costmap, warm_up_odometry_watch, warm_up_ranges
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filters import KeepoutFilterPart, SpeedFilterPart
 from twin.nodes.navigation.costmaps.messages import costmap_msg, occupancy_grid, polygon_msg
 from twin.nodes.navigation.costmaps.services import CostmapServices
@@ -49,27 +49,6 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
     ranges[silent] = no_return if inf_is_valid else np.nan
     ranges[ranges < message.range_min] = np.nan
     return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostmapNodeConfig:
-    """Rates, frame and inputs of a costmap."""
-
-    name: str
-    """global_costmap or local_costmap."""
-    frame: str
-    layers: CostmapConfig
-    scan_topics: tuple[str, ...] = ("scan",)
-    """Topics of sensor_msgs/LaserScan: the obstacle layer's `observation_sources`."""
-    range_topics: tuple[str, ...] = ()
-    """Topics of sensor_msgs/Range: the range sensor layer."""
-    keepout_filter_info_topic: str = ""
-    """Where the keep-out mask is announced; empty: no keep-out filter."""
-    speed_filter_info_topic: str = ""
-    """Where the mask of speed limits is announced; empty: no speed filter."""
-    speed_limit_topic: str = "speed_limit"
-    update_period_ns: int = 200_000_000
-    publish_period_ns: int = 1_000_000_000
 
 
 class _ScanSource:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import CostmapFilterInfo, header
 from twin.bridge.qos import LATCHED
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,12 +17,15 @@ class CostmapFilterInfoConfig:
     """Parameters of nav2_map_server's CostmapFilterInfoServer."""
 
     filter_info_topic: str = "costmap_filter_info"
-    type: int = 0
+    """Where the mask is announced."""
+    type: Annotated[int, Interval(ge=0, le=2)] = 0
     """0 keep-out, 1 speed in per cent, 2 speed in m/s."""
     mask_topic: str = "filter_mask"
-    base: float = 0.0
+    """Of the mask."""
+    base: Annotated[float, Interval(ge=-1e6, le=1e6)] = 0.0
     """A speed limit is base + multiplier * value of the mask."""
-    multiplier: float = 1.0
+    multiplier: Annotated[float, Interval(ge=-1e6, le=1e6)] = 1.0
+    """As `base` says."""
 
 
 class CostmapFilterInfoNode:

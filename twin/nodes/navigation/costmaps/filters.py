@@ -12,12 +12,12 @@ from twin.bridge.srvs import SetBool
 from twin.bridge.topics import Subscription
 from twin.errors import MapError
 from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap_config import KeepoutConfig
 from twin.navigation.costmaps.filters import (
     KEEPOUT_FILTER,
     NO_SPEED_LIMIT,
     SPEED_FILTER_ABSOLUTE,
     SPEED_FILTER_PERCENT,
-    KeepoutConfig,
     KeepoutFilter,
     SpeedFilter,
 )

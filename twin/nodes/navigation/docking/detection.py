@@ -9,7 +9,8 @@ from twin.bridge.msgs import LaserScan, PoseArray, PoseStamped, ns
 from twin.bridge.node import Node
 from twin.bridge.qos import SENSOR_DATA
 from twin.geometry import Pose2
-from twin.navigation.docking.dock_estimate import DockEstimate, DockEstimateConfig
+from twin.navigation.docking.config import DockEstimateConfig
+from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.docks import DockType
 from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose

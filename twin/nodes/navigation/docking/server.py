@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import BatteryState, new
 from twin.geometry import Array, Pose2
-from twin.navigation.docking.collision_check import DockCollisionConfig
-from twin.navigation.docking.dock_estimate import DockEstimateConfig
-from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
-from twin.navigation.docking.line_approach import LineApproachConfig
+from twin.navigation.docking.docks import Dock, DockError, DockType
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.docking.attempt import (
@@ -37,43 +34,13 @@ from twin.nodes.navigation.docking.attempt import (
     Attempt,
     Cancelled,
 )
+from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.nodes.navigation.docking.detection import DockDetection
 from twin.nodes.navigation.docking.drive import BlindError, DockDrive
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
 Work = Generator[None, None, Any]
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockingServerConfig:
-    """Parameters; names are those of opennav_docking, defaults too unless said otherwise."""
-
-    controller_period_ns: int = 60_000_000
-    """Nav2: 50 Hz."""
-    initial_perception_timeout_ns: int = 5_000_000_000
-    """For the first sight of the dock [ns]."""
-    wait_charge_timeout_ns: int = 5_000_000_000
-    """For charging to begin [ns]."""
-    dock_approach_timeout: float = 30.0
-    """For one approach [s]."""
-    max_retries: int = 3
-    """Approaches after the first one."""
-    dock_prestaging_tolerance: float = 0.15
-    """A robot so near to the staging pose is not driven there first [m]; Nav2: 0.5."""
-    database: DockDatabase = field(default_factory=DockDatabase)
-    estimate: DockEstimateConfig = field(default_factory=DockEstimateConfig)
-    dock: LineApproachConfig = field(default_factory=LineApproachConfig)
-    undock: LineApproachConfig = field(
-        default_factory=lambda: LineApproachConfig(
-            lateral_tolerance=0.2, yaw_tolerance=0.3, turn_first_above=0.3
-        )
-    )
-    controller: DockCollisionConfig = field(default_factory=DockCollisionConfig)
-
-
-NAMES = {"database": "", "types": "", "docks": ""}
-"""Levels of the config that are none of the parameters' names."""
 
 
 class DockingServerNode:
@@ -91,7 +58,7 @@ class DockingServerNode:
     ) -> None:
         self.node = bus.create_node("docking_server", namespace)
         self.config = config or DockingServerConfig()
-        declare_config(self.node, self.config, names=NAMES)
+        declare_config(self.node, self.config)
         self._robot_pose = robot_pose
         self._detection = DockDetection(self.node, robot_pose, self.config.estimate)
         self._current = 0.0

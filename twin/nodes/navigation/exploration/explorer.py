@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionClient
@@ -20,17 +21,19 @@ from twin.nodes.navigation.exploration.frontier_markers import frontier_markers
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat, Le, PeriodNs, Positive
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExplorerNodeConfig:
     """Rates, and what happens at the end; names are explore_lite's."""
 
-    planner_period_ns: int = 1_000_000_000
-    """Time between two choices [ns]."""
+    planner_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
+    """How often a frontier is chosen."""
     return_to_init: bool = False
     """Whether the robot drives back to where it was at first when nothing is left."""
-    explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
+    explorer: Annotated[ExplorerConfig, Flat] = field(default_factory=ExplorerConfig)
+    """Of the choice."""
 
 
 class ExplorerNode:
@@ -69,7 +72,7 @@ class ExplorerNode:
         self._home: Pose2 | None = None
         self._goal: ClientGoal | None = None
         self._paused = False
-        declare_config(node, self.config, names={"explorer": "", "frontiers": ""})
+        declare_config(node, self.config)
         self._status_publisher = node.create_publisher(ExploreStatus, "explore/status", LATCHED)
         self._markers = node.create_publisher(MarkerArray, "explore/frontiers", 10)
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from twin.nodes.navigation.localisation.amcl_status import amcl_status
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import DurationNs, Interval, Le, Metres, PeriodNs, Positive, Radians
 
 _SCAN_OVERDUE_NS = 200_000_000
 """map → odom is published without scans when none has come for so long; lidars scan more often [ns]."""
@@ -61,22 +62,22 @@ class InitialPose:
 class StartPose:
     """nav2_amcl's `initial_pose` parameters."""
 
-    x: float = 0.0
-    """[m]"""
-    y: float = 0.0
-    """[m]"""
-    z: float = 0.0
+    x: Metres = 0.0
+    """Position along x."""
+    y: Metres = 0.0
+    """Position along y."""
+    z: Metres = 0.0
     """Not used."""
-    yaw: float = 0.0
-    """[rad]"""
+    yaw: Radians = 0.0
+    """Rotation about z."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AmclNodeConfig:
     """Topics, rates and what is published; names are nav2_amcl's."""
 
-    transform_tolerance_ns: int = 150_000_000
-    """map → odom is stamped this far ahead, so that it holds until the next scan [ns]."""
+    transform_tolerance_ns: Annotated[DurationNs, Interval(ge=-60.0, le=60.0)] = 150_000_000
+    """map → odom is stamped this far ahead, so that it holds until the next scan."""
     tf_broadcast: bool = True
     """Whether map → odom is published."""
     set_initial_pose: bool = False
@@ -86,13 +87,15 @@ class AmclNodeConfig:
     first_map_only: bool = False
     """Whether later maps are ignored."""
     scan_topic: str = "scan"
+    """Of the lidar."""
     map_topic: str = "map"
-    particles_period_ns: int = 1_000_000_000
-    """Time between two particle clouds [ns]."""
-    particles_published: int = 100
+    """Of the map."""
+    particles_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
+    """How often the particles are published."""
+    particles_published: Annotated[int, Interval(ge=0, le=100_000)] = 100
     """At most so many particles are shown."""
-    diagnostics_period_ns: int = 1_000_000_000
-    """Time between two reports on `/diagnostics`; a scan must have come meanwhile [ns]."""
+    diagnostics_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
+    """How often `/diagnostics` are reported; a scan must have come meanwhile."""
 
 
 class AmclNode:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -31,55 +29,11 @@ from twin.bridge.srvs import SetEkfPose
 from twin.bridge.tf import TransformBroadcaster, TransformBuffer, TransformListener, transform_stamped
 from twin.geometry import Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
 from twin.navigation.localisation import ekf as states
-from twin.navigation.localisation.ekf import SIZE, Ekf, EkfConfig
+from twin.navigation.localisation.ekf import Ekf
 from twin.navigation.localisation.gyro_bias import GyroBias
-from twin.nodes.navigation.localisation.ekf_sources import KINDS, EkfSource, SourceReader
+from twin.nodes.navigation.localisation.ekf_config import KINDS, EkfNodeConfig, EkfSource
+from twin.nodes.navigation.localisation.ekf_sources import SourceReader
 from twin.nodes.node_parameters import declare_config
-
-
-def _which(*chosen: int) -> tuple[bool, ...]:
-    return tuple(state in chosen for state in range(SIZE))
-
-
-_WHEELS_AND_IMU = {
-    "odom0": EkfSource(topic="odom", config=_which(states.VX, states.VY, states.VYAW)),
-    "imu0": EkfSource(topic="imu", config=_which(states.VYAW)),
-}
-# Accelerations and turns of a driven robot: what it does within a tenth of a second is not foreseen.
-_ON_A_FLOOR = EkfConfig(
-    two_d_mode=True,
-    process_noise_covariance=(
-        *(1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-7),
-        *(1.0, 1e-3, 1e-3, 1e-3, 1e-3, 5.0),
-        *(1.0, 1.0, 1.0),
-    ),
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class EkfNodeConfig:
-    """Parameters; names are robot_localization's. Defaults fit a wheeled robot with an IMU."""
-
-    ekf: EkfConfig = _ON_A_FLOOR
-    period_ns: int = 20_000_000
-    """Between outputs; as `frequency` [Hz]."""
-    publish_tf: bool = True
-    transform_time_offset_ns: int = 0
-    """The transform is stamped this far ahead [ns]."""
-    map_frame: str = "map"
-    odom_frame: str = "odom"
-    base_link_frame: str = "base_footprint"
-    world_frame: str = "odom"
-    """Parent of the transform that is published."""
-    sources: Mapping[str, EkfSource] = field(default_factory=lambda: _WHEELS_AND_IMU)
-    """By robot_localization's names: `odomN`, `poseN`, `twistN`, `imuN`."""
-
-    def __post_init__(self) -> None:
-        for name in self.sources:
-            if not re.fullmatch(rf"({'|'.join(KINDS)})\d+", name):
-                raise ValueError(
-                    f"ekf_filter_node: no source is called '{name}'; valid are odom0, pose0, twist0, imu0..."
-                )
 
 
 class EkfNode:
@@ -212,27 +166,3 @@ def _parameters(config: EkfNodeConfig) -> dict[str, Any]:
             key = name if item.name == "topic" else f"{name}_{item.name}"
             found[key] = getattr(source, item.name)
     return found
-
-
-def for_robot(
-    odom_frame: str, base_frame: str, period_ns: int, imu: str, bias_stddev: float
-) -> EkfNodeConfig:
-    """Return the defaults for a robot's frames, its control period [ns], and its IMU.
-
-    Args:
-        odom_frame: Name.
-        base_frame: Name.
-        period_ns: [ns]
-        imu: Topic.
-        bias_stddev: Of its gyroscope [rad/s].
-    """
-    return EkfNodeConfig(
-        odom_frame=odom_frame,
-        world_frame=odom_frame,
-        base_link_frame=base_frame,
-        period_ns=period_ns,
-        sources={
-            **_WHEELS_AND_IMU,
-            "imu0": replace(_WHEELS_AND_IMU["imu0"], topic=imu, bias_stddev=bias_stddev),
-        },
-    )

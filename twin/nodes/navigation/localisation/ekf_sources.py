@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import ArrayLike
 from twin.bridge.conversions import pose3_from_pose
 from twin.bridge.msgs import (
     Imu,
-    Odometry,
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     TwistWithCovariance,
@@ -21,50 +19,11 @@ from twin.bridge.msgs import (
 from twin.bridge.tf import TransformBuffer, TransformError
 from twin.geometry import Array, Pose2, Pose3, matrix_from_quat_wxyz, rpy_from_quat_wxyz
 from twin.navigation.localisation import ekf as states
-from twin.navigation.localisation.ekf import SIZE
 from twin.navigation.localisation.gyro_bias import GyroBias
+from twin.nodes.navigation.localisation.ekf_config import EkfSource
 
-KINDS: dict[str, type[Any]] = {
-    "odom": Odometry,
-    "pose": PoseWithCovarianceStamped,
-    "twist": TwistWithCovarianceStamped,
-    "imu": Imu,
-}
-"""Message types by the beginning of a source's name: `odom0`, `imu1`."""
 _GRAVITY = 9.80665
 _SAME = Pose3.from_pose2(Pose2(0.0, 0.0, 0.0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class EkfSource:
-    """One source; of its parameters those count that its kind has.
-
-    Raises:
-        ValueError: the topic is empty, or `config` has not 15 truth values.
-    """
-
-    topic: str
-    config: tuple[bool, ...]
-    """Which of x y z, roll pitch yaw, their velocities, and accelerations to take from it."""
-    differential: bool = False
-    """Whether its pose counts by its changes only."""
-    relative: bool = False
-    """Whether its pose counts from its first one."""
-    pose_rejection_threshold: float = 1e9
-    """Mahalanobis distance; so are the next two."""
-    twist_rejection_threshold: float = 1e9
-    linear_acceleration_rejection_threshold: float = 1e9
-    queue_size: int = 10
-    """Messages that may wait until the filter looks at them."""
-    remove_gravitational_acceleration: bool = True
-    estimate_bias: bool = True
-    """Whether a gyroscope's bias is learnt while the wheels stand (robot_localization does not)."""
-    bias_stddev: float = 1e-3
-    """Standard deviation of that bias before it was learnt; its datasheet tells [rad/s]."""
-
-    def __post_init__(self) -> None:
-        if not self.topic or len(self.config) != SIZE:
-            raise ValueError(f"ekf_filter_node: a source needs a topic and a config of {SIZE} truth values")
 
 
 class Measurement(NamedTuple):

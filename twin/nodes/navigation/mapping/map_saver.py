@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import OccupancyGrid, new
@@ -17,20 +17,28 @@ from twin.navigation.maps.map_saver import SaveParameters, save_map
 from twin.navigation.maps.map_yaml import MODES
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import DurationNs, Fraction, Interval
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapSaverConfig:
     """Parameters of nav2_map_server's MapSaver."""
 
-    save_map_timeout_ns: int = 2_000_000_000
-    """How long a map is waited for [ns]."""
-    free_thresh_default: float = 0.25
-    """For requests that say 0."""
-    occupied_thresh_default: float = 0.65
-    """For requests that say 0."""
+    save_map_timeout_ns: Annotated[DurationNs, Interval(ge=0.0, le=1e6)] = 2_000_000_000
+    """How long a map is waited for."""
+    free_thresh_default: Annotated[float, Fraction] = 0.25
+    """Cells up to this share are free, for requests that say 0."""
+    occupied_thresh_default: Annotated[float, Fraction] = 0.65
+    """Cells from this share on are occupied, for requests that say 0."""
     map_subscribe_transient_local: bool = True
     """Whether a map that was published before is taken."""
+
+    def __post_init__(self) -> None:
+        if self.free_thresh_default >= self.occupied_thresh_default:
+            raise ValueError(
+                f"free_thresh_default is {self.free_thresh_default:g}, not less than "
+                f"occupied_thresh_default, {self.occupied_thresh_default:g}"
+            )
 
 
 class MapSaverNode:

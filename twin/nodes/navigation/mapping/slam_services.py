@@ -9,7 +9,7 @@ from twin.bridge.msgs import new
 from twin.bridge.srvs import DeserializePoseGraph, PauseSlam, ResetSlam, SaveSlamMap, SerializePoseGraph
 from twin.errors import MapError
 from twin.geometry import Pose2
-from twin.navigation.mapping.slam import Mode
+from twin.navigation.mapping.config import Mode
 
 if TYPE_CHECKING:
     from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,35 +25,17 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import GetMap
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.geometry import Pose2, Pose3
-from twin.navigation.mapping.slam import Mode, Slam, SlamConfig, SlamUpdate
+from twin.navigation.mapping.config import Mode
+from twin.navigation.mapping.slam import Slam, SlamUpdate
 from twin.navigation.mapping.warm_up import warm_up
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.diff_drive_controller import planar_covariance
+from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.mapping.graph_markers import graph_markers
 from twin.nodes.navigation.mapping.map_server import grid_msg
 from twin.nodes.navigation.mapping.slam_services import SlamServices
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlamNodeConfig:
-    """Rates of what is published, and what is known at the start; names are slam_toolbox's."""
-
-    mode: Mode = "mapping"
-    """mapping, or localization in a pose graph that stays as it is."""
-    map_file_name: str = ""
-    """A pose graph to go on with or to localise in; empty: nothing is known."""
-    map_start_pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The robot's pose in the map frame at the start: x, y [m], yaw [rad]."""
-    map_update_interval_ns: int = 5_000_000_000
-    """Time between two maps [ns]."""
-    transform_timeout_ns: int = 200_000_000
-    """map → odom is stamped this far ahead, so that it holds until the next scan [ns]."""
-    throttle_scans: int = 1
-    """Every so many scans one is looked at."""
-    scan_topic: str = "scan"
-    slam: SlamConfig = field(default_factory=SlamConfig)
 
 
 class SlamToolboxNode:
@@ -79,7 +60,7 @@ class SlamToolboxNode:
         self._count = 0
         self._started = False
         """Whether a scan was taken since everything was forgotten: the first one is shown at once."""
-        declare_config(node, self.config, names={"slam": ""})
+        declare_config(node, self.config)
         warm_up()
         self.slam = self._begin()
         self._tf = TransformBroadcaster(node)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,45 +18,45 @@ from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
 from twin.navigation.planning.alternatives import AlternativesConfig, other_way
-from twin.navigation.planning.commitment import CommitmentConfig, committed
-from twin.navigation.planning.goal_access import GoalAccess, GoalAccessConfig
+from twin.navigation.planning.commitment import committed
+from twin.navigation.planning.config import (
+    CommitmentConfig,
+    GoalAccessConfig,
+    SmootherConfig,
+    ThetaStarConfig,
+)
+from twin.navigation.planning.goal_access import GoalAccess
 from twin.navigation.planning.path_validity import blocked_poses
-from twin.navigation.planning.planner import GlobalPlanner, ThetaStarConfig
-from twin.navigation.planning.smoother import SimpleSmoother, SmootherConfig
-from twin.navigation.plugins import PLANNERS, config_of, create, plugin_of
+from twin.navigation.planning.planner import GlobalPlanner
+from twin.navigation.plugins import PLANNERS, SMOOTHERS, config_of, create, plugin_of
 from twin.navigation.warm_up import warm_up_planning
 from twin.nodes.messages import path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat, Name, ReadOnly
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlannerServerConfig:
-    """Parameters of the server itself."""
-
-    compute_alternatives: int = 0
-    """How many other ways are tried when a goal is asked for again from the same place, which tells that the
-    path could not be followed. For trees that plan anew only when they must."""
-    path_distance: float = 1.0
-    """A path farther from the robot than this is not valid: it was carried away, or localised anew [m]."""
-    same_place: float = 0.5
-    """How far the robot may have moved meanwhile [m]."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class PlannerParameters:
     """Parameters of the server and its plugins."""
 
-    planner_plugins: tuple[str, ...]
-    server: PlannerServerConfig
-    planner: Any
-    commitment: CommitmentConfig
-    goal_access: GoalAccessConfig
-    smoother: SmootherConfig
+    planner_plugins: Annotated[tuple[str, ...], ReadOnly]
+    """Names of the planners."""
+    server: Annotated[PlannerServerConfig, Flat]
+    """Of the server itself."""
+    planner: Annotated[Any, Name(DEFAULT_ID)]
+    """Of the planner that is used unless a request names another one."""
+    commitment: Annotated[CommitmentConfig, Name(DEFAULT_ID)]
+    """How strongly it stays with the last path."""
+    goal_access: Annotated[GoalAccessConfig, Flat]
+    """What becomes of goals that somebody stands on."""
+    smoother: Annotated[Any, Name("smoother")]
+    """How paths are smoothed."""
 
 
 _SHARED = ("tolerance", "allow_unknown")
@@ -87,7 +87,7 @@ class PlannerServerNode:
         *,
         config: Any = None,
         server: PlannerServerConfig | None = None,
-        smoother: SmootherConfig | None = None,
+        smoother: Any = None,
         commitment: CommitmentConfig | None = None,
         goal_access: GoalAccessConfig | None = None,
         namespace: str = "",
@@ -113,12 +113,7 @@ class PlannerServerNode:
         self._polygon = np.array(costmap.config.layers.polygon, order="C")
         self._access = GoalAccess(footprint=self._polygon)
         self._apply(parameters)
-        declare_config(
-            self.node,
-            parameters,
-            self._apply,
-            {"planner": DEFAULT_ID, "commitment": DEFAULT_ID, "goal_access": "", "server": ""},
-        )
+        declare_config(self.node, parameters, self._apply)
         self._publisher = self.node.create_publisher(Path, "plan", 1)
         self.node.create_service(IsPathValid, "is_path_valid", self._on_is_path_valid)
         ActionServer(self.node, ComputePathToPose, "compute_path_to_pose", self._to_pose)
@@ -133,7 +128,7 @@ class PlannerServerNode:
         self._server = parameters.server
         self._commitment = parameters.commitment
         self._access.config = parameters.goal_access
-        self._smoother = SimpleSmoother(config=parameters.smoother)
+        self._smoother = create(SMOOTHERS, parameters.smoother)
         if parameters.planner != self._configs[DEFAULT_ID]:
             self._configs[DEFAULT_ID] = parameters.planner
             self._planners[DEFAULT_ID] = self._made(parameters.planner)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -14,11 +14,12 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import duration, new
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
-from twin.navigation.planning.smoother import SavitzkyGolayConfig, SmootherConfig
+from twin.navigation.planning.config import SavitzkyGolayConfig, SmootherConfig
 from twin.navigation.plugins import SMOOTHERS, create
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Flat
 
 _INVALID_SMOOTHER, _IN_COLLISION, _INVALID_PATH = 501, 503, 505
 """Codes of nav2_msgs/action/SmoothPath."""
@@ -28,7 +29,7 @@ _INVALID_SMOOTHER, _IN_COLLISION, _INVALID_PATH = 501, 503, 505
 class SmootherServerConfig:
     """Parameters of the server's plugins by name; the first one is used unless a request names another."""
 
-    smoothers: Mapping[str, Any] = field(
+    smoothers: Annotated[Mapping[str, Any], Flat] = field(
         default_factory=lambda: {"simple_smoother": SmootherConfig(), "savitzky_golay": SavitzkyGolayConfig()}
     )
 
@@ -47,7 +48,7 @@ class SmootherServerNode:
         self.node = bus.create_node("smoother_server", namespace)
         self._costmap = costmap
         self._apply(config or SmootherServerConfig())
-        declare_config(self.node, config or SmootherServerConfig(), self._apply, {"smoothers": ""})
+        declare_config(self.node, config or SmootherServerConfig(), self._apply)
         ActionServer(self.node, SmoothPath, "smooth_path", self._execute)
 
     def _apply(self, config: SmootherServerConfig) -> None:

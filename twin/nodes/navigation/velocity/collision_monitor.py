@@ -16,12 +16,8 @@ from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
 from twin.geometry import Array, Pose2
-from twin.navigation.control.collision_monitor import (
-    INVALID_SOURCE,
-    Action,
-    CollisionMonitor,
-    CollisionMonitorConfig,
-)
+from twin.navigation.control.collision_monitor import INVALID_SOURCE, Action, CollisionMonitor
+from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig
 from twin.navigation.warm_up import warm_up_collision_monitor
 from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose

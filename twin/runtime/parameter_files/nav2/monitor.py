@@ -11,12 +11,12 @@ from pydantic import ValidationError
 from twin.runtime.parameter_files.nav2.checks import said_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.names import corners_of
-from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonConfig
+from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonParameters
 
 _NODE = "collision_monitor"
 _CIRCLE_CORNERS = 16
 _SERVER = ("polygons", "observation_sources", "source_timeout")
-_POLYGON = (*MonitorPolygonConfig.model_fields, "type", "radius", "enabled", "max_points")
+_POLYGON = (*MonitorPolygonParameters.model_fields, "type", "radius", "enabled", "max_points")
 _SENSOR = ("type", "topic", "enabled")
 _SENSORS = ("scan", "range")
 """Types of sources that are here."""
@@ -33,12 +33,14 @@ def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
     fitting = [name for name in active if values.get(f"{name}.type") != "velocity_polygon"]
     polygons = tuple(found for name in fitting if (found := _polygon(name, file, values)))
     try:
-        return CollisionMonitorParameters(
-            # A file of other polygons alone leaves the robot its usual guard.
-            polygons=polygons if fitting or not active else None,
-            source_timeout=values.get("source_timeout", 2.0),
-            scan_topics=_topics(file, values, "scan") or None,
-            range_topics=_topics(file, values, "range"),
+        return CollisionMonitorParameters.model_validate(
+            {
+                # A file of other polygons alone leaves the robot its usual guard.
+                "polygons": polygons if fitting or not active else None,
+                "source_timeout": values.get("source_timeout", 2.0),
+                "scan_topics": _topics(file, values, "scan") or None,
+                "range_topics": _topics(file, values, "range"),
+            }
         )
     except ValidationError as error:
         file.wrong(_NODE, str(error.errors()[0]["loc"][0]), said_of(error))
@@ -68,9 +70,9 @@ def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tupl
     )
 
 
-def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonConfig | None:
+def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonParameters | None:
     inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
-    given = {key: inside[key] for key in MonitorPolygonConfig.model_fields if key in inside}
+    given = {key: inside[key] for key in MonitorPolygonParameters.model_fields if key in inside}
     for key in ("radius", "max_points"):
         if key in inside and type(inside[key]) not in (int, float):
             file.wrong(_NODE, f"{name}.{key}", f"must be a number, not {inside[key]!r}")
@@ -85,9 +87,10 @@ def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> Moni
     if "max_points" in inside:
         given["min_points"] = inside["max_points"] + 1
     try:
-        return MonitorPolygonConfig.model_validate({**given, "name": name, "points": points})
+        return MonitorPolygonParameters.model_validate({**given, "name": name, "points": points})
     except ValidationError as error:
-        file.wrong(_NODE, f"{name}.{error.errors()[0]['loc'][0]}", said_of(error))
+        at = error.errors()[0]["loc"]
+        file.wrong(_NODE, f"{name}.{at[0]}" if at else name, said_of(error))
         return None
 
 

@@ -5,31 +5,22 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.costmaps.costmap import CostmapNodeConfig
-from twin.nodes.navigation.docking.server import NAMES as DOCKING_NAMES
+from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
+from twin.parameters import Flat
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
-from twin.runtime.parameter_files.nav2.checks import (
-    NavigatorParameters,
-    VelocitySmootherParameters,
-    WaypointFollowerParameters,
-)
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.controllers import ControllerParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
-from twin.scenario.planners import PlannerParameters
 
-_CONTROLLER_NAMES = dict.fromkeys(
-    ("controllers", "goal_checkers", "progress_checkers", "primary_controller"), ""
-)
 _CONTROLLERS = {
     "RegulatedPurePursuitController": "regulated_pure_pursuit",
     "DWBLocalPlanner": "dwb",
@@ -80,8 +71,8 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
 class AmclParameters:
     """All of `/amcl`."""
 
-    filter: AmclConfig
-    node: AmclNodeConfig
+    filter: Annotated[AmclConfig, Flat]
+    node: Annotated[AmclNodeConfig, Flat]
 
 
 def amcl_with_file(
@@ -102,7 +93,7 @@ def amcl_with_file(
     if params_file is None:
         return parameters, []
     file = Nav2Parameters(Path(params_file), namespace)
-    parameters = file.applied("amcl", parameters, {"filter": "", "node": ""}, keep=given)
+    parameters = file.applied("amcl", parameters, keep=given)
     return parameters, file.ignored()
 
 
@@ -150,7 +141,6 @@ def with_file(
             "velocity_smoother",
             parameters.smoother,
             keep=nav2_given.for_smoother(config),
-            limits=VelocitySmootherParameters,
         ),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
@@ -159,27 +149,21 @@ def with_file(
             parameters.planner,
             prefix="GridBased.",
             keep=nav2_given.for_planner(config.planner),
-            limits=PlannerParameters,
         ),
         controller_server=file.applied(
             "controller_server",
             parameters.controller_server,
-            _CONTROLLER_NAMES,
             keep=nav2_given.for_controllers(config),
-            limits=ControllerParameters,
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
-        docking=file.applied(
-            "docking_server", docking, DOCKING_NAMES, keep=nav2_given.for_docking(config.docking)
-        ),
-        path_smoother=file.applied("smoother_server", parameters.path_smoother, {"smoothers": ""}),
+        docking=file.applied("docking_server", docking, keep=nav2_given.for_docking(config.docking)),
+        path_smoother=file.applied("smoother_server", parameters.path_smoother),
         navigator=file.applied(
             "bt_navigator",
             parameters.navigator,
             keep=nav2_given.for_navigator(config.navigator),
-            limits=NavigatorParameters,
         ),
-        waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
+        waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
     navigator, told = with_trees(file, changed.navigator, nav2_given.for_navigator(config.navigator))
     changed = replace(changed, navigator=navigator)
@@ -196,7 +180,7 @@ def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapPara
         scan_topics=scans if scans and "scan_topics" not in keep else config.scan_topics,
         range_topics=ranges if ranges and "range_topics" not in keep else config.range_topics,
     )
-    changed = file.applied(node, config, {"layers": ""}, keep=keep, limits=CostmapParameters)
+    changed = file.applied(node, config, keep=keep)
     if file.is_round(node) and "robot_radius" not in keep:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))
     return changed
