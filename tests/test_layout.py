@@ -82,7 +82,9 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 MACHINE_PATH = re.compile(r"(?<![\w.>})/-])/(home|root|work|tmp|opt|Users|mnt|workspace)/\w")
-ADDRESS = re.compile(r"(--index-url|--extra-index-url|--find-links|/simple\b(?!\.py)|pypi\.|git\+)", re.IGNORECASE)
+ADDRESS = re.compile(
+    r"(--index-url|--extra-index-url|--find-links|/simple\b(?!\.py)|pypi\.|git\+)", re.IGNORECASE
+)
 
 
 def test_no_file_knows_the_machine_it_was_written_on() -> None:
