@@ -214,7 +214,7 @@ def test_a_bag_is_not_overwritten(tmp_path: Path) -> None:
 def test_a_full_disk_leaves_a_bag_that_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     writer = BagWriter(tmp_path / "bag")
     bags.fill(writer)
-    storage = writer._storage._writer  # type: ignore[attr-defined]
+    storage = writer._storage._output  # type: ignore[attr-defined]
 
     class Full:
         def __init__(self, file: object) -> None:

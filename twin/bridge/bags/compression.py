@@ -1,14 +1,20 @@
-"""Compression of chunks: what MCAP names '', 'zstd' and 'lz4'."""
+"""Compression of chunks and messages: what MCAP names '', 'zstd' and 'lz4'."""
 
 from __future__ import annotations
 
-import sys
-from typing import Any, Literal, cast, get_args
+from io import BytesIO
+from itertools import islice
+from typing import BinaryIO, Literal, cast, get_args
+
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
 
 from twin.errors import RecordingError, nearest
 
 Compression = Literal["none", "zstd", "lz4"]
-"""How chunks are compressed."""
+"""How a bag is compressed."""
+_PIECE = 1 << 20
+"""What a library takes memory for at once, whatever a file says of its size."""
 
 
 def as_compression(name: str) -> Compression:
@@ -22,51 +28,27 @@ def as_compression(name: str) -> Compression:
     return cast(Compression, name)
 
 
-def mcap_name(compression: Compression) -> str:
-    """Return the name that MCAP files use."""
-    return "" if compression == "none" else compression
-
-
-def compress(data: bytes, name: str) -> bytes:
-    """Compress with what MCAP names so."""
-    if name == "zstd":
-        return bytes(_zstd().compress(data))
-    if name == "lz4":
-        import lz4.frame  # type: ignore[import-untyped]
-
-        return bytes(lz4.frame.compress(data))
-    return data
-
-
 def decompress(data: bytes, name: str, size: int) -> bytes:
-    """Undo `compress`.
+    """Return what was compressed with what MCAP names so.
 
     Raises:
-        ValueError: an unknown name, damaged data, or not `size` bytes; never more than that are made.
+        ValueError: an unknown name, damaged data, or not `size` bytes; not much more than that are made.
     """
-    if name == "zstd":
-        zstd = _zstd()
+    if name:
         try:
-            data = zstd.ZstdDecompressor().decompress(data, max_length=size + 1)
-        except (zstd.ZstdError, OverflowError) as error:
-            raise ValueError(f"zstd: {error}") from error
-    elif name == "lz4":
-        import lz4.frame
-
-        try:
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-        except (RuntimeError, OverflowError) as error:
-            raise ValueError(f"lz4: {error}") from error
-    elif name:
-        raise ValueError(f"the compression {name!r} is not known")
+            with _reader(data, name) as stream:
+                pieces = iter(lambda: stream.read(_PIECE), b"")
+                data = b"".join(islice(pieces, size // _PIECE + 1))
+        except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+            raise ValueError(f"{name}: {error}") from error
     if len(data) != size:
-        raise ValueError(f"{len(data)} bytes or more instead of {size}")
+        raise ValueError(f"it does not have {size} bytes")
     return data
 
 
-def _zstd() -> Any:
-    if sys.version_info >= (3, 14):
-        from compression import zstd
-    else:
-        from backports import zstd
-    return zstd
+def _reader(data: bytes, name: str) -> BinaryIO:
+    if name == "zstd":
+        return zstandard.ZstdDecompressor().stream_reader(data)
+    if name == "lz4":
+        return cast(BinaryIO, lz4.frame.LZ4FrameFile(BytesIO(data)))
+    raise ValueError(f"the compression {name!r} is not known")

@@ -1,4 +1,4 @@
-"""Where a bag's messages come from: our own reader of MCAP, or rosbags' readers of everything else."""
+"""Where a bag's messages come from: our reader of MCAP, or rosbags' readers of everything else."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class McapSource:
         for file in self._files:
             names = {c.id: c.topic for c in file.channels.values() if _usable(c) and c.topic in topics}
             for m in file.messages(set(names), start_ns, end_ns):
-                yield BagMessage(names[m.channel_id], m.data, m.log_ns, m.publish_ns, m.sequence)
+                yield BagMessage(names[m.channel_id], m.data, m.log_time, m.publish_time, m.sequence)
 
     def attachment(self, name: str) -> bytes | None:
         """Return an attachment of the last file that has one of this name."""
-        found = [a.data for file in self._files if (a := file.attachment(name)) is not None]
+        found = [data for file in self._files if (data := file.attachment(name)) is not None]
         return found[-1] if found else None
 
     def close(self) -> None:

@@ -8,9 +8,10 @@ from __future__ import annotations
 import sqlite3
 from pathlib import Path
 
-from twin.bridge.bags import compression, metadata
+from zstandard import ZstdCompressor
+
+from twin.bridge.bags import metadata
 from twin.bridge.bags.compression import Compression
-from twin.bridge.bags.mcap.records import Attachment
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import to_yaml
 from twin.errors import RecordingError
@@ -47,7 +48,7 @@ class SqliteWriter:
         self.file = f"{folder.resolve().name}_0.db3"
         self.compression_mode = "" if how == "none" else "MESSAGE"
         self._path = folder / self.file
-        self._compression = compression.mcap_name(how)
+        self._compress = ZstdCompressor().compress if how == "zstd" else bytes
         self._ids: dict[str, int] = {}
         self._types: set[str] = set()
         self._flushed_ns: int | None = None
@@ -83,10 +84,10 @@ class SqliteWriter:
         if message.log_ns - self._flushed_ns >= _FLUSH_NS:
             self.flush()
             self._flushed_ns = message.log_ns
-        data = compression.compress(message.data, self._compression)
+        data = self._compress(message.data)
         self._insert("messages", None, self._ids[message.topic], message.log_ns, data)
 
-    def attach(self, attachment: Attachment) -> None:
+    def attach(self, log_ns: int, name: str, media_type: str, data: bytes) -> None:
         """Do nothing: there is no place for it."""
 
     def flush(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Protocol, Self, cast, get_args
@@ -11,10 +10,7 @@ from typing import Literal, Protocol, Self, cast, get_args
 from twin.bridge.bags import metadata
 from twin.bridge.bags.compression import Compression
 from twin.bridge.bags.definitions import complete
-from twin.bridge.bags.mcap.records import Attachment, Message
-from twin.bridge.bags.mcap.writer import McapConfig, McapWriter
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
-from twin.bridge.bags.offered_qos import to_yaml
 from twin.errors import RecordingError, nearest
 
 Storage = Literal["mcap", "sqlite3"]
@@ -56,7 +52,7 @@ class StorageWriter(Protocol):
     def write(self, message: BagMessage) -> None:
         """Append a message of a known topic."""
 
-    def attach(self, attachment: Attachment) -> None:
+    def attach(self, log_ns: int, name: str, media_type: str, data: bytes) -> None:
         """Append a file within the file, where the storage has such."""
 
     def flush(self) -> None:
@@ -110,7 +106,7 @@ class BagWriter:
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Append a file within the bag; other readers do not mind, SQLite bags have no place for it."""
-        self._storage.attach(Attachment(self._end_ns, name, media_type, data))
+        self._storage.attach(self._end_ns, name, media_type, data)
 
     def flush(self) -> None:
         """Make everything so far survive the end of this process.
@@ -164,53 +160,9 @@ class BagWriter:
         except OSError as fault:
             raise RecordingError(f"{self.folder}: cannot be written: {fault.strerror}") from fault
         if self.config.storage == "mcap":
-            return _McapStorage(self.folder, self.config)
+            from twin.bridge.bags.mcap.writer import McapWriter
+
+            return McapWriter(self.folder, self.config.compression, self.config.ros_distro)
         from twin.bridge.bags.sqlite_writer import SqliteWriter
 
         return SqliteWriter(self.folder, self.config.compression, self.config.ros_distro)
-
-
-class _McapStorage:
-    compression_mode = ""  # of chunks, which MCAP itself tells
-
-    def __init__(self, folder: Path, config: BagConfig) -> None:
-        self.file = f"{folder.resolve().name}_0.mcap"
-        library = f"twin {version('twin')}"
-        self._writer = McapWriter(
-            folder / self.file, McapConfig(library=library, compression=config.compression)
-        )
-        self._schemas: dict[tuple[str, str], int] = {}
-        self._channels: dict[str, int] = {}
-        # As rosbag2: readers of a file that has no end know its version and distribution.
-        self._tell(BagInfo(storage="mcap", files=(self.file,), ros_distro=config.ros_distro))
-
-    def add_topic(self, topic: BagTopic) -> None:
-        key = (topic.type, topic.definition)
-        if key not in self._schemas:
-            encoding = topic.definition_format if topic.definition else ""
-            self._schemas[key] = self._writer.add_schema(topic.type, encoding, topic.definition.encode())
-        self._channels[topic.name] = self._writer.add_channel(
-            topic.name,
-            self._schemas[key],
-            {"offered_qos_profiles": to_yaml(topic.qos), "topic_type_hash": topic.type_hash},
-        )
-
-    def write(self, message: BagMessage) -> None:
-        channel = self._channels[message.topic]
-        sequence = message.sequence & 0xFFFFFFFF
-        self._writer.write(Message(channel, sequence, message.log_ns, message.publish_ns, message.data))
-
-    def attach(self, attachment: Attachment) -> None:
-        self._writer.add_attachment(attachment)
-
-    def flush(self) -> None:
-        self._writer.flush()
-
-    def close(self, info: BagInfo) -> None:
-        try:
-            self._tell(info)
-        finally:
-            self._writer.close()
-
-    def _tell(self, info: BagInfo) -> None:
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(info)})

@@ -20,4 +20,4 @@ def graph(
     from twin.models.graph import graphviz, svg
 
     description = load(file, read)
-    write_drawing(output, lambda: graphviz(description), lambda: svg(description))
+    write_drawing(output, {".gv": lambda: graphviz(description), ".svg": lambda: svg(description)})

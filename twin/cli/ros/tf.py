@@ -51,7 +51,7 @@ def frames(
 
     with joining.open() as process:
         infos, now_ns = _listen(process, wait_time)
-    write_drawing(output, lambda: graphviz(infos, now_ns), lambda: svg(infos, now_ns))
+    write_drawing(output, {".gv": lambda: graphviz(infos, now_ns), ".svg": lambda: svg(infos, now_ns)})
 
 
 @app.command("echo", epilog="Example: [bold]twin tf echo map base_link --once[/bold]")

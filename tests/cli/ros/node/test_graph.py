@@ -1,10 +1,10 @@
-"""What is drawn of a graph, and that the drawing can be read: nothing lies on a label."""
+"""What is drawn of a graph: as text, for Graphviz and for Mermaid."""
 
 from __future__ import annotations
 
-import itertools
-import random
-from collections.abc import Iterator
+import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,9 +12,9 @@ import pytest
 
 from twin.bridge.graph import Graph
 from twin.bridge.wire.keys import mangle
-from twin.cli.ros.node.drawing import svg
-from twin.cli.ros.node.graph import GraphChoice, NodeGraph, Topic, graphviz, node_graph, text
-from twin.cli.ros.node.layout import GAP_Y, LINE_GAP, Edge, Layout, Size, lay_out
+from twin.cli.ros.node.graph import GraphChoice, NodeGraph, Topic, graphviz, mermaid, node_graph, text
+from twin.cli.ros.node.rendering import check_dot, svg
+from twin.errors import RecordingError
 
 TOPICS = (Path(__file__).with_name("warehouse_topics.txt")).read_text("utf-8").split("\n")
 """Of a run of scenarios/warehouse.yaml: 'MP /amcl /amcl_pose' is a publisher; NN is a node."""
@@ -58,7 +58,6 @@ def test_a_node_and_a_topic_of_one_name_are_two_boxes() -> None:
     assert '"n_/clock" -> "t_/clock";' in graphviz(graph)
 
 
-SVG = "{http://www.w3.org/2000/svg}"
 CHOICES = [
     GraphChoice(),
     GraphChoice(nodes_only=True),
@@ -67,60 +66,67 @@ CHOICES = [
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_the_drawing_of_the_warehouse_shows_every_label_once(choice: GraphChoice) -> None:
+def test_every_kind_of_text_has_every_label_and_arrow_once(choice: GraphChoice) -> None:
     graph = warehouse(choice)
-    drawing = svg(graph)
-    assert drawing == svg(warehouse(choice))
-    labels = [element.text for element in ElementTree.fromstring(drawing).iter(f"{SVG}text")]
-    topics = [] if choice.nodes_only else [topic.name for topic in graph.topics]
-    assert sorted(filter(None, labels)) == sorted([*graph.nodes, *topics])
+    topics = [] if choice.nodes_only else graph.topics
+    labels = sorted([*graph.nodes, *(topic.name for topic in topics)])
+    arrows = sum(len(topic.publishers) + len(topic.subscribers) for topic in topics) or len(
+        graph.connections()
+    )
+    dot = graphviz(graph)
+    assert sorted(re.findall(r'^"[nt]_\S+" \[label="(.*)"\];$', dot, re.MULTILINE)) == labels
+    assert len(re.findall(r'^"[nt]_\S+" -> "[nt]_\S+"', dot, re.MULTILINE)) == arrows
+    chart = mermaid(graph)
+    shapes = dict(re.findall(r'^(\w+)[(\[]+"(.*)"[)\]]+$', chart, re.MULTILINE))
+    assert sorted(shapes.values()) == labels
+    ends = re.findall(r"^(\w+) -->(?:\|.*\|)? (\w+)$", chart, re.MULTILINE)
+    assert len(ends) == len(set(ends)) == arrows
+    assert {end for pair in ends for end in pair} <= set(shapes)
+    assert chart == mermaid(warehouse(choice))
 
 
-def test_an_empty_graph_can_be_drawn() -> None:
+def test_a_chart_leads_from_the_publisher_by_the_topic_to_who_hears_it() -> None:
+    graph = NodeGraph(
+        nodes=("/ear", "/mouth"),
+        topics=(Topic(name="/words", type="t", publishers=("/mouth",), subscribers=("/ear",)),),
+        choice=GraphChoice(),
+    )
+    boxes = 'flowchart LR\nn0(["/ear"])\nn1(["/mouth"])\n'
+    assert mermaid(graph) == boxes + 't0["/words"]\nn1 --> t0\nt0 --> n0\n'
+    assert mermaid(replace(graph, choice=GraphChoice(nodes_only=True))) == boxes + 'n1 -->|"/words"| n0\n'
+
+
+def test_names_cannot_end_a_label() -> None:
+    evil = 'a"];\\'
+    graph = NodeGraph(nodes=(evil,), topics=(), choice=GraphChoice())
+    assert r'"n_a\"];\\" [label="a\"];\\"];' in graphviz(graph).splitlines()
+    assert mermaid(graph).splitlines()[1] == 'n0(["a#quot;];\\"])'
+
+
+def test_an_empty_graph_has_no_lines() -> None:
     empty = NodeGraph(nodes=(), topics=(), choice=GraphChoice())
-    ElementTree.fromstring(svg(empty))
-    assert text(empty) == ""
+    assert (text(empty), mermaid(empty)) == ("", "flowchart LR\n")
 
 
-def random_graph(seed: int) -> tuple[list[Size], list[Edge]]:
-    """Return up to 40 vertices and edges that cross layers, close cycles and skip vertices."""
-    numbers = random.Random(seed)
-    count = numbers.randint(2, 40)
-    sizes = [(float(numbers.randint(40, 300)), 30.0) for _ in range(count)]
-    pairs = {(numbers.randrange(count), numbers.randrange(count)) for _ in range(numbers.randint(1, 70))}
-    return sizes, sorted((a, b) for a, b in pairs if (a != b and (b, a) not in pairs) or a < b)
+def program(folder: Path, script: str) -> None:
+    folder.joinpath("dot").write_text(f"#!/bin/sh\n{script}\n")
+    folder.joinpath("dot").chmod(0o755)
 
 
-def lines_of(layout: Layout) -> Iterator[tuple[Edge, tuple[float, float, float]]]:
-    """Yield the straight parts of edges: from x0 to x1 at y; what is between them is between layers."""
-    for edge, points in layout.paths.items():
-        for point in points:
-            yield edge, (min(point.x0, point.x1), max(point.x0, point.x1), point.y)
+def test_a_picture_is_what_dot_makes_of_the_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    program(tmp_path, 'echo "$@"; cat')
+    check_dot(tmp_path / "graph.svg")
+    assert svg("digraph {}\n") == "-Tsvg\ndigraph {}\n"
+    program(tmp_path, "echo Error: syntax error in line 1 >&2; exit 1")
+    with pytest.raises(RecordingError, match=r"^dot cannot draw the graph: Error: syntax error in line 1$"):
+        svg("nonsense")
+    monkeypatch.setenv("PATH", str(tmp_path / "nowhere"))
+    with pytest.raises(RecordingError, match=r"graph.svg: .* package graphviz, which is not installed"):
+        check_dot(tmp_path / "graph.svg")
 
 
-@pytest.mark.parametrize("seed", range(25))
-def test_labels_do_not_touch_and_no_edge_crosses_one(seed: int) -> None:
-    sizes, edges = random_graph(seed)
-    layout = lay_out(sizes, edges)
-    assert set(layout.paths) == set(edges)
-    boxes = [(x - w / 2, x + w / 2, y, h) for (x, y), (w, h) in zip(layout.places, sizes, strict=True)]
-    for (l0, r0, y0, h), (l1, r1, y1, _) in itertools.combinations(boxes, 2):
-        assert r0 <= l1 or r1 <= l0 or abs(y0 - y1) >= h + GAP_Y - 1e-6
-    for edge, (x0, x1, y) in lines_of(layout):
-        for v, (left, right, middle, height) in enumerate(boxes):
-            if v not in edge:
-                assert x1 <= left or right <= x0 or abs(y - middle) >= height / 2 + LINE_GAP - 1e-6
-
-
-def test_edges_lead_from_left_to_right_but_for_one_of_a_cycle() -> None:
-    sizes = [(50.0, 30.0)] * 4
-    layout = lay_out(sizes, [(0, 1), (1, 2), (2, 0), (2, 3)])
-    assert len(layout.turned) == 1
-    for (a, b), points in layout.paths.items():
-        rightwards = points[0].x0 < points[-1].x1
-        assert rightwards is ((a, b) not in layout.turned)
-
-
-def test_a_chain_is_one_straight_line() -> None:
-    layout = lay_out([(60.0, 30.0)] * 5, [(0, 1), (1, 2), (2, 3), (3, 4)])
-    assert {round(y, 6) for _, y in layout.places} == {15.0}
+@pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
+@pytest.mark.parametrize("choice", CHOICES)
+def test_graphviz_takes_our_text(choice: GraphChoice) -> None:
+    ElementTree.fromstring(svg(graphviz(warehouse(choice))))

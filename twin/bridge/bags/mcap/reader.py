@@ -1,4 +1,9 @@
-"""Reads MCAP files: by their summary, or by looking through them where it is missing or wrong."""
+"""Reads MCAP files: by their summary, or by looking through them where it is missing or wrong.
+
+The records are those of the library `mcap`. Its own readers stop at what a crash left unfinished, and take as
+much memory for a chunk as the chunk says; here a torn file is read to its last whole record, and a chunk that
+says one thing and is another costs an error.
+"""
 
 from __future__ import annotations
 
@@ -6,28 +11,53 @@ import heapq
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from struct import Struct
+from typing import Any, BinaryIO, NamedTuple
 
-from twin.bridge.bags.compression import decompress
-from twin.bridge.bags.mcap.fields import Fields
-from twin.bridge.bags.mcap.records import (
-    FOOTER_SIZE,
-    MAGIC,
-    RECORD_HEAD,
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import (
     Attachment,
+    AttachmentIndex,
     Channel,
-    ChunkHead,
+    Chunk,
     ChunkIndex,
+    Footer,
+    McapRecord,
     Message,
-    Op,
+    Metadata,
+    MetadataIndex,
     Schema,
     Statistics,
 )
+from mcap.writer import MCAP0_MAGIC as MAGIC
+
+from twin.bridge.bags.compression import decompress
 from twin.errors import RecordingError
 from twin.files.reading import open_file
 
+_HEAD = Struct("<BQ")
+"""Opcode and length of a record."""
+_MESSAGE = Struct("<HIQQ")
+_FOOTER_SIZE = _HEAD.size + 20
 _LARGEST_RECORD = 1 << 32
+
+_KINDS: dict[int, Any] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.CHUNK: Chunk,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.ATTACHMENT: Attachment,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA: Metadata,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.FOOTER: Footer,
+}
+"""What is read; other records are passed over."""
 
 
 class _Block(NamedTuple):
@@ -49,19 +79,9 @@ class McapReader:
             RecordingError: not an MCAP file, or it cannot be read.
         """
         self.path = path
-        self.profile = ""
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.counts: Counter[int] = Counter()
-        """Messages by channel."""
-        self.start_ns, self.end_ns = 0, 0
-        """Log time of the first and the last message [ns]."""
-        self.metadata: dict[str, dict[str, str]] = {}
-        """By name; of several of a name the last."""
         self.damage = ""
         """Empty, or one clause such as 'ends in the middle of a chunk'."""
-        self._blocks: list[_Block] = []
-        self._attachments: dict[str, tuple[int, int]] = {}
+        self._forget()
         try:
             self._file: BinaryIO = open_file(path)
             self._size = path.stat().st_size
@@ -90,107 +110,110 @@ class McapReader:
             # Nothing in this or a later block is earlier than its start.
             while waiting and waiting[0][0] < block.start_ns:
                 yield heapq.heappop(waiting)[3]
-            for number, message in enumerate(self._block(block)):
-                if (channels is None or message.channel_id in channels) and first <= message.log_ns <= last:
-                    heapq.heappush(waiting, (message.log_ns, block.offset, number, message))
+            for number, message in enumerate(self._messages_of(block)):
+                if (channels is None or message.channel_id in channels) and first <= message.log_time <= last:
+                    heapq.heappush(waiting, (message.log_time, block.offset, number, message))
         while waiting:
             yield heapq.heappop(waiting)[3]
 
-    def attachment(self, name: str) -> Attachment | None:
+    def attachment(self, name: str) -> bytes | None:
         """Return the last attachment of that name, None if there is none."""
         if name not in self._attachments:
             return None
-        offset, length = self._attachments[name]
-        return Attachment.parse(self._read(offset + RECORD_HEAD.size, length - RECORD_HEAD.size))
+        attachment: Attachment = self._record_at(*self._attachments[name])
+        return attachment.data
 
     def close(self) -> None:
         """Close the file. Harmless when repeated."""
         self._file.close()
 
+    def _forget(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.counts: Counter[int] = Counter()
+        """Messages by channel."""
+        self.start_ns, self.end_ns = 0, 0
+        """Log time of the first and the last message [ns]."""
+        self.metadata: dict[str, dict[str, str]] = {}
+        """By name; of several of a name the last."""
+        self._blocks: list[_Block] = []
+        self._attachments: dict[str, tuple[int, int]] = {}
+
     def _open(self) -> None:
-        head = self._read(0, min(len(MAGIC) + RECORD_HEAD.size, self._size))
+        head = self._read(0, min(len(MAGIC) + _HEAD.size, self._size))
         if not head:
             raise RecordingError(f"{self.path}: is empty")
         if not head.startswith(MAGIC[: len(head)]):
             raise RecordingError(f"{self.path}: is not an MCAP file")
         try:
             self._read_summary()
-            return
-        except (ValueError, UnicodeDecodeError) as fault:
+        except ValueError as fault:
             self.damage = str(fault)
-        for state in (self.schemas, self.channels, self.counts, self.metadata, self._attachments):
-            state.clear()
-        self._blocks.clear()
-        self._scan()
+            self._forget()
+            self._scan()
 
     def _read_summary(self) -> None:
         """Read the summary; raises ValueError if there is none that can be trusted."""
-        if self._size < len(MAGIC) + FOOTER_SIZE + len(MAGIC):
+        if self._size < len(MAGIC) + _FOOTER_SIZE + len(MAGIC):
             raise ValueError("ends too early")
-        end = self._size - len(MAGIC) - FOOTER_SIZE
-        tail = self._read(end, FOOTER_SIZE + len(MAGIC))
+        end = self._size - len(MAGIC) - _FOOTER_SIZE
+        tail = self._read(end, _FOOTER_SIZE + len(MAGIC))
         if not tail.endswith(MAGIC):
             raise ValueError("ends in the middle: its writer was stopped")
-        f = Fields(tail[RECORD_HEAD.size :])
-        start, _, crc = f.u64(), f.u64(), f.u32()
-        if start == 0:
+        footer: Footer = _parse(Opcode.FOOTER, tail[_HEAD.size : _FOOTER_SIZE])
+        if footer.summary_start == 0:
             raise ValueError("")  # allowed
-        if start > end:
+        if footer.summary_start > end:
             raise ValueError("has a damaged footer")
-        summary = self._read(start, end - start)
-        if crc and zlib.crc32(summary + tail[: FOOTER_SIZE - 4]) != crc:
+        summary = self._read(footer.summary_start, end - footer.summary_start)
+        if footer.summary_crc and zlib.crc32(summary + tail[: _FOOTER_SIZE - 4]) != footer.summary_crc:
             raise ValueError("has a damaged summary")
         statistics = None
-        self._profile()
         for op, content in _records(summary):
-            if op == Op.SCHEMA:
-                self._add_schema(content)
-            elif op == Op.CHANNEL:
-                self._add_channel(content)
-            elif op == Op.CHUNK_INDEX:
-                index = ChunkIndex.parse(content)
-                self._blocks.append(_Block(index.start_ns, index.end_ns, index.offset, index.length))
-            elif op == Op.STATISTICS:
-                statistics = Statistics.parse(content)
-            elif op == Op.METADATA_INDEX:
-                f = Fields(content)
-                offset, length = f.u64(), f.u64()
-                self._add_metadata(self._read(offset + RECORD_HEAD.size, length - RECORD_HEAD.size))
-            elif op == Op.ATTACHMENT_INDEX:
-                f = Fields(content)
-                offset, length, _ = f.u64(), f.u64(), f.take(24)
-                self._attachments[f.text()] = (offset, length)
-        if (
-            statistics is None
-            or len(self._blocks) != statistics.chunks
-            or len(self.channels) != statistics.channels
+            record = _parse(op, content)
+            if isinstance(record, ChunkIndex):
+                self._blocks.append(
+                    _Block(
+                        record.message_start_time,
+                        record.message_end_time,
+                        record.chunk_start_offset,
+                        record.chunk_length,
+                    )
+                )
+            elif isinstance(record, Statistics):
+                statistics = record
+            elif isinstance(record, MetadataIndex):
+                self._keep(self._record_at(record.offset, record.length))
+            elif isinstance(record, AttachmentIndex):
+                self._attachments[record.name] = (record.offset, record.length)
+            else:
+                self._keep(record)
+        if statistics is None or (len(self._blocks), len(self.channels)) != (
+            statistics.chunk_count,
+            statistics.channel_count,
         ):
             raise ValueError("has an incomplete summary")
-        if statistics.messages and not self._blocks:
+        if statistics.message_count and not self._blocks:
             raise ValueError("")  # written without chunks: no damage, but no index either
-        self.counts.update(statistics.by_channel)
-        self.start_ns, self.end_ns = statistics.start_ns, statistics.end_ns
-
-    def _profile(self) -> None:
-        op, length = RECORD_HEAD.unpack(self._read(len(MAGIC), RECORD_HEAD.size))
-        if op == Op.HEADER and length < 1 << 16:
-            self.profile = Fields(self._read(len(MAGIC) + RECORD_HEAD.size, length)).text()
+        self.counts.update(statistics.channel_message_counts)
+        self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
 
     def _scan(self) -> None:
         """Look through the records up to the first that is not whole."""
         at = len(MAGIC)
         times: list[int] = []
-        while at + RECORD_HEAD.size <= self._size:
-            op, length = RECORD_HEAD.unpack(self._read(at, RECORD_HEAD.size))
-            whole = RECORD_HEAD.size + length
-            if op == Op.DATA_END or op == Op.FOOTER:
+        while at + _HEAD.size <= self._size:
+            op, length = _HEAD.unpack(self._read(at, _HEAD.size))
+            whole = _HEAD.size + length
+            if op in (Opcode.DATA_END, Opcode.FOOTER):
                 break
             if at + whole > self._size or length > _LARGEST_RECORD:
                 self.damage = self.damage or "ends in the middle"
                 break
             try:
-                self._scan_record(op, at, whole, times)
-            except (ValueError, UnicodeDecodeError) as fault:
+                if op != Opcode.MESSAGE_INDEX:
+                    self._scan_record(op, at, whole, times)
+            except ValueError as fault:
                 self.damage = f"is damaged at byte {at}: {fault}"
                 break
             at += whole
@@ -198,63 +221,48 @@ class McapReader:
             self.start_ns, self.end_ns = min(times), max(times)
 
     def _scan_record(self, op: int, at: int, whole: int, times: list[int]) -> None:
-        if op in (Op.MESSAGE_INDEX, Op.ATTACHMENT):
-            if op == Op.ATTACHMENT:
-                attachment = Attachment.parse(self._read(at + RECORD_HEAD.size, whole - RECORD_HEAD.size))
-                self._attachments[attachment.name] = (at, whole)
-            return
-        content = self._read(at + RECORD_HEAD.size, whole - RECORD_HEAD.size)
-        if op == Op.HEADER:
-            self.profile = Fields(content).text()
-        elif op == Op.CHUNK:
-            head = ChunkHead.parse(content)
-            for inner, data in _records(_unpacked(head)):
-                self._scan_content(inner, data, times)
-            self._blocks.append(_Block(head.start_ns, head.end_ns, at, whole))
-        elif op == Op.METADATA:
-            self._add_metadata(content)
+        record = _parse(op, self._read(at + _HEAD.size, whole - _HEAD.size))
+        if isinstance(record, Attachment):
+            self._attachments[record.name] = (at, whole)
+        elif isinstance(record, Chunk):
+            for inner, content in _records(_unpacked(record)):
+                self._keep(_parse(inner, content), times)
+            self._blocks.append(_Block(record.message_start_time, record.message_end_time, at, whole))
         else:
-            self._scan_content(op, content, times)
-            if op == Op.MESSAGE:
-                self._blocks.append(_Block(times[-1], times[-1], at, whole))
+            self._keep(record, times)
+            if isinstance(record, Message):
+                self._blocks.append(_Block(record.log_time, record.log_time, at, whole))
 
-    def _scan_content(self, op: int, content: bytes, times: list[int]) -> None:
-        if op == Op.SCHEMA:
-            self._add_schema(content)
-        elif op == Op.CHANNEL:
-            self._add_channel(content)
-        elif op == Op.MESSAGE:
-            message = Message.parse(content)
-            self.counts[message.channel_id] += 1
-            times.append(message.log_ns)
+    def _keep(self, record: McapRecord | None, times: list[int] | None = None) -> None:
+        """Take in what a record tells; `times` gathers those of messages."""
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+        elif isinstance(record, Metadata):
+            self.metadata[record.name] = record.metadata
+        elif isinstance(record, Message) and times is not None:
+            self.counts[record.channel_id] += 1
+            times.append(record.log_time)
 
-    def _add_schema(self, content: bytes) -> None:
-        schema = Schema.parse(content)
-        self.schemas[schema.id] = schema
-
-    def _add_channel(self, content: bytes) -> None:
-        channel = Channel.parse(content)
-        self.channels[channel.id] = channel
-
-    def _add_metadata(self, content: bytes) -> None:
-        f = Fields(content)
-        name = f.text()
-        self.metadata[name] = f.text_map()
-
-    def _block(self, block: _Block) -> Iterator[Message]:
-        op, _ = RECORD_HEAD.unpack(self._read(block.offset, RECORD_HEAD.size))
-        content = self._read(block.offset + RECORD_HEAD.size, block.length - RECORD_HEAD.size)
+    def _messages_of(self, block: _Block) -> Iterator[Message]:
         try:
-            if op == Op.MESSAGE:
-                yield Message.parse(content)
-                return
-            for inner, data in _records(_unpacked(ChunkHead.parse(content))):
-                if inner == Op.MESSAGE:
-                    yield Message.parse(data)
+            record = self._record_at(block.offset, block.length)
+            if isinstance(record, Message):
+                yield record
+            elif isinstance(record, Chunk):
+                for op, content in _records(_unpacked(record)):
+                    if op == Opcode.MESSAGE:
+                        yield _parse(op, content)
         except ValueError as fault:
             raise RecordingError(
                 f"{self.path}: the chunk at byte {block.offset} is damaged: {fault}"
             ) from fault
+
+    def _record_at(self, offset: int, length: int) -> Any:
+        """Return the record of `length` bytes at an offset; raises ValueError if there is none."""
+        data = self._read(offset, length)
+        return _parse(data[0], data[_HEAD.size :]) if data else None
 
     def _read(self, offset: int, size: int) -> bytes:
         try:
@@ -267,21 +275,44 @@ class McapReader:
         return data
 
 
+class _Fields(ReadDataStream):
+    """The content of a record; raises ValueError where fields go beyond it."""
+
+    def read(self, length: int) -> bytes:
+        try:
+            data = super().read(length)
+        except EndOfFile:
+            data = b""
+        if len(data) != length:
+            raise ValueError("a record ends too early")
+        return data
+
+
+def _parse(op: int, content: bytes) -> Any:
+    """Return a record, None for one of a kind that is not read; raises ValueError if it is none."""
+    if op == Opcode.MESSAGE:  # most records are: in one go
+        if len(content) < _MESSAGE.size:
+            raise ValueError("a record ends too early")
+        channel, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(content)
+        return Message(channel, log_ns, content[_MESSAGE.size :], publish_ns, sequence)
+    return _KINDS[op].read(_Fields(BytesIO(content))) if op in _KINDS else None
+
+
 def _records(data: bytes) -> Iterator[tuple[int, bytes]]:
     at = 0
     while at < len(data):
-        if at + RECORD_HEAD.size > len(data):
+        if at + _HEAD.size > len(data):
             raise ValueError("a record has no head")
-        op, length = RECORD_HEAD.unpack_from(data, at)
-        at += RECORD_HEAD.size
+        op, length = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
         if at + length > len(data):
             raise ValueError("a record ends too late")
         yield op, data[at : at + length]
         at += length
 
 
-def _unpacked(head: ChunkHead) -> bytes:
-    data = decompress(head.packed, head.compression, head.size)
-    if head.crc and zlib.crc32(data) != head.crc:
+def _unpacked(chunk: Chunk) -> bytes:
+    data = decompress(chunk.data, chunk.compression, chunk.uncompressed_size)
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError("the checksum is wrong")
     return data

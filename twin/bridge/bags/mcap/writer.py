@@ -2,107 +2,89 @@
 
 from __future__ import annotations
 
-import zlib
-from collections import Counter
-from dataclasses import dataclass
+import sys
+from importlib.metadata import version
 from io import FileIO
 from pathlib import Path
+from typing import Any
 
-from twin.bridge.bags.compression import Compression, compress, mcap_name
-from twin.bridge.bags.mcap.fields import text, text_map
-from twin.bridge.bags.mcap.records import (
-    MAGIC,
-    Attachment,
-    Channel,
-    ChunkHead,
-    ChunkIndex,
-    Message,
-    Op,
-    Schema,
-    Statistics,
-    footer,
-    message_index,
-    metadata_index,
-    record,
-    summary_offset,
-)
+from mcap.writer import CompressionType, Writer
+
+from twin.bridge.bags import metadata
+from twin.bridge.bags.compression import Compression
+from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
+from twin.bridge.bags.offered_qos import to_yaml
 from twin.errors import RecordingError
 
-
-@dataclass(frozen=True, kw_only=True)
-class McapConfig:
-    """How a file is written."""
-
-    library: str = "twin"
-    compression: Compression = "none"
-    chunk_bytes: int = 1 << 20
-    """A chunk is written when it has so many bytes ..."""
-    chunk_ns: int = 500_000_000
-    """... or when its messages span so much log time [ns]; only the chunk in work is lost in a crash."""
+_CHUNK_BYTES = 1 << 20
+"""A chunk is written when its messages have so many bytes ..."""
+_CHUNK_NS = 500_000_000
+"""... or span so much log time [ns]; only the chunk in work is lost in a crash."""
+_COMPRESSION = {"none": CompressionType.NONE, "zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4}
 
 
 class McapWriter:
-    """Appends messages; each chunk goes to the operating system in one write, followed by its index."""
+    """The file of a bag."""
 
-    def __init__(self, path: Path, config: McapConfig | None = None) -> None:
-        """Create the file.
+    compression_mode = ""  # of chunks, which MCAP itself tells
+
+    def __init__(self, folder: Path, how: Compression, ros_distro: str) -> None:
+        """Create it.
 
         Raises:
             RecordingError: it cannot be written, or exists.
         """
-        self.path = path
-        self.config = config or McapConfig()
-        self.size = 0
-        """Bytes in the file."""
-        self._compression = mcap_name(self.config.compression)
-        self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Channel] = {}
-        self._counts: Counter[int] = Counter()
-        self._chunks: list[ChunkIndex] = []
-        self._start_ns, self._end_ns = 0, 0
-        self._attachments: list[bytes] = []
-        self._metadata: list[bytes] = []
-        self._chunk_start = self._chunk_end = 0
-        self._begin_chunk()
-        self._file = _create(path)
-        self._append(MAGIC + record(Op.HEADER, text("ros2"), text(self.config.library)))
+        self.file = f"{folder.resolve().name}_0.mcap"
+        self._output = _WholeRecords(folder / self.file)
+        # Chunks end where `write` says so.
+        self._writer: Any = Writer(
+            self._output,  # type: ignore[arg-type]
+            chunk_size=sys.maxsize,
+            compression=_COMPRESSION[how],
+        )
+        self._writer.start("ros2", f"twin {version('twin')}")
+        self._schemas: dict[tuple[str, str], int] = {}
+        self._channels: dict[str, int] = {}
+        self._chunk_bytes, self._chunk_start = 0, 0
+        # As rosbag2: readers of a file that has no end know its version and distribution.
+        self._tell(BagInfo(storage="mcap", files=(self.file,), ros_distro=ros_distro))
 
-    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Add a type; return its id."""
-        schema = Schema(len(self._schemas) + 1, name, encoding, data)
-        self._schemas[schema.id] = schema
-        self._add(schema.pack())
-        return schema.id
+    def add_topic(self, topic: BagTopic) -> None:
+        """Make a topic known."""
+        key = (topic.type, topic.definition)
+        if key not in self._schemas:
+            encoding = topic.definition_format if topic.definition else ""
+            self._schemas[key] = self._writer.register_schema(topic.type, encoding, topic.definition.encode())
+        told = {"offered_qos_profiles": to_yaml(topic.qos), "topic_type_hash": topic.type_hash}
+        self._channels[topic.name] = self._writer.register_channel(
+            topic.name, "cdr", self._schemas[key], told
+        )
 
-    def add_channel(self, topic: str, schema_id: int, metadata: dict[str, str]) -> int:
-        """Add a topic of CDR messages; return its id."""
-        channel = Channel(len(self._channels) + 1, schema_id, topic, "cdr", metadata)
-        self._channels[channel.id] = channel
-        self._add(channel.pack())
-        return channel.id
-
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         """Append a message.
 
         Raises:
             RecordingError: the disk is full or gone.
         """
-        if self._chunk_messages and message.log_ns - self._chunk_start >= self.config.chunk_ns:
+        if self._chunk_bytes and message.log_ns - self._chunk_start >= _CHUNK_NS:
             self.flush()
-        if not self._chunk_messages:
-            self._chunk_start = self._chunk_end = message.log_ns
-        if not self._counts:
-            self._start_ns = self._end_ns = message.log_ns
-        self._chunk_start = min(self._chunk_start, message.log_ns)
-        self._chunk_end = max(self._chunk_end, message.log_ns)
-        self._start_ns = min(self._start_ns, message.log_ns)
-        self._end_ns = max(self._end_ns, message.log_ns)
-        self._index.setdefault(message.channel_id, []).append((message.log_ns, self._chunk_size))
-        self._counts[message.channel_id] += 1
-        self._chunk_messages += 1
-        self._add(message.pack())
-        if self._chunk_size >= self.config.chunk_bytes:
+        self._chunk_start = min(self._chunk_start, message.log_ns) if self._chunk_bytes else message.log_ns
+        self._chunk_bytes += len(message.data) + 1
+        self._writer.add_message(
+            self._channels[message.topic],
+            message.log_ns,
+            message.data,
+            message.publish_ns,
+            message.sequence & 0xFFFFFFFF,
+        )
+        if self._chunk_bytes >= _CHUNK_BYTES:
             self.flush()
+
+    def attach(self, log_ns: int, name: str, media_type: str, data: bytes) -> None:
+        """Append a file within the file, after the chunk in work."""
+        self.flush()
+        self._writer.add_attachment(log_ns, log_ns, name, media_type, data)
+        self._output.flush()
 
     def flush(self) -> None:
         """Hand the chunk in work to the operating system: from now on it survives the end of this process.
@@ -110,113 +92,57 @@ class McapWriter:
         Raises:
             RecordingError: the disk is full or gone.
         """
-        if not self._chunk:
-            return
-        data = b"".join(self._chunk)
-        packed = compress(data, self._compression)
-        head = ChunkHead(
-            self._chunk_start, self._chunk_end, len(data), zlib.crc32(data), self._compression, packed
-        )
-        chunk = head.pack()
-        indexes, offsets = [], {}
-        at = self.size + len(chunk)
-        for channel_id, entries in self._index.items():
-            offsets[channel_id] = at
-            indexes.append(message_index(channel_id, entries))
-            at += len(indexes[-1])
-        length = at - self.size - len(chunk)
-        self._chunks.append(
-            ChunkIndex(
-                head.start_ns,
-                head.end_ns,
-                self.size,
-                len(chunk),
-                offsets,
-                length,
-                head.compression,
-                len(packed),
-                head.size,
-            )
-        )
-        self._append(b"".join([chunk, *indexes]))
-        self._begin_chunk()
+        self._chunk_bytes = 0
+        self._writer.flush()
 
-    def add_metadata(self, name: str, values: dict[str, str]) -> None:
-        """Append named texts, after the chunk in work."""
-        self.flush()
-        data = record(Op.METADATA, text(name), text_map(values))
-        self._metadata.append(metadata_index(self.size, len(data), name))
-        self._append(data)
-
-    def add_attachment(self, attachment: Attachment) -> None:
-        """Append a file within the file, after the chunk in work."""
-        self.flush()
-        data = attachment.pack()
-        self._attachments.append(attachment.index_record(self.size, len(data)))
-        self._append(data)
-
-    def close(self) -> None:
-        """Write what is left and the summary. Harmless when repeated.
+    def close(self, info: BagInfo) -> None:
+        """Write what is left and the summary.
 
         Raises:
             RecordingError: the disk is full or gone.
         """
-        if self._file.closed:
-            return
         try:
-            self.flush()
-            self._append(record(Op.DATA_END, bytes(4)))
-            self._append(self._summary())
+            self._tell(info)
+            self._writer.finish()
+            self._output.flush()
         finally:
-            self._file.close()
+            self._output.close()
 
-    def _summary(self) -> bytes:
-        statistics = Statistics(
-            self._counts.total(),
-            len(self._schemas),
-            len(self._channels),
-            len(self._attachments),
-            len(self._metadata),
-            len(self._chunks),
-            self._start_ns,
-            self._end_ns,
-            dict(self._counts),
-        )
-        groups = {
-            Op.SCHEMA: [schema.pack() for schema in self._schemas.values()],
-            Op.CHANNEL: [channel.pack() for channel in self._channels.values()],
-            Op.STATISTICS: [statistics.pack()],
-            Op.CHUNK_INDEX: [chunk.pack() for chunk in self._chunks],
-            Op.ATTACHMENT_INDEX: self._attachments,
-            Op.METADATA_INDEX: self._metadata,
-        }
-        at, offsets = self.size, []
-        for group, records in groups.items():
-            length = sum(map(len, records))
-            if records:
-                offsets.append(summary_offset(group, at, length))
-            at += length
-        summary = b"".join([*(item for records in groups.values() for item in records), *offsets])
-        return summary + footer(summary, self.size, at) + MAGIC
+    def _tell(self, info: BagInfo) -> None:
+        self.flush()
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(info)})
+        self._output.flush()
 
-    def _begin_chunk(self) -> None:
-        self._chunk: list[bytes] = []
-        self._chunk_size = self._chunk_messages = 0
-        self._index: dict[int, list[tuple[int, int]]] = {}
 
-    def _add(self, data: bytes) -> None:
-        self._chunk.append(data)
-        self._chunk_size += len(data)
+class _WholeRecords:
+    """A file that always ends after a whole record: what is written waits until it is flushed."""
 
-    def _append(self, data: bytes) -> None:
-        left = memoryview(data)
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.size = 0
+        """Bytes in the file."""
+        self._waiting = bytearray()
+        self._file = _create(path)
+
+    def write(self, data: bytes) -> None:
+        self._waiting += data
+
+    def tell(self) -> int:
+        return self.size + len(self._waiting)
+
+    def flush(self) -> None:
+        left = memoryview(bytes(self._waiting))
         try:
             while left:
                 left = left[self._file.write(left) :]
         except OSError as fault:
-            self._file.truncate(self.size)  # the file still ends after a whole record
-            raise RecordingError(f"{self.path}: cannot be written: {fault.strerror}") from fault
-        self.size += len(data)
+            self._file.truncate(self.size)
+            raise RecordingError(f"{self._path}: cannot be written: {fault.strerror}") from fault
+        self.size += len(self._waiting)
+        self._waiting.clear()
+
+    def close(self) -> None:
+        self._file.close()
 
 
 def _create(path: Path) -> FileIO:

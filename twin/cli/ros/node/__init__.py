@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -83,7 +84,7 @@ def info(
         typer.echo("\n".join(f"    {line}" for line in shown))
 
 
-@app.command("graph", epilog="Example: [bold]twin node graph -o graph.svg[/bold]")
+@app.command("graph", epilog="Example: [bold]twin node graph -o graph.mmd[/bold]")
 @joins
 def graph_(
     output: Annotated[
@@ -92,7 +93,7 @@ def graph_(
             "-o",
             "--output",
             metavar="FILE",
-            help="File to write: .gv or .svg; - is .gv on stdout.",
+            help="File to write: .gv, .mmd or .svg; - is .gv on stdout.",
             show_default="text on stdout",
         ),
     ] = None,
@@ -111,18 +112,21 @@ def graph_(
     *,
     joining: Joining,
 ) -> None:
-    """Draw nodes and topics, as rqt_graph: text, Graphviz text, or SVG, which needs no Graphviz."""
-    from twin.cli.ros.node.drawing import svg
-    from twin.cli.ros.node.graph import GraphChoice, graphviz, node_graph, text
+    """Draw nodes and topics, as rqt_graph: text, Graphviz text, Mermaid text, or SVG by Graphviz."""
+    from twin.cli.ros.node.graph import GraphChoice, graphviz, mermaid, node_graph, text
+    from twin.cli.ros.node.rendering import check_dot, svg
 
     file = None if output is None or str(output) == "-" else output
-    check_ending(file)
+    check_ending(file, (".gv", ".mmd", ".svg"))
+    if file is not None and file.suffix == ".svg":
+        check_dot(file)
     choice = GraphChoice(nodes_only=nodes_only, hidden=hidden, debug=debug, dead_sinks=dead_sinks)
     shown = node_graph(joining.graph(), choice)
     if output is None:
         sys.stdout.write(text(shown))
     else:
-        write_drawing(file, lambda: graphviz(shown), lambda: svg(shown))
+        drawings = {".gv": graphviz, ".mmd": mermaid, ".svg": lambda shown: svg(graphviz(shown))}
+        write_drawing(file, {ending: partial(draw, shown) for ending, draw in drawings.items()})
 
 
 def _names(graph: Graph, *, hidden: bool) -> list[str]:

@@ -1,4 +1,4 @@
-"""What rqt_graph shows: nodes, and the topics by which they are connected; as text and for Graphviz.
+"""What rqt_graph shows: nodes, and the topics by which they are connected; as text, DOT or Mermaid.
 
 Source of what is shown: rqt_graph, dotcode.py (active topics; dead sinks and debug topics hidden, the
 topics of an action as one).
@@ -115,8 +115,8 @@ def graphviz(graph: NodeGraph) -> str:
     lines += [f"{_id('n', node)} [label={_quoted(node)}];" for node in graph.nodes]
     if graph.choice.nodes_only:
         for (a, b), names in graph.connections().items():
-            label = _quoted("\\n".join(names))
-            lines.append(f"{_id('n', a)} -> {_id('n', b)} [label={label}];")
+            label = "\\n".join(map(_escaped, names))
+            lines.append(f'{_id("n", a)} -> {_id("n", b)} [label="{label}"];')
     else:
         lines.append("node [shape=box];")
         lines += [f"{_id('t', topic.name)} [label={_quoted(topic.name)}];" for topic in graph.topics]
@@ -124,6 +124,21 @@ def graphviz(graph: NodeGraph) -> str:
             lines += [f"{_id('n', node)} -> {_id('t', topic.name)};" for node in topic.publishers]
             lines += [f"{_id('t', topic.name)} -> {_id('n', node)};" for node in topic.subscribers]
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def mermaid(graph: NodeGraph) -> str:
+    """Return the graph as a flowchart of Mermaid, which pages of Markdown draw: nodes round, topics boxes."""
+    number = {name: f"n{i}" for i, name in enumerate(graph.nodes)}
+    lines = ["flowchart LR", *(f"{number[node]}([{_entity(node)}])" for node in graph.nodes)]
+    if graph.choice.nodes_only:
+        for (a, b), names in graph.connections().items():
+            lines.append(f"{number[a]} -->|{_entity(*names)}| {number[b]}")
+        return "".join(f"{line}\n" for line in lines)
+    for i, topic in enumerate(graph.topics):
+        lines.append(f"t{i}[{_entity(topic.name)}]")
+        lines += [f"{number[node]} --> t{i}" for node in topic.publishers]
+        lines += [f"t{i} --> {number[node]}" for node in topic.subscribers]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _shown_as(endpoint: EndpointInfo, choice: GraphChoice) -> str | None:
@@ -146,4 +161,17 @@ def _id(kind: str, name: str) -> str:
 
 
 def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '\\"') + '"'
+    return f'"{_escaped(name)}"'
+
+
+def _escaped(name: str) -> str:
+    return name.replace("\\", "\\\\").replace('"', '\\"')
+
+
+def _entity(*names: str) -> str:
+    """Return a text of Mermaid, a line for each name; what would end it or be taken for HTML has names."""
+    lines = [
+        name.replace("#", "#35;").replace('"', "#quot;").replace("<", "#lt;").replace(">", "#gt;")
+        for name in names
+    ]
+    return f'"{"<br>".join(lines)}"'
