@@ -71,6 +71,7 @@ class Copy:
         self.folder, self._cache = folder / "twin", folder / "cache"
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
+        self._cache.mkdir(exist_ok=True)
         for part in _PARTS:
             shutil.copytree(root / part, self.folder / part, ignore=shutil.ignore_patterns("__pycache__"))
         for file in root.glob("*.*"):
@@ -79,7 +80,7 @@ class Copy:
 
     def python(self, *words: str, timeout: float | None = None, **variables: str) -> int:
         """Run Python here; its exit code, or -1 if it takes too long."""
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(self._cache), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(self._cache)}
         with subprocess.Popen(
             (sys.executable, *words),
             cwd=self.folder,
@@ -97,12 +98,25 @@ class Copy:
     def notices(self, mutant: Mutant, tests: list[str], timeout: float) -> bool:
         """Whether a test fails, or they do not come to an end, when the change is made."""
         file = self.folder / mutant.site.file
-        before = file.read_text("utf-8")
+        before, stat = file.read_text("utf-8"), file.stat()
+        # What is compiled of the change must not be left behind: neither byte code nor machine code.
+        cache = self.folder.parent / "cache_of_one"
+        shutil.rmtree(cache, ignore_errors=True)
+        shutil.copytree(self._cache, cache, copy_function=os.link)
         file.write_text(mutant.source, "utf-8")
         try:
-            return self.python("-m", "pytest", "-x", *_FAST, *tests, timeout=timeout) != 0
+            return (
+                self.python(
+                    *("-m", "pytest", "-x", *_FAST, *tests),
+                    timeout=timeout,
+                    NUMBA_CACHE_DIR=str(cache),
+                    PYTHONDONTWRITEBYTECODE="1",
+                )
+                != 0
+            )
         finally:
             file.write_text(before, "utf-8")
+            os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
 def measured(copies: list[Copy], folder: Path) -> Reach:

@@ -77,10 +77,11 @@ def sites_of(root: Path, file: str) -> Iterator[Site]:
     statements, nodes = _statements(ast.parse(source)), list(ast_nodes(get_ast(source)))
     for name in OPERATORS:
         operator = _operator(name)
-        places = [place for node in nodes for place in operator.mutation_positions(node)]
-        for occurrence, ((line, _), _) in enumerate(places):
+        places = [(node, place) for node in nodes for place in operator.mutation_positions(node)]
+        for occurrence, (node, ((line, _), _)) in enumerate(places):
             around = [(len(lines), lines, kernel) for lines, kernel in statements if line in lines]
-            if around:  # else it is in a docstring
+            # Not in a docstring, nor the star of keyword-only parameters.
+            if around and not (node.type == "operator" and node.parent.type in ("parameters", "param")):
                 _, lines, kernel = min(around, key=lambda found: found[0])
                 yield Site(
                     file=file,
@@ -93,9 +94,13 @@ def sites_of(root: Path, file: str) -> Iterator[Site]:
 
 
 def mutant_at(root: Path, site: Site) -> Mutant | None:
-    """Return the change; None if it leaves the file as it is."""
+    """Return the change; None if it leaves the file as it is, or makes it no Python."""
     source = (root / site.file).read_text("utf-8")
     changed = mutate_code(source, _operator(site.operator), site.occurrence)
+    try:
+        ast.parse(changed or source)
+    except SyntaxError:
+        return None
     before, after = source.splitlines(), (changed or source).splitlines()
     for one, other in zip(before, after, strict=False):
         if one != other:
