@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test test-long check bench soak fuzz oracle scenarios wheel smoke docs clean
+.PHONY: run test test-long check bench soak fuzz mutate oracle scenarios wheel smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt benchmarks/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
@@ -41,6 +41,10 @@ soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: co
 
 fuzz: $(VENV)/.ready  ## 10 000 broken and hostile mesh files, checked and converted: none takes 5 s of CPU or 500 MB
 	$(BIN)/python -m tests.oracles.mesh_fuzz
+
+mutate: $(VENV)/.ready  ## 200 small wrong changes, each of which tests should notice: up to 90 minutes; ARGS='--again' for survivors
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,mutate]'
+	$(BIN)/python -m tests.mutation.mutate $(ARGS)
 
 oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from twin.controllers.odometry import Odometry, OdometryConfig
+from twin.controllers.odometry_noise import OdometryNoise
 from twin.geometry import Pose2
 
 CONFIG = OdometryConfig(wheel_radius=0.05, track=0.3)
@@ -67,3 +69,25 @@ def test_covariance_is_that_of_the_numerical_jacobian_of_the_motion() -> None:
         odometry.update(left, right, 0.1)
         np.testing.assert_allclose(odometry.covariance, P, atol=2e-3 * np.abs(P).max())
     assert abs(P[0, 1]) > 0.1 * P[0, 0], "the errors of x and y belong together"
+
+
+def test_a_gyroscope_makes_the_heading_as_unsure_as_its_bias_times_the_time() -> None:
+    noise = OdometryNoise(gyro_bias=2e-3)
+    odometry = Odometry(replace(CONFIG, noise=noise))
+    for i in range(1001):
+        odometry.update(0.2 * i, 0.2 * i, 0.02, yaw_rate=0.1)
+    assert odometry.covariance[2, 2] == pytest.approx((2e-3 * 20.0) ** 2, rel=0.01)
+    assert odometry.pose.yaw == pytest.approx(2.0), "the gyroscope is believed, not the wheels"
+
+
+def test_velocities_integrated_as_white_noise_are_as_unsure_as_the_pose() -> None:
+    odometry, place, turn = Odometry(CONFIG), 0.0, 0.0
+    odometry.update(0.0, 0.0, 0.05)
+    at_rest = odometry.update(0.0, 0.0, 0.05) and odometry.velocity_covariance
+    for i in range(1, 101):
+        odometry.update(0.5 * i, 0.5 * i, 0.05)
+        gained = odometry.velocity_covariance - at_rest
+        place, turn = place + gained[0, 0] * 0.05**2, turn + gained[2, 2] * 0.05**2
+    assert odometry.covariance[0, 0] == pytest.approx(place)
+    assert odometry.covariance[2, 2] == pytest.approx(turn)
+    assert 0.0 < at_rest[0, 0] < 1e-4
