@@ -103,11 +103,14 @@ def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> Moni
     if "max_points" in inside:
         inside[names_of(MonitorPolygon).min_points] = inside["max_points"] + 1
     given = _taken(MonitorPolygon, f"{name}.", inside, file)
+    if given is None:
+        return None
     try:
-        return None if given is None else MonitorPolygonParameters.model_validate(given)
+        MonitorPolygon(**given)
     except ValueError as error:
         file.wrong(_NODE, name, str(error))
         return None
+    return MonitorPolygonParameters.model_validate(given)
 
 
 def _points(inside: Mapping[str, Any]) -> Sequence[Sequence[float]] | None:
