@@ -24,7 +24,7 @@ from twin.navigation.docking.config import DockCollisionConfig, DockEstimateConf
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.planning.config import ThetaStarConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.docking.config import DockingServerConfig

@@ -433,8 +433,8 @@ waypoint_follower: {ros__parameters: {loop_rate: 0}}
 """
     assert _said(tmp_path, text) == [
         "velocity_smoother: max_decel must be greater than 0, not 0.0",
-        "bt_navigator: bt_loop_duration must be greater than 0, not 0",
-        "waypoint_follower: loop_rate must be greater than 0, not 0",
+        "bt_navigator: bt_loop_duration must be at least 1 and at most 1000000, not 0",
+        "waypoint_follower: loop_rate must be at least 1 and at most 1000, not 0",
     ]
 
 

@@ -11,7 +11,7 @@ from twin.errors import ScenarioError
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.scenario.controllers import ControllerParameters, FurtherControllerParameters
 from twin.scenario.navigation import NavigationConfig

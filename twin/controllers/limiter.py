@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from twin.parameters import MayBeInfinite, Nav2, NotNegative, Positive
 
 
 @dataclass(frozen=True, kw_only=True)
 class AxisLimits:
     """Limits of one axis; SI units, angular or linear."""
 
-    max_velocity: float = math.inf
-    max_acceleration: float = math.inf
-    max_deceleration: float | None = None
-    """None: as max_acceleration."""
+    max_velocity: Annotated[float, NotNegative, MayBeInfinite] = math.inf
+    """In both directions."""
+    max_acceleration: Annotated[float, Positive, MayBeInfinite, Nav2("max_accel")] = math.inf
+    """When speeding up."""
+    max_deceleration: Annotated[float, Positive, MayBeInfinite, Nav2("max_decel")] | None = None
+    """When braking; None: as max_acceleration."""
 
 
 class SpeedLimiter:

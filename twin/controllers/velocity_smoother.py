@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from twin.controllers.limiter import AxisLimits, SpeedLimiter
+from twin.parameters import MetresPerSecond, NotNegative, RadiansPerSecond, Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,16 +15,18 @@ class VelocitySmootherConfig:
     """Limits and time-out; Nav2's parameters by axis instead of by list."""
 
     linear: AxisLimits = AxisLimits(max_velocity=1.0, max_acceleration=0.8, max_deceleration=1.5)
+    """Limits of driving [m/s], [m/s²]."""
     angular: AxisLimits = AxisLimits(max_velocity=1.5, max_acceleration=2.5, max_deceleration=3.5)
-    velocity_timeout: float = 0.5
-    """Without a command for this long the target is zero [s]."""
+    """Limits of turning [rad/s], [rad/s²]."""
+    velocity_timeout: Annotated[Seconds, NotNegative] = 0.5
+    """Without a command for this long the target is zero."""
     scale_velocities: bool = False
     """Whether the axis that is farthest from its target holds the other back, so that the robot speeds up and
     brakes, along the curve that was commanded; otherwise each axis is limited by itself."""
-    deadband_linear: float = 0.0
-    """Speeds below this are sent as zero [m/s]."""
-    deadband_angular: float = 0.0
-    """[rad/s]"""
+    deadband_linear: Annotated[MetresPerSecond, NotNegative] = 0.0
+    """Speeds below this are sent as zero ..."""
+    deadband_angular: Annotated[RadiansPerSecond, NotNegative] = 0.0
+    """... and turn rates below this."""
 
 
 class VelocitySmoother:

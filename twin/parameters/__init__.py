@@ -21,7 +21,8 @@ its bounds in the same words, and NaN, infinity, and sizes beyond `Unit.sizes` i
   le=1000)]` the parameter is `controller_frequency`, and its bounds are in Hz; `timeout_ns:
   Annotated[DurationNs, Positive]` is `timeout`, in seconds.
 - `Name("...")`: the parameter's name, where the field's cannot be it; `Nav2("...")`: Nav2's name in files,
-  where it is another one; `ReadOnly`; `MayBeInfinite`; `Derived`: no key of scenarios.
+  and how the value is read, where that is otherwise; `ReadOnly`; `MayBeInfinite`; `NameOrPath`; `Derived`: no
+  key of scenarios.
 - A config inside, or a mapping of configs by name, is a section of its own name, or of `Name("...")`; with
   `Flat` it is none: `controllers: Annotated[Mapping[str, ControllerConfig], Flat]` gives 'FollowPath.xy'.
 
@@ -44,6 +45,7 @@ from twin.parameters.forms import DurationNs as DurationNs
 from twin.parameters.forms import Flat as Flat
 from twin.parameters.forms import MayBeInfinite as MayBeInfinite
 from twin.parameters.forms import Name as Name
+from twin.parameters.forms import NameOrPath as NameOrPath
 from twin.parameters.forms import Nav2 as Nav2
 from twin.parameters.forms import PeriodNs as PeriodNs
 from twin.parameters.forms import ReadOnly as ReadOnly

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from twin.parameters.domain import Domain, domain_of, metadata_of
-from twin.parameters.forms import Derived, DurationNs, Form, Name, Nav2, PeriodNs, ReadOnly
+from twin.parameters.forms import Derived, DurationNs, Form, Name, NameOrPath, Nav2, PeriodNs, ReadOnly
 from twin.parameters.texts import texts_of
 
 
@@ -28,8 +28,8 @@ class Declaration:
     """Which values it takes; None for configs inside, and for what is no parameter."""
     form: Form | None
     """How the value is told, if not as it is kept."""
-    nav2: str
-    """Nav2's name in files; mostly the same."""
+    nav2: tuple[Nav2, ...]
+    """How Nav2's files write it, where it is otherwise."""
     config: type | None
     """The config inside, if the annotation names just one."""
     is_required: bool
@@ -37,6 +37,8 @@ class Declaration:
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
+    is_path: bool
+    """Whether it is the name of what ships, or a path."""
 
     @property
     def text(self) -> str:
@@ -106,9 +108,10 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         name=name,
         domain=domain_of(hint),
         form=form,
-        nav2=next((one.name for one in metadata if isinstance(one, Nav2)), name),
+        nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
         is_required=of.default is of.default_factory is dataclasses.MISSING,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
+        is_path=NameOrPath in metadata,
     )

@@ -31,9 +31,17 @@ class Name:
 
 @dataclass(frozen=True)
 class Nav2:
-    """Nav2's name of the parameter in files, where it is another one."""
+    """How Nav2's files write the parameter, where it is otherwise; a field may have several."""
 
-    name: str
+    name: str = ""
+    """Another name, below the section of the config; '': the same."""
+    read: Callable[[Any], Any] = lambda value: value
+    """Takes what a file says, whatever that is, and returns what is meant."""
+
+
+def renamed(**names: str) -> Callable[[Any], Any]:
+    """Return a `Nav2.read` of other names for some choices."""
+    return lambda value: names.get(value, value) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,7 @@ Flat = Name("")
 ReadOnly = Marker("live setting does not change it")
 Derived = Marker("made of other parameters: scenarios have no key for it")
 MayBeInfinite = Marker("infinity is valid")
+NameOrPath = Marker("the name of what ships, or a path, in a scenario relative to its file")
 
 _HERTZ, _SECONDS = get_args(Hertz)[1], get_args(Seconds)[1]
 

@@ -21,7 +21,7 @@ from twin.navigation.control.goal_checker import (
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig, ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
 from twin.strict_yaml import Fault, Faults

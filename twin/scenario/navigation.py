@@ -9,8 +9,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
-from twin.parameters import Hertz, MetresPerSecond, Positive, RadiansPerSecond
+from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
@@ -25,14 +26,11 @@ class CostmapParameters(ParameterGroup):
     """Parameters of a costmap."""
 
 
+@keys_of(BtNavigatorConfig)
 class NavigatorParameters(ParameterGroup):
     """Parameters of `/bt_navigator`."""
 
-    default_nav_to_pose_bt_xml: NameOrPath | None = None
-    """Behaviour tree of goals that name none: one that ships with twin, or a file."""
-    default_nav_through_poses_bt_xml: NameOrPath | None = None
-    """The same for goals through poses."""
-    bt_loop_frequency: Annotated[Hertz, Positive] | None = None
+    bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 from pydantic import Field, create_model
 
 from twin.parameters.declaration import Declaration, fields_of
+from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
 G = TypeVar("G", bound="ParameterGroup")
@@ -89,7 +90,7 @@ def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any]
     domain = declaration.domain
     if domain is None:
         return None
-    kind: Any = Annotated[domain.annotation, domain]
+    kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
     if required:
         return kind, Field(description=declaration.text)
     return kind | None, Field(default=None, description=declaration.text)

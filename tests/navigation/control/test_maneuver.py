@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from twin.geometry import Array, Pose2
-from twin.navigation.control.maneuver import Maneuver, ManeuverConfig, find_maneuver
+from twin.navigation.control.maneuver import Maneuver, find_maneuver
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, Costmap
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.kernels import footprint_hits, outline_cost

@@ -28,7 +28,7 @@ from twin.navigation.control.mppi.sent_commands import SentCommands
 from twin.navigation.control.plugins import create_controller
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.costmaps.costmap import Costmap, footprint_cost
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap

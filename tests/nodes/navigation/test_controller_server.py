@@ -26,7 +26,7 @@ from twin.bridge.msgs import (
 )
 from twin.bridge.parameters.values import Parameter
 from twin.geometry import Pose2
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig

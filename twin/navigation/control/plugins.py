@@ -24,11 +24,9 @@ from twin.navigation.control.progress_checker import (
     ProgressCheckerConfig,
     SimpleProgressChecker,
 )
-from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
-from twin.navigation.control.rotation_shim import RotationShim, RotationShimConfig
-
-ControllerConfig = RegulatedPurePursuitConfig | MPPIConfig | DWBConfig | RotationShimConfig
+from twin.navigation.control.rotation_shim import RotationShim
+from twin.navigation.control.rotation_shim_config import ControllerConfig, RotationShimConfig
 
 
 def create_controller(config: ControllerConfig, footprint: Array) -> Controller:

@@ -6,8 +6,6 @@ Nav2's own, a user's. A goal may name one in its field `behavior_tree`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
@@ -15,34 +13,11 @@ from twin.bridge.msgs import PoseStamped, new
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 from twin.nodes.navigation.behavior_trees.log import TreeLog
 from twin.nodes.navigation.behavior_trees.navigator import Navigator, NavigatorSetup
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
 _MS = 1_000_000
-
-
-@dataclass(frozen=True, kw_only=True)
-class BtNavigatorConfig:
-    """Parameters; names are those of nav2_bt_navigator, defaults too unless said otherwise."""
-
-    default_nav_to_pose_bt_xml: str = "navigate_to_pose"
-    """Tree of goals that name none: a shipped one by name, or a path."""
-    default_nav_through_poses_bt_xml: str = "navigate_through_poses"
-    """The same for goals through poses."""
-    bt_loop_duration: int = 100
-    """Time between ticks of the tree [ms]; Nav2: 10."""
-    default_server_timeout: int = 1000
-    """How long a server may take to accept a goal, or a service to answer [ms]; Nav2: 20."""
-    error_code_name_prefixes: tuple[str, ...] = (
-        *("assisted_teleop", "backup", "compute_path", "dock_robot", "drive_on_heading", "follow_path"),
-        *("nav_thru_poses", "nav_to_pose", "smoother", "spin", "undock_robot", "wait"),
-    )
-    """Of the blackboard's `<prefix>_error_code` the lowest goes into the result, with its `_error_msg`."""
-    odom_topic: str = "odom"
-    filter_duration: float = 0.3
-    """Over which odometry's speed is averaged [s]."""
-    goal_reached_tol: float = 0.25
-    """Of the node `GoalReached` [m]."""
 
 
 class BtNavigatorNode:

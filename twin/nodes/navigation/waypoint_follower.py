@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Any
+from typing import Annotated, Any
 
 from twin.bridge import types
 from twin.bridge.action_types import FollowWaypoints, NavigateToPose
@@ -13,6 +13,7 @@ from twin.bridge.actions import ActionClient, ActionServer, ClientGoal, GoalHand
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import header, new
 from twin.nodes.node_parameters import declare_config
+from twin.parameters import Interval
 
 MissedWaypoint: Any = types.get("nav2_msgs/msg/MissedWaypoint")
 _MS = 1_000_000
@@ -25,7 +26,8 @@ class WaitAtWaypointConfig:
     """Parameters of nav2_waypoint_follower::WaitAtWaypoint."""
 
     enabled: bool = True
-    waypoint_pause_duration: int = 0
+    """Whether it does."""
+    waypoint_pause_duration: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
     """How long to stand at each waypoint [ms]."""
 
 
@@ -35,9 +37,10 @@ class WaypointFollowerConfig:
 
     stop_on_failure: bool = True
     """Whether the first waypoint that is missed ends the action."""
-    loop_rate: int = 20
+    loop_rate: Annotated[int, Interval(ge=1, le=1000)] = 20
     """How often the follower looks and tells its feedback [Hz]."""
     wait_at_waypoint: WaitAtWaypointConfig = field(default_factory=WaitAtWaypointConfig)
+    """What is done at each waypoint."""
 
 
 class WaypointFollowerNode:

@@ -9,17 +9,16 @@ from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
-from twin.navigation.control.maneuver import ManeuverConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.mppi.config import (
     GoalAngleCriticConfig,
     GoalCriticConfig,
     MPPIConfig,
     PathAlignCriticConfig,
 )
-from twin.navigation.control.plugins import ControllerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
-from twin.navigation.control.rotation_shim import RotationShimConfig
+from twin.navigation.control.rotation_shim_config import ControllerConfig, RotationShimConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.controllers import GOAL_CHECKERS, PROGRESS_CHECKERS, ControllerParameters

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
@@ -13,7 +12,7 @@ from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.config import PLUGINS, CommitmentConfig, GoalAccessConfig, PlannerPluginConfig
 from twin.navigation.recovery import BehaviorConfig
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.docking.config import DockingServerConfig
@@ -24,7 +23,7 @@ from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults.controllers import controller_server_config
 from twin.runtime.defaults.docking import docking_config
 from twin.runtime.defaults.overrides import overridden as overridden
-from twin.scenario.navigation import CostmapParameters, NavigationConfig
+from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
 
 C = TypeVar("C")
 
@@ -114,7 +113,7 @@ def navigation_parameters(
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=SmootherServerConfig(),
         docking=docking_config(config.docking),
-        navigator=_navigator(config.navigator.overrides()),
+        navigator=_navigator(config.navigator),
         waypoints=WaypointFollowerConfig(),
     )
 
@@ -141,13 +140,9 @@ def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherCon
     )
 
 
-def _navigator(overrides: Mapping[str, Any]) -> BtNavigatorConfig:
-    defaults = BtNavigatorConfig()
-    frequency = overrides.get("bt_loop_frequency")
-    return replace(
-        overridden(defaults, overrides),
-        bt_loop_duration=defaults.bt_loop_duration if frequency is None else round(1e3 / frequency),
-    )
+def _navigator(group: NavigatorParameters) -> BtNavigatorConfig:
+    config, frequency = overridden(BtNavigatorConfig(), group.overrides()), group.bt_loop_frequency
+    return config if frequency is None else replace(config, bt_loop_duration=max(1, round(1e3 / frequency)))
 
 
 def _limits(speed: float, acceleration: float, deceleration: float, drive: float | None) -> AxisLimits:

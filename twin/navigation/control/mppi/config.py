@@ -11,6 +11,7 @@ from twin.parameters import (
     Metres,
     MetresPerSecond,
     MetresPerSecondSquared,
+    Nav2,
     NotNegative,
     NotPositive,
     Positive,
@@ -19,6 +20,7 @@ from twin.parameters import (
     RadiansPerSecondSquared,
     Seconds,
 )
+from twin.parameters.forms import renamed
 
 _Weight = Annotated[float, NotNegative]
 _Power = Annotated[int, Interval(ge=1, le=10)]
@@ -245,9 +247,11 @@ class MPPIConfig:
     """Whether every cycle draws from another part of the noise, not always the same."""
     noise_time_constant: Annotated[Seconds, NotNegative] = 0.0
     """Of the noise, 0: white, as Nav2's; more reaches farther aside with as many rollouts."""
-    motion_model: Literal["DiffDrive", "Ackermann"] = "DiffDrive"
-    """What the drive can do."""
-    min_turning_r: Annotated[Metres, Positive] = 0.2
+    motion_model: Annotated[
+        Literal["DiffDrive", "Ackermann"], Nav2(read=renamed(diff_drive="DiffDrive", ackermann="Ackermann"))
+    ] = "DiffDrive"
+    """What the drive can do; since Lyrical Nav2 has other words."""
+    min_turning_r: Annotated[Metres, Positive, Nav2("AckermannConstraints.min_turning_r")] = 0.2
     """Of motion model Ackermann."""
     model_delay_vx: Annotated[Seconds, NotNegative] = 0.0
     """From a command to its effect."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from twin.navigation.control.goal_checker import GoalCheckerConfig, PositionGoalCheckerConfig
-from twin.navigation.control.maneuver import ManeuverConfig
-from twin.navigation.control.plugins import ControllerConfig
+from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
+from twin.navigation.control.rotation_shim_config import ControllerConfig
 from twin.parameters import (
     Derived,
     DurationNs,

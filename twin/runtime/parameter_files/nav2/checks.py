@@ -4,38 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, get_args, get_origin
+from typing import Any, get_args, get_origin
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from twin.runtime.parameter_files.nav2.names import local_name
-
-_MoreThanZero = Annotated[float, Field(gt=0.0)]
-
-
-class _AxisParameters(BaseModel):
-    max_acceleration: _MoreThanZero
-    max_deceleration: _MoreThanZero
-
-
-class VelocitySmootherParameters(BaseModel):
-    """What a scenario has no keys for: a robot that cannot brake is none."""
-
-    linear: _AxisParameters
-    angular: _AxisParameters
-
-
-class NavigatorParameters(BaseModel):
-    """Of `/bt_navigator`."""
-
-    bt_loop_duration: Annotated[int, Field(gt=0)]
-
-
-class WaypointFollowerParameters(BaseModel):
-    """Of `/waypoint_follower`."""
-
-    loop_rate: _MoreThanZero
-
 
 _SENTINELS = ("failure_tolerance",)
 """Negative values of these have a meaning of their own."""

@@ -23,6 +23,7 @@ from twin.runtime.parameter_files.nav2.names import (
     by_axis,
     class_of,
     converted,
+    declared,
     flat,
     is_same,
     renamed,
@@ -216,7 +217,7 @@ class Nav2Parameters:
     ) -> dict[str, Value]:
         """Return the node's values by the names that this config has for them."""
         values = converted(by_axis(renamed(self._said(node))))
-        values = {rename(name): entry for name, entry in values.items()}
+        values = declared({rename(name): entry for name, entry in values.items()}, config, prefix)
         known = tuple(prefix + name for name in parameters_of(config, names))
         if "costmap" in node or node == "behavior_server":
             values = flat(values, known)

@@ -8,6 +8,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from twin.controllers.limiter import AxisLimits
+from twin.parameters.declaration import fields_of
+from twin.parameters.placed import parameters_of
+
 PLANNERS = {
     "NavfnPlanner": "grid_based",
     "SmacPlanner2D": "grid_based",
@@ -33,8 +37,6 @@ _SECTIONS = {
 """List of plugins -> what the section of the first one is called here. Until Iron the last was one name."""
 
 
-_MOTION_MODELS = {"diff_drive": "DiffDrive", "ackermann": "Ackermann"}
-"""Names of MPPI's motion models since Lyrical."""
 _ROBOT_MODELS = {
     "differential": "nav2_amcl::DifferentialMotionModel",
     "omnidirectional": "nav2_amcl::OmniMotionModel",
@@ -69,28 +71,32 @@ def renamed(values: dict[str, Value]) -> dict[str, Value]:
                 return new + name.removeprefix(old)
         return name
 
-    out = {here(name): entry for name, entry in values.items()}
-    if "error_code_names" in out and isinstance(out["error_code_names"].value, list):
-        entry = out.pop("error_code_names")
-        prefixes = [str(name).removesuffix("_error_code") for name in entry.value]
-        out["error_code_name_prefixes"] = entry._replace(value=prefixes)
+    return {here(name): entry for name, entry in values.items()}
+
+
+def declared(values: dict[str, Value], config: Any, prefix: str) -> dict[str, Value]:
+    """Return values by the names that a config's parameters have here, as they are written here."""
+    out = dict(values)
+    for name, one in parameters_of(config).items():
+        section = prefix + name.removesuffix(one.declaration.name)
+        for way in one.declaration.nav2:
+            entry = out.pop(section + (way.name or one.declaration.name), None)
+            if entry is not None:
+                out[prefix + name] = entry._replace(value=way.read(entry.value))
     return out
 
 
 def by_axis(values: dict[str, Value]) -> dict[str, Value]:
     """Return the smoother's parameters with its lists [x, y, yaw] taken apart, as they are declared here."""
     out = dict(values)
-    for said, name in (
-        ("max_velocity", "max_velocity"),
-        ("max_accel", "max_acceleration"),
-        ("max_decel", "max_deceleration"),
-    ):
+    for declaration in fields_of(AxisLimits).values():
+        said = declaration.nav2[0].name if declaration.nav2 else declaration.name
         entry = out.get(said)
         if entry is None or not _is_triple(entry.value):
             continue
         x, _, yaw = out.pop(said).value
-        out[f"linear.{name}"] = entry._replace(value=abs(x))
-        out[f"angular.{name}"] = entry._replace(value=abs(yaw))
+        out[f"linear.{declaration.name}"] = entry._replace(value=abs(x))
+        out[f"angular.{declaration.name}"] = entry._replace(value=abs(yaw))
     return out
 
 
@@ -106,15 +112,11 @@ def converted(values: dict[str, Value]) -> dict[str, Value]:
             out["footprint"] = footprint._replace(value=corners)
             out.pop("robot_radius", None)  # as in Nav2, where the polygon goes first
     for name, entry in values.items():
-        section, _, last = name.rpartition(".")
-        if last == "motion_model" and entry.value in _MOTION_MODELS:
-            out[name] = entry._replace(value=_MOTION_MODELS[entry.value])
-        elif last == "robot_model_type" and entry.value in _ROBOT_MODELS:
+        last = name.rpartition(".")[2]
+        if last == "robot_model_type" and entry.value in _ROBOT_MODELS:
             out[name] = entry._replace(value=_ROBOT_MODELS[entry.value])
         elif name == "GridBased.max_iterations" and type(entry.value) is int and entry.value <= 0:
             out[name] = entry._replace(value=_ENDLESS)
-        elif last == "min_turning_r" and section.endswith(".AckermannConstraints"):
-            out[f"{section.removesuffix('.AckermannConstraints')}.{last}"] = out.pop(name)
     return out
 
 

@@ -13,23 +13,14 @@ from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
-from twin.runtime.parameter_files.nav2.checks import (
-    NavigatorParameters,
-    VelocitySmootherParameters,
-    WaypointFollowerParameters,
-)
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.controllers import ControllerParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 
-_CONTROLLER_NAMES = dict.fromkeys(
-    ("controllers", "goal_checkers", "progress_checkers", "primary_controller"), ""
-)
 _CONTROLLERS = {
     "RegulatedPurePursuitController": "regulated_pure_pursuit",
     "DWBLocalPlanner": "dwb",
@@ -150,7 +141,6 @@ def with_file(
             "velocity_smoother",
             parameters.smoother,
             keep=nav2_given.for_smoother(config),
-            limits=VelocitySmootherParameters,
         ),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
@@ -163,9 +153,7 @@ def with_file(
         controller_server=file.applied(
             "controller_server",
             parameters.controller_server,
-            _CONTROLLER_NAMES,
             keep=nav2_given.for_controllers(config),
-            limits=ControllerParameters,
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
         docking=file.applied("docking_server", docking, keep=nav2_given.for_docking(config.docking)),
@@ -174,9 +162,8 @@ def with_file(
             "bt_navigator",
             parameters.navigator,
             keep=nav2_given.for_navigator(config.navigator),
-            limits=NavigatorParameters,
         ),
-        waypoints=file.applied("waypoint_follower", parameters.waypoints, limits=WaypointFollowerParameters),
+        waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
     navigator, told = with_trees(file, changed.navigator, nav2_given.for_navigator(config.navigator))
     changed = replace(changed, navigator=navigator)

@@ -11,7 +11,7 @@ from twin.errors import NavigationError
 from twin.models.options import DEFAULTS
 from twin.models.urdf.packages import PackagePath, Packages
 from twin.nodes.navigation.behavior_trees.navigator import tree_file
-from twin.nodes.navigation.bt_navigator import BtNavigatorConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 
 _SHARE = re.compile(r"\$\(\s*find-pkg-share\s+([^\s()]+)\s*\)")
