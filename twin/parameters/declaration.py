@@ -63,11 +63,7 @@ class Declaration:
             ValueError: it is none; a sentence without its subject.
         """
         assert self.domain is not None
-        try:
-            value = self.domain.checked(told)
-        except ValueError as error:
-            raise ValueError(f"{error}, not {told!r}") from None
-        return self.kept(value)
+        return self.kept(self.domain.checked(told))
 
     def kept(self, checked: Any) -> Any:
         """Return a valid value as the config keeps it."""

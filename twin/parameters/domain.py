@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from annotated_types import Len
+
 from twin.parameters.bounds import LARGEST, SMALLEST, Bounds
 from twin.parameters.forms import Form, MayBeInfinite
 from twin.parameters.units import Unit
@@ -32,8 +34,10 @@ class Domain:
     """The only valid values, if there are any."""
     item: Domain | None = None
     """Of a list: what all its items are."""
-    length: int | None = None
-    """Of a list: how many they are; None: as many as you like."""
+    lengths: tuple[int, int | None] = (0, None)
+    """Of a list: how many they are at least and at most; None: as many as you like."""
+    is_fixed: bool = False
+    """Of a list: whether each of its items has a place of its own, as x and y have."""
     is_optional: bool = False
     """Whether None is valid, too."""
     may_be_infinite: bool = False
@@ -59,7 +63,7 @@ class Domain:
         """The type of the told value with its metadata, for a schema."""
         if self.item is not None:
             inner = _annotated(self.item.annotation, [self.item])
-            listed = (inner, ...) if self.length is None else (inner,) * self.length
+            listed = (inner,) * self.lengths[0] if self.is_fixed else (inner, ...)
             return _annotated(tuple.__class_getitem__(listed), self.metadata)
         kind = Literal[self.choices] if self.choices else self.kind
         others = [one for one in self.metadata if not isinstance(one, Form | Unit)]
@@ -75,21 +79,16 @@ class Domain:
             return None
         if self.item is not None:
             return self._checked_list(value)
-        if self.kind is float and type(value) is int:
-            value = float(value)
-        if type(value) is not self.kind:
-            raise ValueError(f"must be {_MEANT[self.kind]}")
-        if self.choices and value not in self.choices:
-            raise ValueError(self.said)
-        if isinstance(value, int | float) and self.kind is not bool:
-            self._check_size(value)
-        return value
+        try:
+            return self._sound(value)
+        except ValueError as error:
+            raise ValueError(f"{error}, not {value!r}") from None
 
     def parsed(self, value: Any) -> Any:
         """Return what a file may have: as `checked`, and text with a unit; lists are left to their items.
 
         Raises:
-            ValueError: As `checked`.
+            ValueError: It is none; says only what is valid.
         """
         if self.choices or value is None:
             return value
@@ -100,16 +99,29 @@ class Domain:
                 value = self.unit.parse(value)
             elif type(value) not in (int, float):
                 return value  # the unit says what is valid
-        return self.checked(value)
+        return self._sound(value)
 
     def _checked_list(self, value: Any) -> tuple[Any, ...]:
         assert self.item is not None
         if not isinstance(value, list | tuple):
-            raise ValueError(f"must be {_MEANT[tuple]}")
-        if self.length is not None and len(value) != self.length:
-            raise ValueError(f"must have {self.length} values")
+            raise ValueError(f"must be {_MEANT[tuple]}, not {value!r}")
+        low, high = self.lengths
+        if not low <= len(value) <= (len(value) if high is None else high):
+            many = low if low == high else f"at least {low}" if len(value) < low else f"at most {high}"
+            raise ValueError(f"must have {many} values, not {len(value)}")
         items = [self.item.checked(one) for one in value]
         return tuple(items) if self.kind is tuple else self.kind(*items)
+
+    def _sound(self, value: Any) -> Any:
+        if self.kind is float and type(value) is int:
+            value = float(value)
+        if type(value) is not self.kind:
+            raise ValueError(f"must be {_MEANT[self.kind]}")
+        if self.choices and value not in self.choices:
+            raise ValueError(self.said)
+        if isinstance(value, int | float) and self.kind is not bool:
+            self._check_size(value)
+        return value
 
     def _check_size(self, value: float) -> None:
         if not math.isfinite(value) and not (math.isinf(value) and self.may_be_infinite):
@@ -142,15 +154,13 @@ def domain_of(hint: Any, metadata: Iterable[object] = ()) -> Domain | None:
         return Domain(type(choices[0]), choices=choices, **common)
     if get_origin(kind) is tuple:
         first, *others = get_args(kind)
-        item = domain_of(first)
-        return (
-            None
-            if item is None
-            else Domain(tuple, item=item, length=None if others == [...] else 1 + len(others), **common)
-        )
+        item, several = domain_of(first), next((one for one in found if isinstance(one, Len)), Len())
+        is_fixed = others != [...]
+        lengths = (1 + len(others),) * 2 if is_fixed else (several.min_length, several.max_length)
+        return item and Domain(tuple, item=item, lengths=lengths, is_fixed=is_fixed, **common)
     if isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields"):
         item = domain_of(next(iter(get_type_hints(kind, include_extras=True).values()), None))
-        return None if item is None else Domain(kind, item=item, length=len(kind._fields), **common)
+        return item and Domain(kind, item=item, lengths=(len(kind._fields),) * 2, is_fixed=True, **common)
     if kind not in (bool, int, float, str):
         return None
     return Domain(
