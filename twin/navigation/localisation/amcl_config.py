@@ -5,10 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from twin.parameters import Fraction, Ge, Interval, Le, Metres, NotNegative, PerMetre, Positive, Radians
+from twin.parameters import Fraction, Ge, Interval, Le, Metres, Nav2, NotNegative, PerMetre, Positive, Radians
+from twin.parameters.forms import renamed
 
 LaserModelType = Literal["likelihood_field", "likelihood_field_prob", "beam"]
 MotionModelType = Literal["nav2_amcl::DifferentialMotionModel", "nav2_amcl::OmniMotionModel"]
+_UNTIL_GALACTIC = Nav2(
+    read=renamed(
+        differential="nav2_amcl::DifferentialMotionModel", omnidirectional="nav2_amcl::OmniMotionModel"
+    )
+)
 
 Alpha = Annotated[float, NotNegative, Le(100.0)]
 """A ratio of variances."""
@@ -32,7 +38,7 @@ class AmclConfig:
     """Driving noise per turn; Nav2: 0.2."""
     alpha5: Alpha = 0.01
     """Sideways noise per metre, of the omnidirectional model only; Nav2: 0.2."""
-    robot_model_type: MotionModelType = "nav2_amcl::DifferentialMotionModel"
+    robot_model_type: Annotated[MotionModelType, _UNTIL_GALACTIC] = "nav2_amcl::DifferentialMotionModel"
     """How odometry is wrong: of a drive that cannot, or that can go sideways."""
     min_particles: Annotated[int, Interval(ge=1, le=100_000)] = 500
     """Fewest particles."""

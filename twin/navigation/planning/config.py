@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from twin.geometry import Array
-from twin.parameters import Fraction, Interval, Le, Metres, NotNegative, Seconds
+from twin.parameters import Fraction, Interval, Le, Metres, Nav2, NotNegative, Seconds
 
 Tolerance = Annotated[Metres, Interval(ge=0.0, le=10.0)]
 """Every cell within it is looked at."""
@@ -55,6 +55,14 @@ class ThetaStarConfig:
         return 1.0 + self.w_traversal_cost / self.w_euc_cost * level**2
 
 
+_ENDLESS = 1_000_000_000
+"""Poses of a search that Nav2 does not limit."""
+
+
+def _unlimited(value: Any) -> Any:
+    return _ENDLESS if type(value) is int and value <= 0 else value
+
+
 Penalty = Annotated[float, Interval(ge=1.0, le=1000.0)]
 
 
@@ -84,7 +92,7 @@ class HybridConfig:
     """What a metre of a turn counts."""
     cost_penalty: Weight = 2.0
     """A metre at cost 252 counts as 1 + cost_penalty metres of free space."""
-    max_iterations: Annotated[int, Interval(ge=1, le=1_000_000_000)] = 1_000_000
+    max_iterations: Annotated[int, Interval(ge=1, le=_ENDLESS), Nav2(read=_unlimited)] = 1_000_000
     """Poses that are expanded at most."""
     smooth_path: bool = True
     """Whether parts of the path give way to single curves where those are cheaper."""

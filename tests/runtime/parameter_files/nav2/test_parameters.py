@@ -421,7 +421,7 @@ velocity_smoother:
         "controller_server has no critic 'CostCritc'; did you mean 'CostCritic'?",
         "controller_server: FollowPath.CostCritic.cost_weight must be at least 0, not -3.0",
         "planner_server: GridBased.motion_model_for_search must be 'DUBIN' or 'REEDS_SHEPP', not 'LATTICE'",
-        "planner_server: GridBased.minimum_turning_radius must be greater than 0, not 0.0",
+        "planner_server: GridBased.minimum_turning_radius must be greater than 0 and at most 100, not 0.0",
     ]
 
 

@@ -37,15 +37,6 @@ _SECTIONS = {
 """List of plugins -> what the section of the first one is called here. Until Iron the last was one name."""
 
 
-_ROBOT_MODELS = {
-    "differential": "nav2_amcl::DifferentialMotionModel",
-    "omnidirectional": "nav2_amcl::OmniMotionModel",
-}
-"""amcl's motion models until Galactic."""
-_ENDLESS = 1_000_000_000
-"""Poses of a search that Nav2 does not limit."""
-
-
 class Value(NamedTuple):
     """A parameter's value and where it comes from."""
 
@@ -111,12 +102,6 @@ def converted(values: dict[str, Value]) -> dict[str, Value]:
         elif corners is not None:
             out["footprint"] = footprint._replace(value=corners)
             out.pop("robot_radius", None)  # as in Nav2, where the polygon goes first
-    for name, entry in values.items():
-        last = name.rpartition(".")[2]
-        if last == "robot_model_type" and entry.value in _ROBOT_MODELS:
-            out[name] = entry._replace(value=_ROBOT_MODELS[entry.value])
-        elif name == "GridBased.max_iterations" and type(entry.value) is int and entry.value <= 0:
-            out[name] = entry._replace(value=_ENDLESS)
     return out
 
 
@@ -165,12 +150,6 @@ def flat(values: dict[str, Value], known: tuple[str, ...]) -> dict[str, Value]:
 def class_of(plugin: object) -> str:
     """Return a plugin's class without its package, which stands before '::' or, until Iron, before '/'."""
     return re.split("::|/", str(plugin))[-1]
-
-
-def local_name(name: str) -> str:
-    """Return a parameter's name without the section of its plugin, as scenarios have it."""
-    section, _, rest = name.partition(".")
-    return rest if rest and section in _SECTIONS.values() else name
 
 
 def is_same(plugin: str, config: Any) -> bool:
