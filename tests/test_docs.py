@@ -9,10 +9,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 import pytest
 import typer
@@ -154,6 +156,10 @@ def test_commands_and_snippets_run(page: str, tmp_path: Path) -> None:
             reader.save(block)
         elif block.language == "yaml":
             assert yaml.safe_load(block.text)
+        elif block.language == "toml":
+            assert tomllib.loads(block.text)
+        elif block.language == "xml":
+            ElementTree.fromstring(block.text)
         elif block.language == "python":
             (tmp_path / "snippet.py").write_text(block.text, encoding="utf-8")
             reader.type("python snippet.py", [])
@@ -166,7 +172,7 @@ def test_commands_and_snippets_run(page: str, tmp_path: Path) -> None:
 
 def test_no_command_hides_in_another_kind_of_block() -> None:
     kinds = {block.language for page in PAGES for block in blocks(page)}
-    assert kinds <= {"console", "python", "yaml", ""}
+    assert kinds <= {"console", "python", "yaml", "toml", "xml", ""}
     hidden = [
         b.text for page in PAGES for b in blocks(page) if not b.language and re.search(r"^\$ ", b.text, re.M)
     ]
