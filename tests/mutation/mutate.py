@@ -73,7 +73,7 @@ def tried(
         if widely:
             tests.append(mirror(mutant.site.file, reach.seconds))
         try:
-            noticed = copy.notices(mutant, tests, 60.0 + 5.0 * (reach.cost(tests) + 60.0 * widely))
+            noticed = copy.notices(mutant, tests, 30.0 + 5.0 * (reach.cost(tests) + 60.0 * widely))
         finally:
             free.put(copy)
         site = mutant.site
