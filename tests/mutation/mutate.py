@@ -43,9 +43,13 @@ def draw(root: Path, reach: Reach, seed: int, count: int) -> list[Mutant]:
     for module in modules:
         for site in filter(reach.reaches, sites_of(root, module.relative_to(root).as_posix())):
             lines.setdefault((site.file, site.line), []).append(site)
-    rng = random.Random(seed)
-    chosen = rng.sample(sorted(lines), min(count, len(lines)))
-    return [mutant for line in chosen if (mutant := mutant_at(root, rng.choice(lines[line]))) is not None]
+    rng, drawn = random.Random(seed), list[Mutant]()
+    while len(drawn) < count and lines:
+        for line in rng.sample(sorted(lines), min(count - len(drawn), len(lines))):
+            mutant = mutant_at(root, rng.choice(lines.pop(line)))
+            if mutant is not None:
+                drawn.append(mutant)
+    return drawn
 
 
 def tried(
@@ -69,7 +73,7 @@ def tried(
         if widely:
             tests.append(mirror(mutant.site.file, reach.seconds))
         try:
-            noticed = copy.notices(mutant, tests, 60.0 + 5.0 * (reach.cost(tests) + 60.0 * widely))
+            noticed = copy.notices(mutant, tests, 30.0 + 5.0 * (reach.cost(tests) + 60.0 * widely))
         finally:
             free.put(copy)
         site = mutant.site

@@ -49,7 +49,12 @@ def traced(file: Path, script: str) -> list[list[str]]:
     for step in script:
         events.clear()
         if step == "t":
-            said = NAMES[tree.tick()]
+            status = tree.tick()
+            said = NAMES[status]
+            if (
+                status.is_completed
+            ):  # tickOnce does; here the root keeps it until whoever ran the tree halts it
+                tree.root.set_status(Status.IDLE)
         else:
             said = "h"
             tree.halt()

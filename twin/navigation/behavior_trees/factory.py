@@ -80,15 +80,16 @@ class Tree:
         self.blackboard = blackboard
 
     def tick(self) -> Status:
-        """Tick from the root, again while a node asks for it (BehaviorTree.CPP's tickOnce); its status."""
-        status, context = self.root.execute_tick(), self.root.context
+        """Tick from the root, again while a node asks for it (BehaviorTree.CPP's tickOnce); its status.
+
+        A root that has ended keeps its status; `halt` before the next start, as the navigator does.
+        """
+        context, status = self.root.context, self.root.execute_tick()
         for _ in range(_MOST_WAKE_UPS):
             if status is not Status.RUNNING or not context.woken:
                 break
             context.woken = False
             status = self.root.execute_tick()
-        if status.is_completed:
-            self.root.set_status(Status.IDLE)
         return status
 
     def halt(self) -> None:

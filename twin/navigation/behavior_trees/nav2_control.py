@@ -81,6 +81,8 @@ class RecoveryNode(ControlNode):
 
     def _end(self, status: Status) -> Status:
         self.halt()
+        if status is Status.SKIPPED:
+            self.set_status(Status.IDLE)
         return status
 
 
@@ -120,7 +122,10 @@ class RoundRobin(ControlNode):
                 self.reset_children()
                 return status
         self.halt()
-        return Status.SKIPPED if skipped == count else Status.FAILURE
+        if skipped < count:
+            return Status.FAILURE
+        self.set_status(Status.IDLE)
+        return Status.SKIPPED
 
     def halt(self) -> None:
         """Begin with the first child next time."""

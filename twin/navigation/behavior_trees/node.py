@@ -155,9 +155,8 @@ class ControlNode(TreeNode):
     CHILDREN: ClassVar[tuple[int, int | None]] = (1, None)
 
     def halt(self) -> None:
-        """Reset the children, and be idle."""
+        """Reset the children."""
         self.reset_children()
-        self.set_status(Status.IDLE)
 
 
 class DecoratorNode(TreeNode):
@@ -179,9 +178,8 @@ class DecoratorNode(TreeNode):
         return status
 
     def halt(self) -> None:
-        """Reset the child, and be idle."""
+        """Reset the child."""
         self.child.reset()
-        self.set_status(Status.IDLE)
 
 
 class ConditionNode(TreeNode):

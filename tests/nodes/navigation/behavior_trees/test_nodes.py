@@ -150,7 +150,7 @@ def test_distance_is_counted_from_where_it_held_last(bed: Bed) -> None:
     tree = bed.load('DistanceTraveled distance="0.5"')
     for x, says in ((0.0, FAILURE), (0.4, FAILURE), (0.6, SUCCESS), (1.0, FAILURE), (1.2, SUCCESS)):
         bed.at(x)
-        assert tree.root.execute_tick() is says, x
+        assert tree.tick() is says, x
 
 
 def test_a_goal_is_nearby_when_little_of_the_path_is_left(bed: Bed) -> None:
@@ -173,7 +173,7 @@ def test_time_expires_again_and_again(bed: Bed, text: str) -> None:
     tree = bed.load(text, path=straight(0.0, 1.0))
     for seconds, says in ((0.0, FAILURE), (0.9, FAILURE), (0.2, SUCCESS), (0.9, FAILURE), (0.2, SUCCESS)):
         bed.bench.run(seconds)
-        assert tree.root.execute_tick() is says
+        assert tree.tick() is says
 
 
 CODES = [
@@ -214,7 +214,7 @@ def test_a_child_is_ticked_every_so_many_metres(bed: Bed) -> None:
     ticked = []
     for x in (0.0, 0.3, 0.6, 0.9, 1.2):
         bed.at(x)
-        tree.root.execute_tick()
+        tree.tick()
         ticked.append(bed.ticks)
     assert ticked == [1, 1, 2, 2, 3]
 
@@ -225,7 +225,7 @@ def test_a_child_is_ticked_more_often_at_speed(bed: Bed, speed: float, ticks: in
     tree = bed.load(decorated(f"SpeedController {rates}"))
     for _ in range(round(2.9 / (2 * TICK_S))):
         bed.drive(speed)
-        tree.root.execute_tick()
+        tree.tick()
     assert bed.ticks == ticks, "at once, after 0.5 s, then every second, or every half"
 
 
@@ -299,7 +299,7 @@ def test_lists_of_goals(bed: Bed, text: str, left: list[float]) -> None:
     goals = [stamped(x) for x in (1.0, 2.0, 3.0)]
     tree = bed.load(f'{text} output_goals="{{goals}}"', goals=goals, last=stamped(4.0))
     bed.at(0.7)
-    bed.bench.until(lambda: tree.root.execute_tick() is not RUNNING, 1.0)
+    bed.bench.until(lambda: tree.tick() is not RUNNING, 1.0)
     assert tree.root.status is SUCCESS
     assert [pose2_from_pose(goal.pose).x for goal in bed.blackboard.get("goals")] == left
 
@@ -319,7 +319,7 @@ def test_cancelling_ends_what_somebody_else_began(bed: Bed, name: str) -> None:
     tree = bed.load(name)
     sent = client.send_goal(new(node.ACTION.Goal))
     bed.bench.until(lambda: sent.accepted, 1.0)
-    bed.bench.until(lambda: tree.root.execute_tick() is not RUNNING, 1.0)
+    bed.bench.until(lambda: tree.tick() is not RUNNING, 1.0)
     assert tree.root.status is SUCCESS
     bed.bench.until(lambda: sent.done, 1.0)
     assert sent.status == GoalStatus.STATUS_CANCELED
