@@ -25,6 +25,7 @@ from twin.runtime.stacks.commands import build_commands
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
+from twin.warehouse.docks import TOTE_POSES
 
 
 def build_navigation(
@@ -80,6 +81,7 @@ def build_navigation(
             parameters.docking,
             costmap=local_costmap,
             footprint=footprint,
+            boxes=TOTE_POSES,
             namespace=namespace,
         )
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
