@@ -105,7 +105,7 @@ def test_massless_links_that_carry_others_stand_in() -> None:
     text = robot(inertial(1, CUBE), "").urdf.replace(inertial(1, CUBE), "", 2)
     text = text.replace("</robot>", f"{chain}<link name='end'>{inertial(1, CUBE)}</link></robot>")
     description = parse_urdf(text, Path("r.urdf"))
-    assert description.settlement.stand_ins == {"tip"}
+    assert description.settlement.massless_carriers == {"tip"}
 
 
 @settings(max_examples=40, deadline=None)

@@ -88,7 +88,7 @@ def _notes(description: RobotDescription) -> str:
     counted = {
         "lumped": len(settlement.lumped),
         "point or rounded inertia": len(settlement.repaired),
-        "massless but carrying": len(settlement.stand_ins),
+        "massless but carrying": len(settlement.massless_carriers),
     }
     return ", ".join(f"{number} {what}" for what, number in counted.items() if number)
 

@@ -18,7 +18,7 @@ from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
 from twin.bridge.topics import Sample
-from twin.bridge.topics.in_process import Exchange
+from twin.bridge.topics.in_process import InProcess
 from twin.bridge.wire import Wire
 from twin.bridge.wire.external import Arrival, ExternalQueue
 from twin.bridge.wire.interrupts import guard
@@ -40,8 +40,8 @@ class Bus:
 
     def __init__(self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool) -> None:
         self.zenoh = session
-        """The session, for those who hear no topic by it, or tell the exchange."""
-        self.exchange = Exchange(is_private=not networked)
+        """The session, for those who hear no topic by it, or tell `in_process`."""
+        self.in_process = InProcess(is_private=not networked)
         self.clock = clock
         self.naming = naming
         self.domain_id = naming.domain_id
@@ -140,7 +140,7 @@ class Bus:
     @property
     def session(self) -> zenoh.Session:
         """The Zenoh session. Who takes it may hear topics: from then on all messages go through it."""
-        self.exchange.is_private = False
+        self.in_process.is_private = False
         return self.zenoh
 
     @property

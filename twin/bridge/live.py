@@ -23,7 +23,7 @@ from twin.bridge.programs import ros_args
 from twin.bridge.programs.arguments import parser_of, split
 from twin.bridge.programs.console_log import show_log
 from twin.bridge.wire import Wire
-from twin.bridge.wire.admission import Entrance, read
+from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.interrupts import noted_signals
 from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.naming import Interface
@@ -81,7 +81,7 @@ class SimTime:
         self._now_ns = 0
         name = self._codec.msgtype
         clock = Interface("/clock", types.dds_name(name), types.rihs01(name))
-        self._entrance = Entrance(bus.external, clock)
+        self._admission = Admission(bus.external, clock)
         self._subscribers = [
             bus.session.declare_subscriber(key, direct(self._on_sample)) for key in bus.naming.heard(clock)
         ]
@@ -94,7 +94,7 @@ class SimTime:
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         attachment = sample.attachment.to_bytes() if sample.attachment else None
-        if self._entrance.source(str(sample.key_expr), attachment) is None:
+        if self._admission.source(str(sample.key_expr), attachment) is None:
             return
         message = read(self._bus.external, "/clock", self._codec, sample.payload.to_bytes())
         if message is None:

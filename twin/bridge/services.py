@@ -11,7 +11,7 @@ from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
-from twin.bridge.wire.admission import Entrance, read
+from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, pack_attachment
 from twin.bridge.wire.naming import parse_key
@@ -101,7 +101,7 @@ class Service(Endpoint):
         self._callback = callback
         self._open: set[zenoh.Query] = set()
         bus = node.bus
-        self._entrance = Entrance(bus.external, self.interface)
+        self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
             queryable = bus.zenoh.declare_queryable(key, direct(self._on_query), complete=True)
             self._declared.append(queryable)
@@ -151,7 +151,7 @@ class Service(Endpoint):
     def _on_query(self, query: zenoh.Query) -> None:
         bus = self.node.bus
         key, attachment = str(query.key_expr), query.attachment
-        source = self._entrance.source(key, attachment.to_bytes() if attachment else None)
+        source = self._admission.source(key, attachment.to_bytes() if attachment else None)
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
         elif bus.in_own_thread():

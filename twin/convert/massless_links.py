@@ -19,7 +19,7 @@ def refuse_singular(model: mujoco.MjModel, description: RobotDescription) -> Non
     Raises:
         ConversionError: Some motion of the joints moves no mass: any force accelerates it without end.
     """
-    if not description.settlement.stand_ins:
+    if not description.settlement.massless_carriers:
         return
     rng = np.random.Generator(np.random.Philox(0))
     for positions in (model.qpos0, rng.uniform(-0.5, 0.5, size=model.nq)):
@@ -44,11 +44,11 @@ def _least_motion(model: mujoco.MjModel, positions: Array) -> tuple[float, Array
 
 
 def _refuse(model: mujoco.MjModel, description: RobotDescription, motion: Array) -> None:
-    stand_ins = description.settlement.stand_ins
+    massless_carriers = description.settlement.massless_carriers
     moving = np.abs(motion) > 0.1
     bodies = {model.body(model.dof_bodyid[dof]).name for dof in np.flatnonzero(moving)}
     joints = [joint.name for joint in description.joints.values() if joint.child in bodies]
-    links = sorted(stand_ins & bodies) or sorted(stand_ins)
+    links = sorted(massless_carriers & bodies) or sorted(massless_carriers)
     raise ConversionError(
         Problem(
             f"link '{links[0]}' has no mass, and joints {', '.join(joints)} can turn together and move none; "

@@ -63,7 +63,7 @@ class Settlement:
     """Links whose mass properties went to another one, and to which."""
     repaired: Mapping[str, Repair]
     """Links with the nearest possible inertia."""
-    stand_ins: frozenset[str]
+    massless_carriers: frozenset[str]
     """Links without mass that move and carry others by joints; a mass of `STAND_IN` makes no difference."""
 
 
@@ -135,10 +135,10 @@ def settle(description: RobotDescription) -> Settlement:
                 change=_change(whole.inertia, bodies[head].inertia),
                 parts=tuple(name for name in parts if name != head),
             )
-    stand_ins = _carriers(description, bodies)
+    carriers = frozenset(_carriers(description, bodies))
     trifle = MassProperties(mass=STAND_IN, com=np.zeros(3), inertia=STAND_IN * np.eye(3))
-    bodies |= dict.fromkeys(stand_ins, trifle)
-    return Settlement(bodies=bodies, lumped=lumped, repaired=repaired, stand_ins=frozenset(stand_ins))
+    bodies |= dict.fromkeys(carriers, trifle)
+    return Settlement(bodies=bodies, lumped=lumped, repaired=repaired, massless_carriers=carriers)
 
 
 def _carriers(description: RobotDescription, bodies: Mapping[str, MassProperties]) -> list[str]:

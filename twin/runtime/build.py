@@ -25,7 +25,7 @@ from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.runtime.defaults.drives import with_drive
 from twin.runtime.events.obstacles import hidden_pose, standing_pose
-from twin.runtime.parameter_files.unpublished_topics import tell_unheard_scans
+from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished_scans
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.missions import MissionHandle, build_mission
 from twin.runtime.stacks.robot import RobotStack
@@ -147,7 +147,7 @@ def build(
         bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)
-        tell_unheard_scans(bus)
+        warn_of_unpublished_scans(bus)
     except BaseException:
         bus.close()
         raise

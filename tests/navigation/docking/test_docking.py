@@ -117,8 +117,8 @@ def test_what_has_another_width_is_no_tote() -> None:
 # DockEstimate: the plan expects the face at x = 2; the robot stands at the origin
 
 
-def estimate(*, wants_tote: bool = True) -> DockEstimate:
-    return DockEstimate(Pose2(2.0, 0.0, 0.0), DockEstimateConfig(), wants_tote=wants_tote)
+def estimate(*, wants_box: bool = True) -> DockEstimate:
+    return DockEstimate(Pose2(2.0, 0.0, 0.0), DockEstimateConfig(), wants_box=wants_box)
 
 
 ORIGIN = Pose2(0.0, 0.0, 0.0)
@@ -130,7 +130,7 @@ def test_the_dock_is_where_it_is_seen_not_where_the_plan_says() -> None:
     for _ in range(3):
         assert not dock.seen
         dock.take_scan(FACE, ORIGIN)
-        dock.take_totes([Pose2(2.05, 0.08, 0.0)], ORIGIN)
+        dock.take_boxes([Pose2(2.05, 0.08, 0.0)], ORIGIN)
     assert dock.seen
     assert dock.face == pytest.approx((1.997, 0.078, 0.033), abs=0.006)
 
@@ -141,7 +141,7 @@ def test_a_robot_that_has_moved_sees_the_same_dock() -> None:
         dock = estimate()
         for _ in range(3):
             dock.take_scan(base.inverse().apply(FACE), base)
-            dock.take_totes([base.inverse() @ Pose2(2.05, 0.08, 0.0)], base)
+            dock.take_boxes([base.inverse() @ Pose2(2.05, 0.08, 0.0)], base)
         seen.append(dock.face)
     assert seen[0] == pytest.approx(seen[1], abs=1e-9)
 
@@ -152,7 +152,7 @@ def test_the_tote_of_the_slot_is_taken_however_the_robot_is_turned() -> None:
     dock = estimate()
     for _ in range(20):
         dock.take_scan(base.inverse().apply(FACE), base)
-        dock.take_totes([base.inverse() @ Pose2(2.05, y, 0.0) for y in (0.5, 0.04)], base)
+        dock.take_boxes([base.inverse() @ Pose2(2.05, y, 0.0) for y in (0.5, 0.04)], base)
     assert dock.face.y == pytest.approx(0.04, abs=0.01)
 
 
@@ -160,32 +160,32 @@ def test_a_neighbours_tote_never_draws_the_estimate_away() -> None:
     dock = estimate()
     for _ in range(3):
         dock.take_scan(FACE, ORIGIN)
-        assert dock.take_totes([Pose2(2.05, 0.1, 0.0)], ORIGIN)
+        assert dock.take_boxes([Pose2(2.05, 0.1, 0.0)], ORIGIN)
     for _ in range(50):
-        assert not dock.take_totes([Pose2(2.05, 0.45, 0.0)], ORIGIN), "though near to what was seen last"
+        assert not dock.take_boxes([Pose2(2.05, 0.45, 0.0)], ORIGIN), "though near to what was seen last"
     assert dock.face.y == pytest.approx(0.1, abs=0.01)
 
 
 def test_a_wall_seen_between_goods_is_no_tote() -> None:
     dock = estimate()
     dock.take_scan(FACE, ORIGIN)
-    assert not dock.take_totes([Pose2(2.5, 0.0, 0.0)], ORIGIN), "half a metre behind the edge of the shelf"
-    assert dock.take_totes([Pose2(2.5, 0.0, 0.0), Pose2(2.05, 0.1, 0.0)], ORIGIN)
+    assert not dock.take_boxes([Pose2(2.5, 0.0, 0.0)], ORIGIN), "half a metre behind the edge of the shelf"
+    assert dock.take_boxes([Pose2(2.5, 0.0, 0.0), Pose2(2.05, 0.1, 0.0)], ORIGIN)
 
 
 def test_single_wrong_sights_change_nothing() -> None:
     dock = estimate()
     for i in range(9):
         dock.take_scan(FACE + ((0.1, 0.0) if i % 4 == 0 else (0.0, 0.0)), ORIGIN)
-        dock.take_totes([Pose2(2.05, 0.19 if i % 4 == 0 else 0.02, 0.0)], ORIGIN)
+        dock.take_boxes([Pose2(2.05, 0.19 if i % 4 == 0 else 0.02, 0.0)], ORIGIN)
     assert dock.face == pytest.approx((1.999, 0.018, 0.033), abs=0.006)
 
 
 def test_a_table_is_docked_at_where_the_plan_says_along_it() -> None:
-    dock = estimate(wants_tote=False)
+    dock = estimate(wants_box=False)
     for _ in range(3):
         dock.take_scan(FACE, ORIGIN)
-        assert not dock.take_totes([Pose2(2.05, 0.1, 0.0)], ORIGIN)
+        assert not dock.take_boxes([Pose2(2.05, 0.1, 0.0)], ORIGIN)
     assert dock.seen
     assert dock.face == pytest.approx((2.0, 0.0, 0.033), abs=0.006)
 

@@ -12,7 +12,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import INFINITE_NS, QoS
-from twin.bridge.wire.admission import Entrance, read
+from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.wire.naming import Interface
@@ -95,15 +95,16 @@ class Publisher(Endpoint, Generic[M]):
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
-        self._line = None if self._latched or node.bus.networked else node.bus.exchange.line(self.key)
+        by_zenoh = self._latched or node.bus.networked
+        self._listeners = None if by_zenoh else node.bus.in_process.listeners(self.key)
         self._declared.append(self._zenoh)
         self.announce()
 
     @property
     def has_subscribers(self) -> bool:
         """Whether somebody listens now, here or elsewhere; always true if latched: Zenoh does not tell."""
-        if self._line is not None and self._line.is_direct:
-            return bool(self._line.receivers)
+        if self._listeners is not None and self._listeners.is_direct:
+            return bool(self._listeners.receivers)
         return self._latched or self._zenoh.matching_status.matching
 
     def publish(self, message: M) -> None:
@@ -124,12 +125,12 @@ class Publisher(Endpoint, Generic[M]):
             sample = Sample(self, self._sequence, time_ns, message)
             for tap in self._bus.taps:
                 tap(sample)
-        line = self._line
-        if line is not None and line.is_direct and self._bus.in_own_thread():
-            if line.receivers:
+        listeners = self._listeners
+        if listeners is not None and listeners.is_direct and self._bus.in_own_thread():
+            if listeners.receivers:
                 payload = self.codec.encode(message) if sample is None else sample.payload
                 data = payload, Attachment(self._sequence, time_ns, self.gid)
-                for receiver in line.receivers:
+                for receiver in listeners.receivers:
                     receiver.enqueue(data, False)
             return
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
@@ -169,15 +170,15 @@ class Subscription(Endpoint, Generic[M]):
         self._networked = bus.networked
         # ros2dds's keys tell no type: what comes even from here may be another one's.
         self._untyped = bus.networked and bus.naming.wire == "ros2dds"
-        self._entrance = Entrance(bus.external, self.interface)
+        self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
             self._declared.append(declare_subscriber(bus.zenoh, key, self._on_sample, qos))
-        self._line = bus.exchange.line(self.key)
+        self._listeners = bus.in_process.listeners(self.key)
         self._latched = qos.durability == "transient_local"
         if self._latched:
-            self._line.through_zenoh += 1
+            self._listeners.through_zenoh += 1
         else:
-            self._line.receivers.append(self)
+            self._listeners.receivers.append(self)
         self.announce()
 
     @property
@@ -223,9 +224,9 @@ class Subscription(Endpoint, Generic[M]):
         """Leave the graph; waiting messages are not delivered."""
         if self._declared:
             if self._latched:
-                self._line.through_zenoh -= 1
+                self._listeners.through_zenoh -= 1
             else:
-                self._line.receivers.remove(self)
+                self._listeners.receivers.remove(self)
         super().destroy()
         for entry in self._pending:
             entry[0] = None
@@ -240,7 +241,7 @@ class Subscription(Endpoint, Generic[M]):
                 self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
         attachment = sample.attachment.to_bytes() if sample.attachment else None
-        source = self._entrance.source(str(sample.key_expr), attachment)
+        source = self._admission.source(str(sample.key_expr), attachment)
         if source is not None:
             payload = sample.payload.to_bytes()
             bus.external.push(Arrival(source, self, (payload, source), len(payload)))

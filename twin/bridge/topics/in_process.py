@@ -14,13 +14,13 @@ class Receiver(Protocol):
         """Put a payload and its source into the node's inbox."""
 
 
-class Line:
+class Listeners:
     """Who hears one key."""
 
-    __slots__ = ("_exchange", "receivers", "through_zenoh")
+    __slots__ = ("_all", "receivers", "through_zenoh")
 
-    def __init__(self, exchange: Exchange) -> None:
-        self._exchange = exchange
+    def __init__(self, every: InProcess) -> None:
+        self._all = every
         self.receivers: list[Receiver] = []
         """Those who can be given a message directly; Zenoh reaches them too."""
         self.through_zenoh = 0
@@ -29,10 +29,10 @@ class Line:
     @property
     def is_direct(self) -> bool:
         """Whether the receivers are all who hear the key."""
-        return not self.through_zenoh and self._exchange.is_private
+        return not self.through_zenoh and self._all.is_private
 
 
-class Exchange:
+class InProcess:
     """Who hears what on a bus that has no network.
 
     A message that Zenoh carries from one node of a process to another costs several times as much as one that
@@ -41,9 +41,9 @@ class Exchange:
 
     def __init__(self, is_private: bool) -> None:
         self.is_private = is_private
-        """Whether nobody can hear a topic of whom the exchange does not know."""
-        self._lines: dict[str, Line] = {}
+        """Whether nobody can hear a topic who is not known here."""
+        self._listeners: dict[str, Listeners] = {}
 
-    def line(self, key: str) -> Line:
+    def listeners(self, key: str) -> Listeners:
         """Return who hears a key, now and later."""
-        return self._lines.setdefault(key, Line(self))
+        return self._listeners.setdefault(key, Listeners(self))

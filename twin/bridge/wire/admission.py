@@ -1,4 +1,4 @@
-"""The door between other processes and one endpoint: who sends, and whether it is what is carried."""
+"""Admits what other processes send to an endpoint, or refuses it: who sends, and is it what is carried?"""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _WORD = 4
 """Fewer bytes than this after a message fill its last word."""
 
 
-class Entrance:
+class Admission:
     """Judges samples and requests of one topic or service; called in any thread."""
 
     def __init__(self, external: ExternalQueue, item: Interface) -> None:

@@ -96,7 +96,7 @@ class DockEstimateConfig:
     min_length: Annotated[Metres, NotNegative] = 0.3
     """A shorter line is another thing."""
     tote_reach: Annotated[Metres, NotNegative] = 0.2
-    """A tote further aside of the expected point is another one; less than half of totes' spacing."""
+    """A box further aside of the expected point is another one; less than half of boxes' spacing."""
     tote_depth: Annotated[Metres, NotNegative] = 0.2
     """So is one further behind the face than this, or before it."""
     width_tolerance: Annotated[Metres, NotNegative] = 0.08

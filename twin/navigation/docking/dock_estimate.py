@@ -1,7 +1,7 @@
 """Where the face of a dock is: the plan says where to expect it, scans tell where it is.
 
 A measurement counts if it is near what the plan says, not near the estimate so far: otherwise a neighbour's
-tote could draw the estimate away step by step. Of what counts, the median of the latest few is taken, so that
+box could draw the estimate away step by step. Of what counts, the median of the latest few is taken, so that
 a single wrong sight changes nothing.
 """
 
@@ -22,23 +22,23 @@ class DockEstimate:
     """The face of one dock, in the odom frame."""
 
     def __init__(
-        self, expected: Pose2, config: DockEstimateConfig, *, wants_tote: bool, face_width: float = 0.0
+        self, expected: Pose2, config: DockEstimateConfig, *, wants_box: bool, face_width: float = 0.0
     ) -> None:
         """Begin with what the plan says.
 
         Args:
             expected: Point on the face, x into the dock, in the odom frame.
             config: What is believed.
-            wants_tote: Whether to line up with the tote there, or with the expected point.
+            wants_box: Whether to line up with the box there, or with the expected point.
             face_width: Of a face whose middle is to be lined up with [m]; 0: the expected point is.
         """
         self.config = config
-        self.wants_tote = wants_tote
+        self.wants_box = wants_box
         self.face_width = face_width
         self._expected = expected
         self._walls: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
         self._middles: deque[tuple[float, float]] = deque(maxlen=config.max_sights)
-        """What to line up with: totes, or middles of the face, in the expected dock's frame."""
+        """What to line up with: boxes, or middles of the face, in the expected dock's frame."""
 
     @property
     def seen_face(self) -> bool:
@@ -48,7 +48,7 @@ class DockEstimate:
     @property
     def seen(self) -> bool:
         """Whether all that is looked for was seen often enough."""
-        knows_middle = not self.wants_tote and not self.face_width
+        knows_middle = not self.wants_box and not self.face_width
         return self.seen_face and (knows_middle or len(self._middles) >= self.config.min_sights)
 
     @property
@@ -57,7 +57,7 @@ class DockEstimate:
         edge = self._edge()
         if not self._middles:
             return self._expected @ edge
-        # The tote stands behind the edge: its foot on the face is what the robot lines up with.
+        # The box stands behind the edge: its foot on the face is what the robot lines up with.
         x, y = np.median(self._middles, axis=0).tolist()
         return self._expected @ edge @ Pose2(0.0, (edge.inverse() @ Pose2(x, y, 0.0)).y, 0.0)
 
@@ -99,16 +99,16 @@ class DockEstimate:
         if abs(y) <= self.config.tote_reach:
             self._middles.append((x, y))
 
-    def take_totes(self, totes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
-        """Look for the tote among faces seen, in the base frame; return whether it is one of them."""
-        if not self.wants_tote:
+    def take_boxes(self, boxes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
+        """Look for the box among faces seen, in the base frame; return whether it is one of them."""
+        if not self.wants_box:
             return False
         T_expected_base = self._expected.inverse() @ T_odom_base
         edge, config = self._edge(), self.config
-        seen = [T_expected_base @ tote for tote in totes]
+        seen = [T_expected_base @ box for box in boxes]
         there = [t for t in seen if abs(t.x - edge.x) <= config.tote_depth and abs(t.y) <= config.tote_reach]
         if not there:
             return False
-        nearest = min(there, key=lambda tote: abs(tote.y))
+        nearest = min(there, key=lambda box: abs(box.y))
         self._middles.append((nearest.x, nearest.y))
         return True

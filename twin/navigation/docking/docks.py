@@ -25,7 +25,7 @@ class DockType:
     is_charger: bool = False
     """Whether docking ends only when the battery is charged."""
     detection: Detection = "face"
-    """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a tote)."""
+    """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a box)."""
     use_external_detection_pose: bool = False
     """Whether `detected_dock_pose` tells instead."""
     face_width: Annotated[Metres, NotNegative, Le(100.0)] = 0.0
@@ -81,14 +81,7 @@ class DockError(Exception):
         self.code = code
 
 
-_TYPES: Mapping[str, DockType] = MappingProxyType(
-    {
-        "tote": DockType(detection="tote"),
-        "shelf": DockType(),
-        "table": DockType(),
-        "charger": DockType(is_charger=True, face_width=0.6),
-    }
-)
+_TYPES: Mapping[str, DockType] = MappingProxyType({"charger": DockType(is_charger=True, face_width=0.6)})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockTyp
 from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.docking import DockingParameters
+from twin.warehouse.docks import DOCK_TYPES
 
 
 def docking_config(group: DockingParameters) -> DockingServerConfig:
@@ -15,16 +16,16 @@ def docking_config(group: DockingParameters) -> DockingServerConfig:
     Raises:
         ScenarioError: a dock of a type that there is not.
     """
-    own = DockDatabase()
+    own = {**DOCK_TYPES, **DockDatabase().types}
     changed = {
-        name: overridden(own.types.get(name, DockType()), parameters.overrides())
+        name: overridden(own.get(name, DockType()), parameters.overrides())
         for name, parameters in group.types.items()
     }
     docks = {
         name: Dock(type=dock.type, frame=dock.frame, pose=dock.pose.pose)
         for name, dock in group.docks.items()
     }
-    database = DockDatabase(types={**own.types, **changed}, docks=docks)
+    database = DockDatabase(types={**own, **changed}, docks=docks)
     for name, dock in docks.items():
         try:
             database.type_of(dock.type)

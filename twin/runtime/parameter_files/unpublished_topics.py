@@ -11,7 +11,7 @@ from twin.bridge.node import Node
 from twin.bridge.topics import Publisher, Subscription
 
 
-def tell_unheard(node: Node, topics: Mapping[str, tuple[str, type[Any]]]) -> None:
+def warn_of_unpublished(node: Node, topics: Mapping[str, tuple[str, type[Any]]]) -> None:
     """Warn of what a node listens to and nobody publishes, here or on the network.
 
     Args:
@@ -33,7 +33,7 @@ def tell_unheard(node: Node, topics: Mapping[str, tuple[str, type[Any]]]) -> Non
         node.get_logger().warn(f"{parameter}: nobody publishes {node.resolve_name(topic)}{there}")
 
 
-def tell_unheard_scans(bus: Bus) -> None:
+def warn_of_unpublished_scans(bus: Bus) -> None:
     """Warn of scans that nodes of the bus wait for and nobody publishes, here or on the network."""
     kind = LaserScan.__msgtype__
     both = [e for node in bus.nodes for e in node.endpoints if isinstance(e, Publisher | Subscription)]

@@ -26,6 +26,7 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
 from twin.sensors.lidar import LidarSpec
+from twin.warehouse.docks import TOTE_POSES
 
 
 def build_navigation(
@@ -84,6 +85,7 @@ def build_navigation(
             parameters.docking,
             costmap=local_costmap,
             footprint=footprint,
+            boxes=TOTE_POSES,
             namespace=namespace,
         )
     navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)

@@ -11,7 +11,7 @@ from twin.nodes.navigation.localisation.ekf_sources import KINDS
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.ekf import ekf_with_file
-from twin.runtime.parameter_files.unpublished_topics import tell_unheard
+from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.localisation_parameters import EkfParameters
 from twin.sensors.imu import ImuSpec
@@ -62,10 +62,10 @@ def odometry_filter(context: StackContext, frames: Frames) -> OdometryFilter | N
     return OdometryFilter(config=_with_overrides(config, odometry.parameters), told=tuple(told))
 
 
-def tell_unheard_sources(context: StackContext, node: EkfNode) -> None:
+def warn_of_unpublished_sources(context: StackContext, node: EkfNode) -> None:
     """Warn of sources that nobody publishes, once all nodes of the robot are there."""
     own = {"odom", *(spec.topic for spec in _imus(context))}
-    tell_unheard(
+    warn_of_unpublished(
         node.node,
         {
             name: (source.topic, KINDS[name.rstrip("0123456789")])

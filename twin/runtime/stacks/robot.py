@@ -23,7 +23,7 @@ from twin.runtime.defaults import from_description as derive
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.localisation import build_localisation
 from twin.runtime.stacks.navigation import build_navigation
-from twin.runtime.stacks.odometry_filter import odometry_filter, tell_unheard_sources
+from twin.runtime.stacks.odometry_filter import odometry_filter, warn_of_unpublished_sources
 
 
 class RobotStack:
@@ -70,7 +70,7 @@ class RobotStack:
             )
         self._build_arm(description)
         if fused is not None:
-            tell_unheard_sources(context, fused)
+            warn_of_unpublished_sources(context, fused)
 
     def _build_drive(
         self, description: RobotDescription, *, enable_odom_tf: bool

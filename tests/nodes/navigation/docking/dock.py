@@ -20,11 +20,13 @@ from twin.bridge.msgs import (
 )
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.navigation.docking.docks import DockDatabase
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.nodes.navigation.docking.server import DockingServerNode
+from twin.warehouse.docks import DOCK_TYPES
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LOCAL_COSTMAP = CostmapNodeConfig(
@@ -32,6 +34,9 @@ LOCAL_COSTMAP = CostmapNodeConfig(
     frame="odom",
     layers=CostmapConfig(footprint=FOOTPRINT, rolling_window=True, expected_update_rate=0.35),
 )
+
+
+CONFIG = DockingServerConfig(database=DockDatabase(types=DOCK_TYPES))
 
 
 class Dock:
@@ -55,11 +60,11 @@ class Dock:
         self.robot = Robot(bench, room, cmd_vel="cmd_vel_docking", start=start)
         pose = self.robot.pose_lookup
         local = CostmapNode(bench.bus, pose, LOCAL_COSTMAP) if costmap else None
-        DockingServerNode(bench.bus, pose, config, costmap=local, footprint=np.array(FOOTPRINT))
+        DockingServerNode(bench.bus, pose, config or CONFIG, costmap=local, footprint=np.array(FOOTPRINT))
         self.told: list[Any] = []
         self.dock_client = ActionClient(bench.node, DockRobot, "dock_robot")
         self.undock_client = ActionClient(bench.node, UndockRobot, "undock_robot")
-        self._totes = bench.node.create_publisher(PoseArray, "tote_poses", 1)
+        self._totes = bench.node.create_publisher(PoseArray, "box_poses", 1)
         bench.run(0.5)
 
     def send(self, kind: str = "table", believed: Pose2 | None = None, **fields: Any) -> Any:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from tests.nodes.conftest import Bench
-from tests.nodes.navigation.docking.dock import Dock
+from tests.nodes.navigation.docking.dock import CONFIG, Dock
 from twin.bridge.action_types import DockRobot, UndockRobot
 from twin.bridge.msgs import GoalStatus, new
 from twin.geometry import Pose2
 from twin.nodes.messages import pose_stamped
-from twin.nodes.navigation.docking.config import DockingServerConfig
 
 
 def test_docking_corrects_a_wrong_belief_by_the_scan(bench: Bench) -> None:
@@ -49,7 +49,7 @@ def test_a_tote_of_the_neighbouring_slot_is_not_the_one(bench: Bench) -> None:
     dock.show_totes(0.5)
     goal = dock.dock("tote")
     assert (goal.result.success, goal.result.error_code) == (False, 904)
-    assert goal.result.error_msg == "no tote in sight"
+    assert goal.result.error_msg == "no box in sight"
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3, -0.3])
@@ -117,7 +117,7 @@ def test_a_cancelled_docking_stops(bench: Bench) -> None:
 
 def driving(bench: Bench, x: float = 0.9, **changes: Any) -> tuple[Dock, Any]:
     """Return a robot on its way to the dock, which looks at a costmap, and its goal."""
-    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0), costmap=True, config=DockingServerConfig(**changes))
+    dock = Dock(bench, start=Pose2(0.7, 0.0, 0.0), costmap=True, config=replace(CONFIG, **changes))
     goal = dock.send()
     bench.until(lambda: dock.robot.pose.x > x, 20.0)
     return dock, goal

@@ -1,4 +1,4 @@
-"""Where the dock is that the robot drives to, as scans, the tote detector or `detected_dock_pose` tell."""
+"""Where the dock is that the robot drives to, as scans, a detector of boxes or `detected_dock_pose` tell."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from twin.nodes.navigation.scan_input import ScanInput
 class DockDetection:
     """Looks at what sensors say between `begin` and `end`."""
 
-    def __init__(self, node: Node, robot_pose: RobotPose, config: DockEstimateConfig) -> None:
+    def __init__(self, node: Node, robot_pose: RobotPose, config: DockEstimateConfig, boxes: str) -> None:
         self._node, self._robot_pose, self._config = node, robot_pose, config
         self._type = DockType()
         self._expected = Pose2(0.0, 0.0, 0.0)
@@ -29,7 +29,7 @@ class DockDetection:
         self._told: PoseStamped | None = None
         """The latest on `detected_dock_pose`."""
         node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA)
-        node.create_subscription(PoseArray, "tote_poses", self._on_tote_poses, 10)
+        node.create_subscription(PoseArray, boxes, self._on_boxes, 10)
         node.create_subscription(PoseStamped, "detected_dock_pose", self._on_detected, 1)
 
     def begin(self, docked: Pose2, type_: DockType) -> None:
@@ -41,7 +41,7 @@ class DockDetection:
             self._estimate = DockEstimate(
                 face,
                 self._config,
-                wants_tote=type_.detection == "tote",
+                wants_box=type_.detection == "tote",
                 face_width=type_.face_width,
             )
 
@@ -63,7 +63,7 @@ class DockDetection:
         """What is not in sight."""
         if self._estimate is None:
             return "detected_dock_pose"
-        return "tote" if self._estimate.seen_face and self._type.detection == "tote" else "face of the dock"
+        return "box" if self._estimate.seen_face and self._type.detection == "tote" else "face of the dock"
 
     def _from_topic(self) -> Pose2 | None:
         told = self._told
@@ -89,9 +89,9 @@ class DockDetection:
         points = T_base_lidar.apply(scan_points(message, math.nan))
         self._estimate.take_scan(points, T_odom_lidar @ T_base_lidar.inverse())
 
-    def _on_tote_poses(self, message: PoseArray) -> None:
+    def _on_boxes(self, message: PoseArray) -> None:
         if self._estimate is None:
             return
         T_odom_base = self._robot_pose.at_stamp(self._robot_pose.frames.odom, message.header)
         if T_odom_base is not None:
-            self._estimate.take_totes([pose2_from_pose(pose) for pose in message.poses], T_odom_base)
+            self._estimate.take_boxes([pose2_from_pose(pose) for pose in message.poses], T_odom_base)

@@ -1,6 +1,6 @@
 """`/docking_server`: the actions `dock_robot` and `undock_robot`, as in Nav2's opennav_docking.
 
-The map tells where to expect a dock; scans, totes or a detector tell where it is. What lies behind a dock's
+The map tells where to expect a dock; scans and detectors tell where it is. What lies behind a dock's
 face is its own business: a charger, a shelf, a table.
 """
 
@@ -54,13 +54,15 @@ class DockingServerNode:
         *,
         costmap: CostmapNode | None = None,
         footprint: Array | None = None,
+        boxes: str = "box_poses",
         namespace: str = "",
     ) -> None:
+        """Make the node; `boxes` is the topic of what docks with the detection `box` line up with."""
         self.node = bus.create_node("docking_server", namespace)
         self.config = config or DockingServerConfig()
         declare_config(self.node, self.config)
         self._robot_pose = robot_pose
-        self._detection = DockDetection(self.node, robot_pose, self.config.estimate)
+        self._detection = DockDetection(self.node, robot_pose, self.config.estimate, boxes)
         self._current = 0.0
         """Into the battery [A]."""
         self._left_for: Pose2 | None = None
