@@ -51,10 +51,10 @@ def _harm(run: Run, node: Node, name: str, value: float) -> str:
     """Return what became of a run by a value; '' if it was refused or did no harm."""
     before = node.get_parameter(name).value
     try:
-        node.set_parameter(name, value)
-    except BridgeError:
-        return ""
-    try:
+        try:
+            node.set_parameter(name, value)
+        except BridgeError:
+            return ""
         for _ in range(_TICKS):
             started = time.process_time()
             run.tick()
