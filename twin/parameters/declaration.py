@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -12,6 +13,8 @@ from typing import Any, get_type_hints
 from twin.parameters.domain import Domain, domain_of, metadata_of
 from twin.parameters.forms import Derived, DurationNs, Form, Name, NameOrPath, Nav2, PeriodNs, ReadOnly
 from twin.parameters.texts import texts_of
+
+_END_OF_CLAUSE = re.compile(r"(?<=[^\s.])(?= ?\.\.\.|[.;:](\s|$))")
 
 
 @dataclass(frozen=True)
@@ -32,8 +35,8 @@ class Declaration:
     """How Nav2's files write it, where it is otherwise."""
     config: type | None
     """The config inside, if the annotation names just one."""
-    is_required: bool
-    """Whether it has no default."""
+    default: Any
+    """As configs keep it; MISSING if there is none, or if it is made anew each time."""
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
@@ -47,8 +50,8 @@ class Declaration:
         unit = self.domain.unit if self.domain is not None else None
         if unit is None or "[" in text:
             return text
-        end = next((end for end in (" ...", "...", ".") if text.endswith(end)), "")
-        return f"{text.removesuffix(end)} [{unit.si}]{end or '.'}".lstrip()
+        told, count = _END_OF_CLAUSE.subn(f" [{unit.si}]", text, count=1)
+        return told if count else f"{text} [{unit.si}].".lstrip()
 
     def tell(self, kept: Any) -> Any:
         """Return a value of the config as others are told it: SI, lists for tuples."""
@@ -106,7 +109,7 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         form=form,
         nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
-        is_required=of.default is of.default_factory is dataclasses.MISSING,
+        default=of.default,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
         is_path=NameOrPath in metadata,
