@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TypeVar
 
 from twin.bridge.msgs import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -12,24 +12,21 @@ from twin.bridge.parameters.values import Parameter
 from twin.bridge.types.default_values import new
 from twin.errors import BridgeError
 from twin.parameters.declaration import Declaration
-from twin.parameters.placed import NO_NAMES, overlay, parameters_of
+from twin.parameters.placed import overlay, parameters_of
 
 C = TypeVar("C")
 
 
-def declare_config(
-    node: Node, config: C, replace: Callable[[C], None] | None = None, names: Mapping[str, str] = NO_NAMES
-) -> None:
+def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = None) -> None:
     """Declare the parameters of a config as those of a node, in one parameter event.
 
     Args:
         node: Whose parameters.
         config: A frozen dataclass.
         replace: Takes the changed config; without it the parameters are read-only.
-        names: As for `parameters_of`.
     """
     current = config
-    found = parameters_of(config, names)
+    found = parameters_of(config)
     node.parameters.declare_together(
         [
             (name, one.told(config), descriptor_of(one.declaration, read_only=replace is None))
@@ -41,7 +38,7 @@ def declare_config(
     apply = replace
 
     def changed(parameters: list[Parameter]) -> tuple[C, dict[str, str]]:
-        return overlay(current, {one.name: one.value for one in parameters}, names)
+        return overlay(current, {one.name: one.value for one in parameters})
 
     def on_set(parameters: list[Parameter]) -> None:
         _, refused = changed(parameters)

@@ -25,6 +25,7 @@ its bounds in the same words, and NaN, infinity, and sizes beyond `Unit.sizes` i
   key of scenarios.
 - A config inside, or a mapping of configs by name, is a section of its own name, or of `Name("...")`; with
   `Flat` it is none: `controllers: Annotated[Mapping[str, ControllerConfig], Flat]` gives 'FollowPath.xy'.
+  `Underscored` and `Itself` are robot_localization's way: `odom0` is a topic, `odom0_config` which states.
 
 A config's annotations must be resolvable at run time: no names that are imported for type checkers only.
 """
@@ -43,12 +44,14 @@ from twin.parameters.bounds import Positive as Positive
 from twin.parameters.forms import Derived as Derived
 from twin.parameters.forms import DurationNs as DurationNs
 from twin.parameters.forms import Flat as Flat
+from twin.parameters.forms import Itself as Itself
 from twin.parameters.forms import MayBeInfinite as MayBeInfinite
 from twin.parameters.forms import Name as Name
 from twin.parameters.forms import NameOrPath as NameOrPath
 from twin.parameters.forms import Nav2 as Nav2
 from twin.parameters.forms import PeriodNs as PeriodNs
 from twin.parameters.forms import ReadOnly as ReadOnly
+from twin.parameters.forms import Underscored as Underscored
 from twin.parameters.units import Amperes as Amperes
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules

@@ -11,7 +11,18 @@ from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from twin.parameters.domain import Domain, domain_of, metadata_of
-from twin.parameters.forms import Derived, DurationNs, Form, Name, NameOrPath, Nav2, PeriodNs, ReadOnly
+from twin.parameters.forms import (
+    Derived,
+    DurationNs,
+    Form,
+    Itself,
+    Name,
+    NameOrPath,
+    Nav2,
+    PeriodNs,
+    ReadOnly,
+    Underscored,
+)
 from twin.parameters.texts import texts_of
 
 _END_OF_CLAUSE = re.compile(r"(?<=[^\s.])(?= ?\.\.\.|[.;:](\s|$))")
@@ -40,6 +51,10 @@ class Declaration:
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
+    is_underscored: bool
+    """Of configs by name: whether what is in them is called 'name_field' instead of 'name.field'."""
+    is_itself: bool
+    """Whether the parameter is called as the section that it is in."""
     is_path: bool
     """Whether it is the name of what ships, or a path."""
 
@@ -85,6 +100,21 @@ def _fields_of(config: type) -> Mapping[str, Declaration]:
     return MappingProxyType(found)
 
 
+class _Names:
+    """The names of a config's parameters by field."""
+
+    def __init__(self, config: type) -> None:
+        self._fields = fields_of(config)
+
+    def __getattr__(self, field: str) -> str:
+        return self._fields[field].name
+
+
+def names_of(config: type) -> _Names:
+    """Return what a config's parameters are called: `names_of(AmclConfig).sigma_hit` is 'sigma_hit'."""
+    return _Names(config)
+
+
 def _init(config: type) -> list[dataclasses.Field[Any]]:
     return [field for field in dataclasses.fields(config) if field.init]
 
@@ -112,5 +142,7 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         default=of.default,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
+        is_underscored=Underscored in metadata,
+        is_itself=Itself in metadata,
         is_path=NameOrPath in metadata,
     )

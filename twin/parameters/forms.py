@@ -53,6 +53,8 @@ class Marker:
 
 Flat = Name("")
 """Of a config inside, or of configs by name: without a section of its own."""
+Underscored = Marker("of configs by name: their sections end with _ instead of ., as in odom0_config")
+Itself = Marker("the parameter is called as the section that it is in: odom0")
 ReadOnly = Marker("live setting does not change it")
 Derived = Marker("made of other parameters: scenarios have no key for it")
 MayBeInfinite = Marker("infinity is valid")

@@ -5,14 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from functools import reduce
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 from twin.parameters.declaration import Declaration, fields_of
 
 C = TypeVar("C")
-
-NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,25 +38,26 @@ class Placed:
             raise ValueError(f"{self.name} {error}") from None
 
 
-def parameters_of(config: Any, names: Mapping[str, str] = NO_NAMES) -> dict[str, Placed]:
+def parameters_of(config: Any) -> dict[str, Placed]:
     """Return the parameters of a config by name; what is None, empty, or an array is none.
 
     Args:
         config: A frozen dataclass, or several by name.
-        names: Field -> name of its section, for fields that do not declare it.
     """
-    return {one.name: one for one in _walk(config, names, (), "")}
+    return {one.name: one for one in _walk(config, (), "")}
 
 
-def _walk(config: Any, names: Mapping[str, str], path: tuple[str, ...], prefix: str) -> Iterator[Placed]:
+def _walk(config: Any, path: tuple[str, ...], prefix: str, separator: str = ".") -> Iterator[Placed]:
     declared = {} if isinstance(config, Mapping) else fields_of(config)
     for key in config if isinstance(config, Mapping) else declared:
         value, declaration = _part(config, key), declared.get(key)
-        here, name = (*path, key), names.get(key, key if declaration is None else declaration.name)
+        here, name = (*path, key), key if declaration is None else declaration.name
         if dataclasses.is_dataclass(value) or isinstance(value, Mapping):
-            yield from _walk(value, names, here, f"{prefix}{name}." if name else prefix)
+            inner = f"{prefix}{name}{separator}" if name else prefix
+            is_joined = declaration is not None and declaration.is_underscored
+            yield from _walk(value, here, inner, "_" if is_joined else ".")
         elif declaration is not None and declaration.domain is not None and value not in (None, ()):
-            yield Placed(prefix + name, here, declaration)
+            yield Placed(prefix[:-1] if declaration.is_itself else prefix + name, here, declaration)
 
 
 def replaced(config: C, path: tuple[str, ...], value: Any) -> C:
@@ -75,17 +73,14 @@ def replaced(config: C, path: tuple[str, ...], value: Any) -> C:
     return dataclasses.replace(config, **{head: inner})  # type: ignore[type-var]
 
 
-def overlay(
-    config: C, values: Mapping[str, Any], names: Mapping[str, str] = NO_NAMES
-) -> tuple[C, dict[str, str]]:
+def overlay(config: C, values: Mapping[str, Any]) -> tuple[C, dict[str, str]]:
     """Return a config with values by parameter name, and why some of them were not taken: whole sentences.
 
     Args:
         config: A frozen dataclass.
         values: Parameter name -> value; those that the config does not have are left alone.
-        names: As for `parameters_of`.
     """
-    found = parameters_of(config, names)
+    found = parameters_of(config)
     refused: dict[str, str] = {}
     left = {name: value for name, value in values.items() if name in found}
     while left:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, model_validator
 
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.ekf import EkfConfig
-from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
+from twin.nodes.navigation.localisation.ekf_config import SOURCE, EkfNodeConfig, EkfSource
 from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.parameters.placed import overridden
 from twin.scenario.parameter_group import ParameterGroup, keys_of
@@ -42,7 +42,7 @@ class EkfSourceParameters(ParameterGroup):
 
 
 def _source_name(name: str) -> str:
-    if not re.fullmatch(r"(odom|pose|twist|imu)\d+", name):
+    if not re.fullmatch(SOURCE, name):
         raise ValueError("a source is called odom0, pose0, twist0, imu0, odom1...")
     return name
 

@@ -8,15 +8,16 @@ from dataclasses import replace
 from typing import Any
 
 from twin.navigation.localisation.ekf import SIZE
-from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
+from twin.nodes.navigation.localisation.ekf_config import SOURCE, EkfNodeConfig, EkfSource
+from twin.parameters.declaration import names_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import EKF, corrects_map, differing, file_for
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.scenario.robots import RobotConfig
 
-_SOURCE = r"(odom|pose|twist|imu)\d+"
 _OUTPUT = "odometry/filtered"
-_FRAMES = ("map_frame", "odom_frame", "base_link_frame", "world_frame")
+_EKF = names_of(EkfNodeConfig)
+_FRAMES = (_EKF.map_frame, _EKF.odom_frame, _EKF.base_link_frame, _EKF.world_frame)
 _CONTROL = frozenset(
     {
         *("control_config", "control_timeout", "stamped_control"),
@@ -67,13 +68,13 @@ def ekf_with_file(
         return config, []
     file, node = found
     values = file.effective(node)
-    own = {"map_frame": "map", **{name: getattr(config, name) for name in _FRAMES[1:]}}
+    own = {name: getattr(config, name) for name in _FRAMES}
     frames = differing(file, node, own)
     if corrects_map(values):
-        said = f"is {values['world_frame']}, but a filter of odometry publishes odom → base; valid is odom"
-        file.wrong(node, "world_frame", said)
+        said = f"is {values[_EKF.world_frame]}, but a filter of odometry publishes odom → base; valid is odom"
+        file.wrong(node, _EKF.world_frame, said)
     nothing = (False,) * SIZE
-    named = [name for name in values if re.fullmatch(_SOURCE, name)]
+    named = [name for name in values if re.fullmatch(SOURCE, name)]
     config = file.applied(
         node,
         replace(config, sources={name: EkfSource(topic=name, config=nothing) for name in named}),
@@ -98,20 +99,16 @@ def _finished(file: Nav2Parameters, robot: RobotConfig) -> list[str]:
 
 
 def _renamed(name: str) -> str:
-    """Return 'sources.odom0.config' for 'odom0_config', as the config here has it."""
-    found = re.fullmatch(rf"({_SOURCE})(_(.+))?", name)
-    if found is None:
-        return name
-    source, kind, key = found[1], found[2], found[4] or "topic"
-    if key == "rejection_threshold" and kind in ("pose", "twist"):
-        key = f"{kind}_rejection_threshold"
-    return f"sources.{source}.{key}"
+    """Return 'pose0_pose_rejection_threshold' for 'pose0_rejection_threshold', as twist0 has its own, too."""
+    return re.sub(r"^((pose|twist)\d+)_rejection_threshold$", r"\1_\2_rejection_threshold", name)
 
 
 def _absent(values: Mapping[str, Any]) -> Absent:
     controls = values.get("use_control") is True
+    sections = ["", *(f"{name}_" for name in values if re.fullmatch(SOURCE, name))]
+    idle = _IDLE if controls else _IDLE | _CONTROL
     return Absent(
-        idle=_IDLE if controls else _IDLE | _CONTROL,
-        harmless=_HARMLESS,
+        idle=frozenset(section + name for section in sections for name in idle),
+        harmless={section + name: value for section in sections for name, value in _HARMLESS.items()},
         missed=_MISSED | _CONTROL,
     )

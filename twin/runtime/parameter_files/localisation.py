@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twin.errors import NavigationError, Problem
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
+from twin.parameters.declaration import names_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.scenario.robots import RobotConfig
 
@@ -44,8 +46,9 @@ def file_for(usual: str, config: RobotConfig, namespace: str) -> tuple[Nav2Param
 
 def corrects_map(values: Mapping[str, object]) -> bool:
     """Whether a filter's parameters make it publish map → odom, as the second one of two does."""
-    odom = values.get("odom_frame", "odom")
-    return values.get("world_frame", odom) != odom
+    names = names_of(EkfNodeConfig)
+    odom = values.get(names.odom_frame, "odom")
+    return values.get(names.world_frame, odom) != odom
 
 
 def localisation_nodes(config: RobotConfig, namespace: str) -> tuple[str, ...]:

@@ -14,13 +14,15 @@ from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.storage import unpack
 from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
+from twin.parameters.declaration import names_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import SLAM, differing, file_for
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.scenario.localisation import SlamLocalisation
 from twin.scenario.robots import RobotConfig
 
-_BY_ITSELF = ("mode", "map_file_name", "map_start_pose")
+_SLAM = names_of(SlamNodeConfig)
+_BY_ITSELF = (_SLAM.mode, _SLAM.map_file_name, _SLAM.map_start_pose)
 """Read together: the last means something only with a graph."""
 _SUFFIX = ".posegraph"
 _IDLE = frozenset(
@@ -101,16 +103,16 @@ def _graph(
     """Return the config with its pose graph, and where in it the robot starts."""
     values = file.effective(node)
     name = config.map_file_name
-    if not name and values.get("map_file_name"):
-        name = str(_saved(file, node, str(values["map_file_name"])))
+    if not name and values.get(_SLAM.map_file_name):
+        name = str(_saved(file, node, str(values[_SLAM.map_file_name])))
     if not name and config.mode == "localization":
         said = "is localization, which needs map_file_name, or the scenario's pose_graph"
         file.wrong(node, "mode", said)
-    pose = values.get("map_start_pose")
+    pose = values.get(_SLAM.map_start_pose)
     if not name or pose is None:
         return replace(config, map_file_name=name), None
     if not (isinstance(pose, list) and len(pose) == 3 and all(type(part) in (int, float) for part in pose)):
-        file.wrong(node, "map_start_pose", f"must be [x, y, yaw], not {pose!r}")
+        file.wrong(node, _SLAM.map_start_pose, f"must be [x, y, yaw], not {pose!r}")
         return config, None
     return replace(config, map_file_name=name), Pose2(*map(float, pose))
 
@@ -122,9 +124,9 @@ def _saved(file: Nav2Parameters, node: str, name: str) -> Path:
     try:
         unpack(read_bytes(path), str(path))
     except OSError as fault:
-        file.wrong(node, "map_file_name", f"is {name}, but {path}: {fault.strerror}")
+        file.wrong(node, _SLAM.map_file_name, f"is {name}, but {path}: {fault.strerror}")
     except MapError as fault:
-        file.wrong(node, "map_file_name", f"is {name}, but {fault}")
+        file.wrong(node, _SLAM.map_file_name, f"is {name}, but {fault}")
     return path
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from twin.errors import ScenarioError
 from twin.models.specs import ImuSpec
 from twin.nodes.navigation.localisation.ekf import EkfNode
-from twin.nodes.navigation.localisation.ekf_config import KINDS, EkfNodeConfig, EkfSource, for_robot
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource, for_robot
+from twin.nodes.navigation.localisation.ekf_sources import KINDS
 from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.ekf import ekf_with_file

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,8 @@ from twin.geometry import Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
 from twin.navigation.localisation import ekf as states
 from twin.navigation.localisation.ekf import Ekf
 from twin.navigation.localisation.gyro_bias import GyroBias
-from twin.nodes.navigation.localisation.ekf_config import KINDS, EkfNodeConfig, EkfSource
-from twin.nodes.navigation.localisation.ekf_sources import SourceReader
+from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
+from twin.nodes.navigation.localisation.ekf_sources import KINDS, SourceReader
 from twin.nodes.node_parameters import declare_config
 
 
@@ -48,7 +48,7 @@ class EkfNode:
         self.filter = Ekf(config.ekf)
         self._time_ns: int | None = None
         self._waiting: list[tuple[int, int, SourceReader, Any]] = []
-        declare_config(node, _parameters(config), names={"ekf": ""})
+        declare_config(node, config)
         self._buffer = TransformBuffer()
         self._listener = TransformListener(self._buffer, node)
         self._tf = TransformBroadcaster(node)
@@ -156,13 +156,3 @@ class EkfNode:
             self._tf.send_transform(
                 transform_stamped(config.world_frame, config.base_link_frame, stamp_ns, pose)
             )
-
-
-def _parameters(config: EkfNodeConfig) -> dict[str, Any]:
-    """Return the config with robot_localization's flat names: `odom0` is a topic, `odom0_config`, ..."""
-    found = {f.name: getattr(config, f.name) for f in fields(config) if f.name != "sources"}
-    for name, source in config.sources.items():
-        for item in fields(source):
-            key = name if item.name == "topic" else f"{name}_{item.name}"
-            found[key] = getattr(source, item.name)
-    return found

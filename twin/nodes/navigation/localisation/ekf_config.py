@@ -5,16 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 from annotated_types import Len
 
-from twin.bridge.msgs import (
-    Imu,
-    Odometry,
-    PoseWithCovarianceStamped,
-    TwistWithCovarianceStamped,
-)
 from twin.navigation.localisation import ekf as states
 from twin.navigation.localisation.ekf import SIZE, EkfConfig
 from twin.parameters import (
@@ -22,20 +16,17 @@ from twin.parameters import (
     DurationNs,
     Flat,
     Interval,
+    Itself,
     Le,
     NotNegative,
     PeriodNs,
     Positive,
     RadiansPerSecond,
+    Underscored,
 )
 
-KINDS: dict[str, type[Any]] = {
-    "odom": Odometry,
-    "pose": PoseWithCovarianceStamped,
-    "twist": TwistWithCovarianceStamped,
-    "imu": Imu,
-}
-"""Message types by the beginning of a source's name: `odom0`, `imu1`."""
+SOURCE = r"(odom|pose|twist|imu)\d+"
+"""What sources are called: `odom0`, `imu1`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +37,7 @@ class EkfSource:
         ValueError: the topic is empty, or `config` has not 15 truth values.
     """
 
-    topic: str
+    topic: Annotated[str, Itself]
     """Of Odometry, PoseWithCovarianceStamped, TwistWithCovarianceStamped or Imu messages."""
     config: Annotated[tuple[bool, ...], Len(SIZE, SIZE)]
     """Which of x y z, roll pitch yaw, their velocities, and accelerations to take from it."""
@@ -115,12 +106,14 @@ class EkfNodeConfig:
     """Of the robot."""
     world_frame: Annotated[str, Derived] = "odom"
     """Parent of the transform that is published."""
-    sources: Mapping[str, EkfSource] = field(default_factory=lambda: _WHEELS_AND_IMU)
+    sources: Annotated[Mapping[str, EkfSource], Flat, Underscored] = field(
+        default_factory=lambda: _WHEELS_AND_IMU
+    )
     """By robot_localization's names: `odomN`, `poseN`, `twistN`, `imuN`."""
 
     def __post_init__(self) -> None:
         for name in self.sources:
-            if not re.fullmatch(rf"({'|'.join(KINDS)})\d+", name):
+            if not re.fullmatch(SOURCE, name):
                 raise ValueError(
                     f"ekf_filter_node: no source is called '{name}'; valid are odom0, pose0, twist0, imu0..."
                 )

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from twin.bridge.conversions import pose3_from_pose
 from twin.bridge.msgs import (
     Imu,
+    Odometry,
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     TwistWithCovariance,
@@ -22,6 +23,13 @@ from twin.navigation.localisation import ekf as states
 from twin.navigation.localisation.gyro_bias import GyroBias
 from twin.nodes.navigation.localisation.ekf_config import EkfSource
 
+KINDS: dict[str, type[Any]] = {
+    "odom": Odometry,
+    "pose": PoseWithCovarianceStamped,
+    "twist": TwistWithCovarianceStamped,
+    "imu": Imu,
+}
+"""Message types by the beginning of a source's name: `odom0`, `imu1`."""
 _GRAVITY = 9.80665
 _SAME = Pose3.from_pose2(Pose2(0.0, 0.0, 0.0))
 

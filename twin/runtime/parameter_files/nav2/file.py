@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
-
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
+from twin.parameters.declaration import fields_of
 from twin.parameters.placed import overlay, parameters_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.lines import lines_of
-from twin.runtime.parameter_files.nav2.checks import refusals, sentence, wrong_critics
 from twin.runtime.parameter_files.nav2.names import (
     LISTS,
     Value,
@@ -79,11 +77,9 @@ class Nav2Parameters:
         self,
         node: str,
         config: C,
-        names: Mapping[str, str] | None = None,
         *,
         prefix: str = "",
         keep: frozenset[str] = frozenset(),
-        limits: type[BaseModel] | None = None,
         rename: Callable[[str], str] = str,
         absent: Absent | None = None,
     ) -> C:
@@ -92,29 +88,25 @@ class Nav2Parameters:
         Args:
             node: Its name, such as 'controller_server' or 'local_costmap/local_costmap'.
             config: What holds without the file.
-            names: Field -> parameter, as for `declare_config`.
             prefix: Of all parameters of this config, such as 'GridBased.'.
             keep: Parameters, without their sections, that the scenario gives: they stay.
-            limits: What a scenario may give of them.
             rename: The file's name of a parameter -> the one here.
             absent: What the ROS node has beyond the one here.
         """
         self._nodes.add(node)
         self._absent[node] = absent or Absent()
-        values = self._values(node, config, names or {}, prefix, rename)
-        known = tuple(prefix + name for name in parameters_of(config, names or {}))
+        values = self._values(node, config, prefix, rename)
+        known = tuple(prefix + name for name in parameters_of(config))
         taken = {
             name.removeprefix(prefix): entry.value
             for name, entry in values.items()
             if name in known and not keep & {name, *name.split(".")}
         }
-        config, refused = overlay(config, taken, names or {})
+        config, refused = overlay(config, taken)
         refused = {name: why.removeprefix(f"{name} ") for name, why in refused.items()}
-        if limits is not None:
-            refused = refusals(limits, taken, refused)
         for name, why in refused.items():
             entry = values[prefix + name]
-            self._problems.append(Problem(sentence(node, entry.said, why), self.path, entry.line))
+            self._problems.append(Problem(_sentence(node, entry.said, why), self.path, entry.line))
         self._check_critics(node, values, known)
         self._tell(node, values, known)
         return config
@@ -212,17 +204,15 @@ class Nav2Parameters:
     def _without_namespace(self, name: str) -> str:
         return name.removeprefix(self._namespace.strip("/") + "/") if self._namespace else name
 
-    def _values(
-        self, node: str, config: Any, names: Mapping[str, str], prefix: str, rename: Callable[[str], str]
-    ) -> dict[str, Value]:
+    def _values(self, node: str, config: Any, prefix: str, rename: Callable[[str], str]) -> dict[str, Value]:
         """Return the node's values by the names that this config has for them."""
         values = converted(by_axis(renamed(self._said(node))))
         values = declared({rename(name): entry for name, entry in values.items()}, config, prefix)
-        known = tuple(prefix + name for name in parameters_of(config, names))
+        known = tuple(prefix + name for name in parameters_of(config))
         if "costmap" in node or node == "behavior_server":
             values = flat(values, known)
         foreign = [name.removesuffix("plugin") for name in values if name.endswith(".plugin")]
-        return self._without_foreign(node, values, config, names, prefix, foreign)
+        return self._without_foreign(node, values, config, prefix, foreign)
 
     def _said(self, node: str) -> dict[str, Value]:
         """Return what the file says of a node."""
@@ -240,12 +230,11 @@ class Nav2Parameters:
         node: str,
         values: dict[str, Value],
         config: Any,
-        names: Mapping[str, str],
         prefix: str,
         sections: list[str],
     ) -> dict[str, Value]:
         """Leave out sections of plugins that are others than those here, and the lists of plugins."""
-        classes = {prefix: config} if prefix else dict(_plugins(config, names))
+        classes = {prefix: config} if prefix else dict(_plugins(config))
         out = {name: entry for name, entry in values.items() if not name.endswith(LISTS)}
         for section in sections:
             own, plugin = classes.get(section), str(values[section + "plugin"].value)
@@ -260,7 +249,7 @@ class Nav2Parameters:
             if name not in known or section == name or not isinstance(entry.value, list):
                 continue
             there = {other.removeprefix(section).partition(".")[0] for other in known if "." in other}
-            mistakes, absent = wrong_critics(entry.value, sorted({*there, "Oscillation"}))
+            mistakes, absent = _wrong_critics(entry.value, sorted({*there, "Oscillation"}))
             self._problems += [Problem(f"{node} {said}", self.path, entry.line) for said in mistakes]
             for critic in absent:
                 self._ignored.setdefault(node, []).append(f"the critic {critic}")
@@ -291,9 +280,30 @@ class Nav2Parameters:
             self._ignored.setdefault(node, []).append(entry.said)
 
 
-def _plugins(config: Any, names: Mapping[str, str]) -> Iterator[tuple[str, Any]]:
+def _plugins(config: Any) -> Iterator[tuple[str, Any]]:
     """Yield the sections of a config that are plugins, with their configs."""
-    for field in fields(config):
-        value = getattr(config, field.name)
-        inside = value.items() if isinstance(value, Mapping) else [(names.get(field.name, field.name), value)]
+    for field, declaration in fields_of(config).items():
+        value = getattr(config, field)
+        inside = value.items() if isinstance(value, Mapping) else [(declaration.name, value)]
         yield from ((f"{name}.", inner) for name, inner in inside if is_dataclass(inner))
+
+
+def _sentence(node: str, name: str, why: str) -> str:
+    """Return why a value cannot be, with node and name told once."""
+    if why.startswith(f"{node}: "):
+        return why
+    return f"{node}: {why[why.index(name) :]}" if name in why else f"{node}: {name} {why}"
+
+
+def _wrong_critics(names: Sequence[str], valid: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return which critics are likely mistakes, each with what was meant, and which are Nav2's alone."""
+    mistakes, absent = [], []
+    for name in names:
+        if name in valid:
+            continue
+        close = difflib.get_close_matches(name, valid, n=1, cutoff=_TYPO)
+        if close:
+            mistakes.append(f"has no critic '{name}'; did you mean '{close[0]}'?")
+        else:
+            absent.append(name)
+    return mistakes, absent

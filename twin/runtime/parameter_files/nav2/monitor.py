@@ -6,17 +6,17 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from pydantic import ValidationError
-
-from twin.runtime.parameter_files.nav2.checks import said_of
+from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorPolygon
+from twin.parameters.declaration import fields_of, names_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.names import corners_of
 from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonParameters
 
 _NODE = "collision_monitor"
 _CIRCLE_CORNERS = 16
-_SERVER = ("polygons", "observation_sources", "source_timeout")
-_POLYGON = (*MonitorPolygonParameters.model_fields, "type", "radius", "enabled", "max_points")
+_NAMES = names_of(CollisionMonitorConfig)
+_SERVER = (_NAMES.polygons, "observation_sources", _NAMES.source_timeout_ns)
+_POLYGON = (*MonitorPolygonParameters.model_fields, "type", "radius", "max_points")
 _SENSOR = ("type", "topic", "enabled")
 _SENSORS = ("scan", "range")
 """Types of sources that are here."""
@@ -32,19 +32,35 @@ def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
     active = [name for name in names if values.get(f"{name}.enabled", True)]
     fitting = [name for name in active if values.get(f"{name}.type") != "velocity_polygon"]
     polygons = tuple(found for name in fitting if (found := _polygon(name, file, values)))
-    try:
-        return CollisionMonitorParameters.model_validate(
-            {
-                # A file of other polygons alone leaves the robot its usual guard.
-                "polygons": polygons if fitting or not active else None,
-                "source_timeout": values.get("source_timeout", 2.0),
-                "scan_topics": _topics(file, values, "scan") or None,
-                "range_topics": _topics(file, values, "range"),
-            }
-        )
-    except ValidationError as error:
-        file.wrong(_NODE, str(error.errors()[0]["loc"][0]), said_of(error))
+    server = _taken(CollisionMonitorConfig, "", {_NAMES.source_timeout_ns: 2.0, **values}, file)
+    if server is None:
         return None
+    return CollisionMonitorParameters.model_validate(
+        {
+            **server,
+            # A file of other polygons alone leaves the robot its usual guard.
+            "polygons": polygons if fitting or not active else None,
+            "scan_topics": _topics(file, values, "scan") or None,
+            "range_topics": _topics(file, values, "range"),
+        }
+    )
+
+
+def _taken(
+    config: type, section: str, said: Mapping[str, Any], file: Nav2Parameters
+) -> dict[str, Any] | None:
+    """Return what is said of a config's parameters; None, and noted in `file`, if one cannot be."""
+    taken = {}
+    for name, one in ((one.name, one) for one in fields_of(config).values()):
+        try:
+            if one.domain is not None and name in said:
+                taken[name] = one.domain.checked(said[name])
+            elif one.is_required:
+                raise ValueError("is missing")
+        except ValueError as error:
+            file.wrong(_NODE, section + name, str(error))
+            return None
+    return taken
 
 
 def _read(values: Mapping[str, Any]) -> Iterator[str]:
@@ -72,7 +88,6 @@ def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tupl
 
 def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonParameters | None:
     inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
-    given = {key: inside[key] for key in MonitorPolygonParameters.model_fields if key in inside}
     for key in ("radius", "max_points"):
         if key in inside and type(inside[key]) not in (int, float):
             file.wrong(_NODE, f"{name}.{key}", f"must be a number, not {inside[key]!r}")
@@ -84,14 +99,18 @@ def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> Moni
     if points is None:
         file.wrong(_NODE, f"{name}.points", f"must be corners '[[x, y], ...]', not {inside['points']!r}")
         return None
+    inside |= {"name": name, "points": points}
     if "max_points" in inside:
-        given["min_points"] = inside["max_points"] + 1
-    try:
-        return MonitorPolygonParameters.model_validate({**given, "name": name, "points": points})
-    except ValidationError as error:
-        at = error.errors()[0]["loc"]
-        file.wrong(_NODE, f"{name}.{at[0]}" if at else name, said_of(error))
+        inside[names_of(MonitorPolygon).min_points] = inside["max_points"] + 1
+    given = _taken(MonitorPolygon, f"{name}.", inside, file)
+    if given is None:
         return None
+    try:
+        MonitorPolygon(**given)
+    except ValueError as error:
+        file.wrong(_NODE, name, str(error))
+        return None
+    return MonitorPolygonParameters.model_validate(given)
 
 
 def _points(inside: Mapping[str, Any]) -> Sequence[Sequence[float]] | None:

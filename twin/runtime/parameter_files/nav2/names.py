@@ -152,12 +152,6 @@ def class_of(plugin: object) -> str:
     return re.split("::|/", str(plugin))[-1]
 
 
-def local_name(name: str) -> str:
-    """Return a parameter's name without the section of its plugin, as scenarios have it."""
-    section, _, rest = name.partition(".")
-    return rest if rest and section in _SECTIONS.values() else name
-
-
 def is_same(plugin: str, config: Any) -> bool:
     """Whether a plugin is of a config's kind, as RegulatedPurePursuitController is."""
     kind = type(config).__name__.removesuffix("Config").casefold()

@@ -177,10 +177,10 @@ def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapPara
     scans, ranges = sources_of(file, node)
     config = replace(
         config,
-        scan_topics=scans if scans and "scan_topics" not in keep else config.scan_topics,
-        range_topics=ranges if ranges and "range_topics" not in keep else config.range_topics,
+        scan_topics=config.scan_topics if group.scan_topics is not None else scans or config.scan_topics,
+        range_topics=config.range_topics if group.range_topics is not None else ranges or config.range_topics,
     )
     changed = file.applied(node, config, keep=keep)
-    if file.is_round(node) and "robot_radius" not in keep:
+    if file.is_round(node) and group.robot_radius is None:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))
     return changed

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from twin.controllers.limiter import AxisLimits
+from twin.navigation.control.maneuver_config import ManeuverConfig
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
+from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.parameters.declaration import fields_of, names_of
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
 from twin.scenario.parameter_group import ParameterGroup
 
-_SMOOTHER = {
-    "max_linear_speed": ("linear.max_velocity",),
-    "max_angular_speed": ("angular.max_velocity",),
-    "max_linear_acceleration": ("linear.max_acceleration",),
-    "max_linear_deceleration": ("linear.max_deceleration",),
-    "max_angular_acceleration": ("angular.max_acceleration", "angular.max_deceleration"),
-}
-_OF_SERVER = frozenset({"controller_frequency", "failure_tolerance"})
+_AXIS = names_of(AxisLimits)
+_OF_SERVER = frozenset(declaration.name for declaration in fields_of(ControllerServerConfig).values())
 """Keys under `controller` that belong to the server itself ..."""
 _SECTIONS = ("FollowPath.", "general_goal_checker.", "progress_checker.")
 """... and where the others may belong."""
@@ -28,9 +27,15 @@ _DOCKS = frozenset({"docks", "pose", "type", "frame"})
 
 def for_smoother(config: NavigationConfig) -> frozenset[str]:
     """Return the limits that the scenario gives, by axis as the smoother here has them."""
-    return frozenset(
-        name for key, names in _SMOOTHER.items() if getattr(config, key) is not None for name in names
-    )
+    names = {
+        f"linear.{_AXIS.max_velocity}": config.max_linear_speed,
+        f"linear.{_AXIS.max_acceleration}": config.max_linear_acceleration,
+        f"linear.{_AXIS.max_deceleration}": config.max_linear_deceleration,
+        f"angular.{_AXIS.max_velocity}": config.max_angular_speed,
+        f"angular.{_AXIS.max_acceleration}": config.max_angular_acceleration,
+        f"angular.{_AXIS.max_deceleration}": config.max_angular_acceleration,
+    }
+    return frozenset(name for name, limit in names.items() if limit is not None)
 
 
 def for_planner(group: ParameterGroup) -> frozenset[str]:
@@ -43,7 +48,7 @@ def for_controllers(config: NavigationConfig) -> frozenset[str]:
     keys = set(_chosen_keys(config.controller))
     own = (keys & _OF_SERVER) | {f"{section}{key}" for section in _SECTIONS for key in keys - _OF_SERVER}
     if config.controller.maneuvers is not None:
-        own.add("maneuver.reach")
+        own.add(f"maneuver.{names_of(ManeuverConfig).reach}")
     further = {f"{name}.{key}" for name, one in config.controllers.items() for key in _chosen_keys(one)}
     return frozenset(own | further)
 
@@ -56,8 +61,8 @@ def for_docking(group: DockingParameters) -> frozenset[str]:
 
 def for_navigator(group: NavigatorParameters) -> frozenset[str]:
     """Return what the scenario gives of `/bt_navigator`, whose loop has a duration there."""
-    renamed = {"bt_loop_frequency": "bt_loop_duration"}
-    return frozenset(renamed.get(key, key) for key in _keys(group))
+    loop = [] if group.bt_loop_frequency is None else [names_of(BtNavigatorConfig).bt_loop_duration]
+    return frozenset([*_keys(group), *loop])
 
 
 def for_costmap(group: CostmapParameters) -> frozenset[str]:
