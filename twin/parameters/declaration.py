@@ -47,7 +47,7 @@ class Declaration:
     config: type | None
     """The config inside, if the annotation names just one."""
     default: Any
-    """As configs keep it; MISSING if there is none, or if it is made anew each time."""
+    """As configs keep it; None if it is made anew each time, MISSING if there is none."""
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
@@ -57,6 +57,11 @@ class Declaration:
     """Whether the parameter is called as the section that it is in."""
     is_path: bool
     """Whether it is the name of what ships, or a path."""
+
+    @property
+    def is_required(self) -> bool:
+        """Whether it has no default."""
+        return self.default is dataclasses.MISSING
 
     @property
     def text(self) -> str:
@@ -139,7 +144,7 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         form=form,
         nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
-        default=of.default,
+        default=of.default if of.default_factory is dataclasses.MISSING else None,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
         is_underscored=Underscored in metadata,

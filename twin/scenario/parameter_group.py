@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import MISSING
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -92,7 +91,7 @@ def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | 
     if domain is None:
         return None
     kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
-    if whole and declaration.default is MISSING:
+    if whole and declaration.is_required:
         return kind, Field(description=declaration.text)
     if whole:
         return kind, Field(default=declaration.tell(declaration.default), description=declaration.text)
