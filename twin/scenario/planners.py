@@ -19,17 +19,26 @@ class PlannerServerParameters(ParameterGroup):
     """8-connected A*; any-angle Theta*; Hybrid-A* for robots with a turning circle."""
 
 
+_KEYS = {plugin: group_of(config).model_fields for plugin, config in PLUGINS.items()}
+
+
 @keys_of(*PLUGINS.values())
 class PlannerParameters(PlannerServerParameters):
     """Parameters of `/planner_server`: which planner `GridBased` is, and that planner's own."""
 
     @model_validator(mode="after")
     def _belongs_to_the_plugin(self) -> PlannerParameters:
-        keys = {plugin: group_of(config).model_fields for plugin, config in PLUGINS.items()}
-        valid = {*PlannerServerParameters.model_fields, *keys[self.plugin]}
+        valid = {*PlannerServerParameters.model_fields, *_KEYS[self.plugin]}
         for name in sorted(self.model_fields_set - valid):
-            others = " or ".join(plugin for plugin, own in keys.items() if name in own)
+            others = " or ".join(plugin for plugin, own in _KEYS.items() if name in own)
             raise ValueError(
                 f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
             )
         return self
+
+
+for _name, _field in PlannerParameters.model_fields.items():
+    _owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if _name in own]
+    if 0 < len(_owners) < len(_KEYS):
+        _field.description = f"{' and '.join(_owners)}: {_field.description}"
+PlannerParameters.model_rebuild(force=True)
