@@ -1,4 +1,4 @@
-"""A parameter that nobody sets is what it is in Nav2 (tests/oracles/nav2_defaults.py), but for the named ones."""
+"""A parameter that nobody sets is what it is in Nav2 (tests/oracles/nav2_defaults.py), but for a few."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -12,17 +13,17 @@ from typing import Any, get_type_hints
 from twin.parameters.domain import Domain, domain_of, metadata_of
 from twin.parameters.forms import (
     Derived,
-    DurationNs,
     Form,
     Itself,
     Name,
     NameOrPath,
     Nav2,
-    PeriodNs,
     ReadOnly,
     Underscored,
 )
 from twin.parameters.texts import texts_of
+
+_END_OF_CLAUSE = re.compile(r"(?<=[^\s.])(?= ?\.\.\.|[.;:](\s|$))")
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ class Declaration:
     """How Nav2's files write it, where it is otherwise."""
     config: type | None
     """The config inside, if the annotation names just one."""
-    is_required: bool
-    """Whether it has no default."""
+    default: Any
+    """As configs keep it; None if it is made anew each time, MISSING if there is none."""
     is_read_only: bool
     is_derived: bool
     """Whether it is made of others, so that scenarios have no key for it."""
@@ -56,14 +57,19 @@ class Declaration:
     """Whether it is the name of what ships, or a path."""
 
     @property
+    def is_required(self) -> bool:
+        """Whether it has no default."""
+        return self.default is dataclasses.MISSING
+
+    @property
     def text(self) -> str:
         """The docstring below the field, with the unit if it does not tell it."""
         text = texts_of(self.owner).get(self.field, "")
         unit = self.domain.unit if self.domain is not None else None
         if unit is None or "[" in text:
             return text
-        end = next((end for end in (" ...", "...", ".") if text.endswith(end)), "")
-        return f"{text.removesuffix(end)} [{unit.si}]{end or '.'}".lstrip()
+        told, count = _END_OF_CLAUSE.subn(f" [{unit.si}]", text, count=1)
+        return told if count else f"{text} [{unit.si}].".lstrip()
 
     def tell(self, kept: Any) -> Any:
         """Return a value of the config as others are told it: SI, lists for tuples."""
@@ -119,9 +125,6 @@ def _init(config: type) -> list[dataclasses.Field[Any]]:
 def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
     field = of.name
     metadata = metadata_of(hint)
-    if domain_of(hint) == Domain(int) and field.endswith("_ns"):
-        hint = PeriodNs if field.endswith("period_ns") else DurationNs
-        metadata = metadata_of(hint)
     form = next((one for one in metadata if isinstance(one, Form)), None)
     name = field
     if form is not None and field.endswith(form.suffix):
@@ -136,7 +139,7 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         form=form,
         nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
-        is_required=of.default is of.default_factory is dataclasses.MISSING,
+        default=of.default if of.default_factory is dataclasses.MISSING else None,
         is_read_only=ReadOnly in metadata,
         is_derived=Derived in metadata,
         is_underscored=Underscored in metadata,

@@ -23,7 +23,7 @@ class MonitorPolygonParameters(ParameterGroup):
         return overridden(MonitorPolygon(name=self.name, action_type=self.action_type), self.overrides())
 
 
-@keys_of(CollisionMonitorConfig)
+@keys_of(CollisionMonitorConfig, whole=True)
 class CollisionMonitorParameters(ParameterGroup):
     """Guards the commands of navigation and of people; only for robots with a lidar on `scan`, or with topics
     named here.

@@ -41,14 +41,14 @@ def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]
 
     Args:
         configs: What the keys are of.
-        whole: Whether the group is all that a config is made of: what that has no default of is required.
+        whole: Whether the group is all that a config is made of: its defaults are that one's.
     """
 
     def decorate(group: type[G]) -> type[G]:
         keys: dict[str, Any] = {}
         for config in configs:
             for declaration in _keyed(config):
-                key = _key(declaration, required=whole and declaration.is_required)
+                key = _key(declaration, whole=whole)
                 if key is not None and declaration.name not in group.model_fields:
                     keys[declaration.name] = key
         made = create_model(
@@ -82,7 +82,7 @@ def _keyed(config: type) -> Iterator[Declaration]:
             yield declaration
 
 
-def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any] | None:
+def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | None:
     """Return the type of a key, and what a schema says of it."""
     if declaration.config is not None:
         inner = group_of(declaration.config)
@@ -91,6 +91,8 @@ def _key(declaration: Declaration, *, required: bool = False) -> tuple[Any, Any]
     if domain is None:
         return None
     kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
-    if required:
+    if whole and declaration.is_required:
         return kind, Field(description=declaration.text)
+    if whole:
+        return kind, Field(default=declaration.tell(declaration.default), description=declaration.text)
     return kind | None, Field(default=None, description=declaration.text)

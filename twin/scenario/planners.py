@@ -23,6 +23,9 @@ class PlannerServerParameters(ParameterGroup):
     circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
 
 
+_KEYS = {plugin: group_of(config).model_fields for plugin, config in configs_of(PLANNERS).items()}
+
+
 @keys_of(*configs_of(PLANNERS).values())
 class PlannerParameters(PluginGroup, PlannerServerParameters):
     """Parameters of `/planner_server`: which planner `GridBased` is, and that planner's own."""
@@ -38,14 +41,20 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
     def _belongs_to_the_plugin(self) -> PlannerParameters:
         if self.users is not None:
             return self
-        keys = {plugin: group_of(config).model_fields for plugin, config in configs_of(PLANNERS).items()}
-        valid = {*PlannerServerParameters.model_fields, *keys[self.plugin]}
+        valid = {*PlannerServerParameters.model_fields, *_KEYS[self.plugin]}
         for name in sorted(self.model_fields_set - valid):
-            others = " or ".join(plugin for plugin, own in keys.items() if name in own)
+            others = " or ".join(plugin for plugin, own in _KEYS.items() if name in own)
             raise ValueError(
                 f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
             )
         return self
+
+
+for _name, _field in PlannerParameters.model_fields.items():
+    _owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if _name in own]
+    if 0 < len(_owners) < len(_KEYS):
+        _field.description = f"{' and '.join(_owners)}: {_field.description}"
+PlannerParameters.model_rebuild(force=True)
 
 
 @keys_of(*configs_of(SMOOTHERS).values())

@@ -37,7 +37,7 @@ class SlamConfig:
     resolution: Cell = 0.05
     """Edge of a cell of the map."""
     min_laser_range: Annotated[Metres, NotNegative] = 0.05
-    """Shorter readings are the robot itself: they are not used."""
+    """Shorter readings are not used: they are of the robot itself."""
     max_laser_range: Annotated[Metres, Positive, Le(1000.0)] = 25.0
     """Longer readings are cut: they clear cells up to here, and are not matched."""
     minimum_travel_distance: Annotated[Metres, NotNegative] = 0.5

@@ -49,7 +49,7 @@ def build_commands(
     if scans is None:
         there = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
         scans = (_SCAN,) if there else ()
-    if config.enabled is False or not (scans or config.range_topics):
+    if not config.enabled or not (scans or config.range_topics):
         TwistMuxNode(bus, namespace=namespace)
         return
     TwistMuxNode(bus, output=_GUARDED, namespace=namespace)

@@ -16,7 +16,7 @@ from twin.geometry import Array, Pose2, wrap_angles
 from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.critic import Trajectories
 from twin.navigation.control.dwb import kernels
-from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.dwb.config import DWBConfig, ObstacleConfig
 from twin.navigation.control.dwb.oscillation import Oscillation
 from twin.navigation.control.footprint_cover import CoverOf
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
@@ -165,7 +165,7 @@ class DWB(Controller):
         ):
             critic = getattr(config, name)
             if name in listed:
-                summed = getattr(critic, "sum_scores", False)
+                summed = isinstance(critic, ObstacleConfig) and critic.sum_scores
                 total += factor * critic.scale * raw[:, kernels.FOOTPRINT if summed else column]
         if self._critics:
             trajectories = _trajectories(samples, ends, now, local)
