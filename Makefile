@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/warehouse.yaml
 
-.PHONY: run test check bench soak fuzz oracle scenarios smoke docs clean
+.PHONY: run test test-long check bench soak fuzz oracle scenarios smoke docs clean
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0])'
@@ -17,8 +17,11 @@ run: $(VENV)/.ready  ## the environment, then the warehouse scenario to its verd
 	$(BIN)/twin run $(SCENARIO)
 
 test: $(VENV)/.ready  ## the whole test suite, fast tests first
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow and not bench"
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow and not bench and not long"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not bench and not long"
+
+test-long: $(VENV)/.ready  ## what takes longest: installations, every live value, many runs
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "long"
 
 check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/ruff format --check .

@@ -26,7 +26,7 @@ def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = 
         replace: Takes the changed config; without it the parameters are read-only.
     """
     current = config
-    found = parameters_of(config)
+    found = {name: one for name, one in parameters_of(config).items() if not one.is_nested}
     node.parameters.declare_together(
         [
             (name, one.told(config), descriptor_of(one.declaration, read_only=replace is None))

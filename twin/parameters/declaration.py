@@ -13,13 +13,11 @@ from typing import Any, get_type_hints
 from twin.parameters.domain import Domain, domain_of, metadata_of
 from twin.parameters.forms import (
     Derived,
-    DurationNs,
     Form,
     Itself,
     Name,
     NameOrPath,
     Nav2,
-    PeriodNs,
     ReadOnly,
     Underscored,
 )
@@ -127,9 +125,6 @@ def _init(config: type) -> list[dataclasses.Field[Any]]:
 def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
     field = of.name
     metadata = metadata_of(hint)
-    if domain_of(hint) == Domain(int) and field.endswith("_ns"):
-        hint = PeriodNs if field.endswith("period_ns") else DurationNs
-        metadata = metadata_of(hint)
     form = next((one for one in metadata if isinstance(one, Form)), None)
     name = field
     if form is not None and field.endswith(form.suffix):

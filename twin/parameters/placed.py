@@ -22,6 +22,12 @@ class Placed:
     """Fields and keys from the config to the value."""
     declaration: Declaration
 
+    @property
+    def is_nested(self) -> bool:
+        """Whether it is a list of lists, such as corners, which ROS has no parameters for."""
+        domain = self.declaration.domain
+        return domain is not None and domain.item is not None and domain.item.item is not None
+
     def told(self, config: Any) -> Any:
         """Return its value in a config, as others are told it."""
         return self.declaration.tell(reduce(_part, self.path, config))
@@ -57,7 +63,8 @@ def _walk(config: Any, path: tuple[str, ...], prefix: str, separator: str = ".")
             is_joined = declaration is not None and declaration.is_underscored
             yield from _walk(value, here, inner, "_" if is_joined else ".")
         elif declaration is not None and declaration.domain is not None and value not in (None, ()):
-            yield Placed(prefix[:-1] if declaration.is_itself else prefix + name, here, declaration)
+            whole = prefix[:-1] if declaration.is_itself and prefix else prefix + name
+            yield Placed(whole, here, declaration)
 
 
 def replaced(config: C, path: tuple[str, ...], value: Any) -> C:

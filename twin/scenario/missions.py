@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.parameters import (
     Hertz,
     Metres,
@@ -17,6 +18,7 @@ from twin.parameters import (
     Seconds,
 )
 from twin.scenario.fields import OneOf
+from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.strict_yaml import StrictModel
 
 
@@ -189,30 +191,14 @@ class R2D2StatePublisher(StrictModel):
     """Progress on the circle per cycle [deg]."""
 
 
-class Explore(StrictModel):
+@keys_of(ExplorerNodeConfig)
+class Explore(ParameterGroup):
     """Drive to the borders of what is known until nothing reachable is unknown (explore_lite)."""
 
     type: Literal["explore"]
     """`explore`"""
     robot: str
     """Name of the robot; its localisation is of type slam."""
-    return_to_init: bool = False
-    """Whether it drives back to its start at the end."""
-    min_frontier_size: Annotated[Metres, Positive] | None = None
-    """Shorter borders are left alone [m]."""
-    potential_scale: Annotated[float, NotNegative] | None = None
-    """Weight of the way to a border."""
-    gain_scale: Annotated[float, NotNegative] | None = None
-    """Weight of its length."""
-    orientation_scale: Annotated[float, NotNegative] | None = None
-    """Weight of the turn towards it."""
-    progress_timeout: Annotated[Seconds, Positive] | None = None
-    """A goal that gets no nearer for so long is given up [s]."""
-
-    def overrides(self) -> dict[str, float]:
-        """Return the parameters of `/explore` that the file gives, by name."""
-        own = self.model_fields_set - {"type", "robot", "return_to_init"}
-        return {name: getattr(self, name) for name in sorted(own)}
 
 
 class Idle(StrictModel):

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from twin.geometry import Pose2
-from twin.navigation.exploration.explorer import Explorer, ExplorerConfig
-from twin.navigation.exploration.frontiers import FrontierConfig, FrontierMap
+from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
+from twin.navigation.exploration.explorer import Explorer
+from twin.navigation.exploration.frontiers import FrontierMap
 from twin.navigation.exploration.line_of_sight import seen_from
 from twin.navigation.maps.occupancy_map import OccupancyMap
 

@@ -14,10 +14,10 @@ from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Bool, ExploreStatus, MarkerArray, OccupancyGrid, new
 from twin.bridge.qos import LATCHED
 from twin.geometry import Pose2
-from twin.navigation.exploration.explorer import ExplorerConfig
-from twin.navigation.exploration.frontiers import FrontierConfig
+from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.nodes.missions.explore import ExploreMissionNode
-from twin.nodes.navigation.exploration.explorer import ExplorerNode, ExplorerNodeConfig
+from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
+from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.navigation.mapping.map_server import grid_msg
 
 

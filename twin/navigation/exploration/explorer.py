@@ -4,33 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
-from typing import Annotated
+from dataclasses import dataclass
 
 from twin.geometry import Pose2, wrap_angle
-from twin.navigation.exploration.frontiers import Frontier, FrontierConfig, FrontierMap
+from twin.navigation.exploration.config import ExplorerConfig
+from twin.navigation.exploration.frontiers import Frontier, FrontierMap
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.parameters import Flat, Interval, Metres, NotNegative, PerMetre, Positive, Seconds
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExplorerConfig:
-    """Parameters of the choice; those that explore_lite has are named as there."""
-
-    potential_scale: Annotated[PerMetre, Interval(ge=0.0, le=1e6)] = 3.0
-    """Weight of the way to a frontier."""
-    gain_scale: Annotated[PerMetre, Interval(ge=0.0, le=1e6)] = 1.0
-    """Weight of its length: a long one promises much that is new."""
-    orientation_scale: Annotated[float, Interval(ge=0.0, le=1e6)] = 0.0
-    """Weight of the turn towards it [1/rad]."""
-    progress_timeout: Annotated[Seconds, Positive] = 30.0
-    """A goal that gets no nearer for so long is given up."""
-    standoff: Annotated[Metres, NotNegative] = 0.5
-    """So far before a frontier the robot stops and looks; the second time it drives up to it."""
-    same_place: Annotated[Metres, NotNegative] = 0.5
-    """Frontiers within this distance of each other are one and the same."""
-    frontiers: Annotated[FrontierConfig, Flat] = field(default_factory=FrontierConfig)
-    """What counts as one."""
 
 
 @dataclass(frozen=True, kw_only=True)

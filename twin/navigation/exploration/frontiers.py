@@ -5,38 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from twin.geometry import Array, Pose2
+from twin.navigation.exploration.config import FrontierConfig
 from twin.navigation.exploration.line_of_sight import seen_from
 from twin.navigation.exploration.wavefront import travel_distances, way_back
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
-from twin.parameters import Interval, Le, Metres, NotNegative, Positive
 
 _EIGHT = np.ones((3, 3), dtype=np.int8)
 _FOUR = ((0, 1), (0, -1), (1, 0), (-1, 0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrontierConfig:
-    """What counts as a frontier."""
-
-    min_frontier_size: Annotated[Metres, NotNegative] = 0.5
-    """Shorter ones are left alone."""
-    robot_radius: Annotated[Metres, Positive] = 0.3
-    """The robot's centre keeps this distance from obstacles: its circumscribed radius, to turn."""
-    inscribed_radius: Annotated[Metres, NotNegative] = 0.3
-    """Unknown cells this near to obstacles are none that matter."""
-    view_distance: Annotated[Metres, NotNegative, Le(100.0)] = 2.0
-    """A frontier that the robot cannot drive up to is looked at from afar, so far away at most."""
-    goal_clearance: Annotated[Metres, NotNegative] = 0.1
-    """Goals keep so much more than `robot_radius` from obstacles, where there is room."""
-    lethal_threshold: Annotated[int, Interval(ge=1, le=100)] = 65
-    """Occupancy from which a cell of the map is an obstacle."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

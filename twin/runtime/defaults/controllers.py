@@ -111,7 +111,7 @@ def _mppi(parameters: ControllerParameters, smoother: VelocitySmootherConfig, pe
     Fewer rollouts than Nav2's, of slower noise: they reach as far aside, in a third of the time.
     """
     linear, angular = smoother.linear, smoother.angular
-    speed, model_dt = parameters.vx_max or linear.max_velocity, parameters.model_dt or period
+    speed, model_dt = parameters.vx_max or linear.max_velocity, parameters.model_dt or min(period, 10.0)
     steps = parameters.time_steps or min(1000, max(8, round(2.4 / model_dt)))
     return MPPIConfig(
         batch_size=600,

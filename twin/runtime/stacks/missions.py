@@ -21,13 +21,13 @@ from twin.bridge.types import ActionType
 from twin.errors import ScenarioError
 from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps import footprint as footprints
-from twin.navigation.exploration.explorer import ExplorerConfig
-from twin.navigation.exploration.frontiers import FrontierConfig
+from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.nodes.messages import pose_stamped
 from twin.nodes.missions.explore import ExploreMissionNode
 from twin.nodes.missions.random_goals import RandomGoalsConfig, RandomGoalsNode
 from twin.nodes.missions.simple import ActionSequenceNode, ActionStep, VelocityProfileNode
-from twin.nodes.navigation.exploration.explorer import ExplorerNode, ExplorerNodeConfig
+from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
+from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.runtime.defaults.navigation import overridden
 from twin.runtime.stacks.robot import RobotStack
@@ -166,11 +166,10 @@ def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:
 
 
 def _explore(bus: Bus, mission: Explore, stack: RobotStack, namespace: str) -> MissionHandle:
-    overrides = mission.overrides()
     inner, outer = footprints.radii(stack.footprint)
-    frontiers = overridden(FrontierConfig(robot_radius=outer, inscribed_radius=inner), overrides)
-    explorer = overridden(ExplorerConfig(frontiers=frontiers), overrides)
-    config = ExplorerNodeConfig(return_to_init=mission.return_to_init, explorer=explorer)
+    frontiers = FrontierConfig(robot_radius=outer, inscribed_radius=inner)
+    defaults = ExplorerNodeConfig(explorer=ExplorerConfig(frontiers=frontiers))
+    config = overridden(defaults, mission.overrides())
     node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)
     return ExploreMissionNode(bus, node, namespace=namespace)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from twin.geometry import Array, Pose2, wrap_angles
 from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.dwb import kernels
-from twin.navigation.control.dwb.config import DWBConfig
+from twin.navigation.control.dwb.config import DWBConfig, ObstacleConfig
 from twin.navigation.control.dwb.oscillation import Oscillation
 from twin.navigation.control.footprint_cover import CoverOf
 from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
@@ -157,7 +157,7 @@ class DWB(Controller):
         ):
             critic = getattr(config, name)
             if name in listed:
-                summed = getattr(critic, "sum_scores", False)
+                summed = isinstance(critic, ObstacleConfig) and critic.sum_scores
                 total += factor * critic.scale * raw[:, kernels.FOOTPRINT if summed else column]
         if "RotateToGoal" in listed and self._at_goal:
             allowed, score = self._rotate_to_goal(samples, ends, now, local)

@@ -215,7 +215,7 @@ class MPPIConfig:
     """Steps of each rollout."""
     batch_size: Annotated[int, Interval(ge=8, le=100_000)] = 1000
     """Number of rollouts."""
-    model_dt: Annotated[Seconds, Positive] = 0.05
+    model_dt: Annotated[Seconds, Interval(ge=0.001, le=10)] = 0.05
     """Length of a step; the controller's period is best the same."""
     iteration_count: Annotated[int, Interval(ge=1, le=100)] = 1
     """Rounds per command."""
@@ -253,9 +253,9 @@ class MPPIConfig:
     """What the drive can do; since Lyrical Nav2 has other words."""
     min_turning_r: Annotated[Metres, Positive, Nav2("AckermannConstraints.min_turning_r")] = 0.2
     """Of motion model Ackermann."""
-    model_delay_vx: Annotated[Seconds, NotNegative] = 0.0
+    model_delay_vx: Annotated[Seconds, Interval(ge=0, le=10)] = 0.0
     """From a command to its effect."""
-    model_delay_wz: Annotated[Seconds, NotNegative] = 0.0
+    model_delay_wz: Annotated[Seconds, Interval(ge=0, le=10)] = 0.0
     """The same for turning."""
     open_loop: bool = False
     """Whether the last command counts as the present speed."""

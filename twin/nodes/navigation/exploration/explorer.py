@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated
-
 from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.actions.client import ClientGoal
@@ -13,27 +10,15 @@ from twin.bridge.msgs import Bool, ExploreStatus, MarkerArray, OccupancyGrid, ne
 from twin.bridge.qos import LATCHED
 from twin.errors import MapError
 from twin.geometry import Pose2
-from twin.navigation.exploration.explorer import Explorer, ExplorerConfig
+from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.warm_up import warm_up_exploration
 from twin.nodes.messages import pose_stamped
+from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.nodes.navigation.exploration.frontier_markers import frontier_markers
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
-from twin.parameters import Flat, Le, PeriodNs, Positive
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExplorerNodeConfig:
-    """Rates, and what happens at the end; names are explore_lite's."""
-
-    planner_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
-    """How often a frontier is chosen."""
-    return_to_init: bool = False
-    """Whether the robot drives back to where it was at first when nothing is left."""
-    explorer: Annotated[ExplorerConfig, Flat] = field(default_factory=ExplorerConfig)
-    """Of the choice."""
 
 
 class ExplorerNode:

@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
-from twin.parameters.declaration import fields_of
+from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.parameters.declaration import fields_of, names_of
 from twin.parameters.placed import overlay, parameters_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.lines import lines_of
@@ -119,7 +120,7 @@ class Nav2Parameters:
     def is_round(self, node: str) -> bool:
         """Whether a costmap of the file has a radius, and no polygon that would go before it."""
         said = converted(self._said(node))
-        return "robot_radius" in said and "footprint" not in said
+        return names_of(CostmapConfig).robot_radius in said and "footprint" not in said
 
     def values(self, node: str) -> dict[str, Any]:
         """Return all that the file says of a node by its name, by the names that it uses."""

@@ -35,14 +35,12 @@ def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
     server = _taken(CollisionMonitorConfig, "", {_NAMES.source_timeout_ns: 2.0, **values}, file)
     if server is None:
         return None
-    return CollisionMonitorParameters.model_validate(
-        {
-            **server,
-            # A file of other polygons alone leaves the robot its usual guard.
-            "polygons": polygons if fitting or not active else None,
-            "scan_topics": _topics(file, values, "scan") or None,
-            "range_topics": _topics(file, values, "range"),
-        }
+    return CollisionMonitorParameters(
+        **server,
+        # A file of other polygons alone leaves the robot its usual guard.
+        polygons=polygons if fitting or not active else None,
+        scan_topics=_topics(file, values, "scan") or None,
+        range_topics=_topics(file, values, "range"),
     )
 
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import yaml
 
 from twin.controllers.limiter import AxisLimits
-from twin.parameters.declaration import fields_of
+from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.parameters.declaration import fields_of, names_of
 from twin.parameters.placed import parameters_of
 
 PLANNERS = {
@@ -101,7 +102,7 @@ def converted(values: dict[str, Value]) -> dict[str, Value]:
             del out["footprint"]  # Nav2's default: the circle
         elif corners is not None:
             out["footprint"] = footprint._replace(value=corners)
-            out.pop("robot_radius", None)  # as in Nav2, where the polygon goes first
+            out.pop(names_of(CostmapConfig).robot_radius, None)  # as in Nav2, where the polygon goes first
     return out
 
 
