@@ -87,13 +87,13 @@ def slam_with_file(
 
 
 def _mode(file: Nav2Parameters, node: str, localisation: SlamLocalisation) -> Mode:
-    said = file.effective(node).get("mode", localisation.mode)
-    if "mode" in localisation.model_fields_set:
+    said = file.effective(node).get(_SLAM.mode, localisation.mode)
+    if _SLAM.mode in localisation.model_fields_set:
         return localisation.mode
     modes: tuple[Mode, ...] = get_args(Mode)
     if said in modes:
         return modes[modes.index(said)]
-    file.wrong(node, "mode", f"must be {' or '.join(modes)}, not {said!r}")
+    file.wrong(node, _SLAM.mode, f"must be {' or '.join(modes)}, not {said!r}")
     return localisation.mode
 
 
@@ -107,7 +107,7 @@ def _graph(
         name = str(_saved(file, node, str(values[_SLAM.map_file_name])))
     if not name and config.mode == "localization":
         said = "is localization, which needs map_file_name, or the scenario's pose_graph"
-        file.wrong(node, "mode", said)
+        file.wrong(node, _SLAM.mode, said)
     pose = values.get(_SLAM.map_start_pose)
     if not name or pose is None:
         return replace(config, map_file_name=name), None
