@@ -157,9 +157,9 @@ def test_reading_a_scenario_and_its_schema_run_nothing(kind: str, write: Write) 
         ),
         (
             "mission",
-            "super().__init__",
-            "print",
-            r"mine.py:7: mission 'mine.py:Mine' fails: (TypeError|Attribute)",
+            "super().__init__(context.bus, namespace=context.namespace)\n        self.node",
+            "self.node = context.bus.create_node('x')\n        self.node",
+            r"mine.py:4: mission 'mine.py:Mine' does not call super\(\).__init__\(context.bus, namespace=",
         ),
         (
             "mission",
