@@ -16,10 +16,15 @@ from typing import TYPE_CHECKING, Any
 from twin.errors import PluginError, TwinError
 from twin.plugins.guard import blame, depth_of
 from twin.plugins.installed import version_of
+from twin.plugins.places import Place
 
 if TYPE_CHECKING:
-    from twin.plugins.places import Place
     from twin.plugins.plugin import Plugin
+
+
+_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
+_MODULES: dict[str, ModuleType] = {}
+"""Of files that were run outside of any run."""
 
 
 class Execution:
@@ -30,19 +35,41 @@ class Execution:
         self.versions: dict[str, str] = {}
         """By the plugin's name: its package and version, or the hash of its file."""
         self._tell, self._told = tell, set[str]()
+        self.modules: dict[str, ModuleType] = {}
+        """Files that were run, by the name of their module."""
         self._plugins: list[Plugin[object]] = []
 
     def add(self, plugin: Plugin[object]) -> None:
         """Take a plugin that is about to be executed."""
-        name, place = plugin.name, plugin.place
         self._plugins.append(plugin)
-        version = plugin.version or version_for(place)
+        self.keep(plugin.name, plugin.place, plugin.version)
+
+    def keep(self, name: str, place: Place, version: str | None = None) -> None:
+        """Keep the version of what is about to be executed, and tell of it."""
+        version = version or version_for(place)
         if self.versions.setdefault(name, version) != version:  # files of one name in two folders
             self.versions[f"{place.file}:{place.attribute}"] = version
         where = str(place.file or place.module)
         if self._tell is not None and where not in self._told:
             self._told.add(where)
             self._tell(where)
+
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Keep what is executed inside of the block, too: a run need not be one block.
+
+        An exception that came through a plugin's code leaves as a `PluginError` with its line.
+        """
+        token = _CURRENT.set(self)
+        try:
+            yield
+        except Exception as error:
+            blamed = None if isinstance(error, TwinError) else self.blamed(error)
+            if blamed is None:
+                raise
+            raise blamed from error
+        finally:
+            _CURRENT.reset(token)
 
     def blamed(self, error: Exception) -> PluginError | None:
         """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
@@ -51,29 +78,16 @@ class Execution:
         return blame(plugin, error) if plugin is not None and depth else None
 
 
-_CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
-
-
 @contextmanager
 def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
-    """Keep what is executed inside of the block; blocks inside of each other keep it for the outer one.
-
-    An exception that came through a plugin's code leaves as a `PluginError` with its line.
-    """
+    """Keep what is executed inside of the block; blocks inside of each other keep it for the outer one."""
     current = _CURRENT.get()
     if current is not None:
         yield current
         return
-    token = _CURRENT.set(current := Execution(tell))
-    try:
+    current = Execution(tell)
+    with current.going_on():
         yield current
-    except Exception as error:
-        blamed = None if isinstance(error, TwinError) else current.blamed(error)
-        if blamed is None:
-            raise
-        raise blamed from error
-    finally:
-        _CURRENT.reset(token)
 
 
 def run(plugin: Plugin[object]) -> Any:
@@ -92,6 +106,13 @@ def run(plugin: Plugin[object]) -> Any:
     return found
 
 
+def run_file(file: Path, attribute: str) -> ModuleType:
+    """Run a file of a user that holds no plugin; a run tells of it and keeps its hash likewise."""
+    if (current := _CURRENT.get()) is not None:
+        current.keep(f"{file.name}:{attribute}", Place(attribute, file=file))
+    return _run_file(file)
+
+
 def version_for(place: Place) -> str:
     """Return a package and its version, or the hash of a file's content."""
     owner = None if place.module is None else version_of(place.module)
@@ -101,12 +122,14 @@ def version_for(place: Place) -> str:
 
 
 def _run_file(file: Path) -> ModuleType:
-    """Run a file as a module of its own; once, as long as its content stays."""
+    """Run a file as a module of its own; once in a run, which finds nothing that another one left in it."""
     file = file.resolve()
     code = hashlib.sha256(str(file).encode() + file.read_bytes()).hexdigest()[:12]
     name = f"{file.stem}_{code}"  # a name of its own: nobody's random.py stands in for Python's
-    if name in sys.modules:
-        return sys.modules[name]
+    current = _CURRENT.get()
+    modules = _MODULES if current is None else current.modules
+    if name in modules:
+        return modules[name]
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -120,4 +143,5 @@ def _run_file(file: Path) -> ModuleType:
         raise
     finally:
         sys.path.remove(str(file.parent))
+    modules[name] = module
     return module
