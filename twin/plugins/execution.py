@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 
 _CURRENT: ContextVar[Execution | None] = ContextVar("execution", default=None)
-_MODULES: dict[str, ModuleType] = {}
-"""Of files that were run outside of any run."""
 
 
 class Execution:
@@ -119,6 +117,10 @@ def version_for(place: Place) -> str:
     if owner is not None or place.file is None:
         return owner or "unknown"
     return f"sha256:{hashlib.sha256(place.file.read_bytes()).hexdigest()}"
+
+
+_MODULES: dict[str, ModuleType] = {}
+"""Of files that were run outside of any run."""
 
 
 def _run_file(file: Path) -> ModuleType:
