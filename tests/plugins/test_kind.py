@@ -75,6 +75,9 @@ def test_a_file_beside_the_one_that_names_it_is_found_and_run_only_when_it_is_cr
     assert list(executed.versions) == ["calm.py:Calm"]
     assert executed.versions["calm.py:Calm"].startswith("sha256:")
     assert Path(f"{file}.ran").read_text() == "x"  # once for both
+    with execution():
+        checks.find("mine/calm.py:Calm", tmp_path).load()
+    assert Path(f"{file}.ran").read_text() == "xx"  # another run starts afresh
 
 
 def test_an_edited_file_is_run_again(checks: Kind[Check], tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from twin.errors import PluginError, TwinError
 from twin.plugins.guard import blame, depth_of
 from twin.plugins.installed import version_of
+from twin.plugins.places import Place
 
 if TYPE_CHECKING:
-    from twin.plugins.places import Place
     from twin.plugins.plugin import Plugin
 
 
@@ -33,13 +33,18 @@ class Execution:
         self.versions: dict[str, str] = {}
         """By the plugin's name: its package and version, or the hash of its file."""
         self._tell, self._told = tell, set[str]()
+        self.modules: dict[str, ModuleType] = {}
+        """Files that were run, by the name of their module."""
         self._plugins: list[Plugin[object]] = []
 
     def add(self, plugin: Plugin[object]) -> None:
         """Take a plugin that is about to be executed."""
-        name, place = plugin.name, plugin.place
         self._plugins.append(plugin)
-        version = plugin.version or version_for(place)
+        self.keep(plugin.name, plugin.place, plugin.version)
+
+    def keep(self, name: str, place: Place, version: str | None = None) -> None:
+        """Keep the version of what is about to be executed, and tell of it."""
+        version = version or version_for(place)
         if self.versions.setdefault(name, version) != version:  # files of one name in two folders
             self.versions[f"{place.file}:{place.attribute}"] = version
         where = str(place.file or place.module)
@@ -99,6 +104,13 @@ def run(plugin: Plugin[object]) -> Any:
     return found
 
 
+def run_file(file: Path, attribute: str) -> ModuleType:
+    """Run a file of a user that holds no plugin; a run tells of it and keeps its hash likewise."""
+    if (current := _CURRENT.get()) is not None:
+        current.keep(f"{file.name}:{attribute}", Place(attribute, file=file))
+    return _run_file(file)
+
+
 def version_for(place: Place) -> str:
     """Return a package and its version, or the hash of a file's content."""
     owner = None if place.module is None else version_of(place.module)
@@ -107,13 +119,19 @@ def version_for(place: Place) -> str:
     return f"sha256:{hashlib.sha256(place.file.read_bytes()).hexdigest()}"
 
 
+_MODULES: dict[str, ModuleType] = {}
+"""Of files that were run outside of any run."""
+
+
 def _run_file(file: Path) -> ModuleType:
-    """Run a file as a module of its own; once, as long as its content stays."""
+    """Run a file as a module of its own; once in a run, which finds nothing that another one left in it."""
     file = file.resolve()
     code = hashlib.sha256(str(file).encode() + file.read_bytes()).hexdigest()[:12]
     name = f"{file.stem}_{code}"  # a name of its own: nobody's random.py stands in for Python's
-    if name in sys.modules:
-        return sys.modules[name]
+    current = _CURRENT.get()
+    modules = _MODULES if current is None else current.modules
+    if name in modules:
+        return modules[name]
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -127,4 +145,5 @@ def _run_file(file: Path) -> ModuleType:
         raise
     finally:
         sys.path.remove(str(file.parent))
+    modules[name] = module
     return module

@@ -57,9 +57,13 @@ def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[
     if file is None:
         return
     mine = file.resolve()
+    inner = (plugin.place.module or "").count(".") + (
+        plugin.place.module is not None and file.name == "__init__.py"
+    )
+    package = mine.parents[inner - 1] if inner else None
     for depth, frame in enumerate(traceback.extract_tb(error.__traceback__), 1):
         at = Path(frame.filename).resolve()
-        if at == mine or (plugin.place.module is not None and mine.parent in at.parents):
+        if at == mine or package in at.parents:
             yield depth, (file if at == mine else at), frame.lineno
 
 

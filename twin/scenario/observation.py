@@ -135,8 +135,13 @@ class CheckContext:
     """Of each robot that has a lidar."""
 
     def robot(self, name: str | None) -> str:
-        """Return the robot a check is about; without a name the only one."""
-        return self.robots[0] if name is None else name
+        """Return the robot a check is about, without a name the only one; raises ScenarioError for none."""
+        if name is None and len(self.robots) == 1:
+            return self.robots[0]
+        if name not in self.robots:
+            what = "must name its robot" if name is None else f"names the robot '{name}', which is not there"
+            raise ScenarioError(f"a check {what}; valid: {', '.join(self.robots)}")
+        return name
 
     def zone(self, name: str) -> Zone:
         """Return a zone; raises ScenarioError naming the arena's zones."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from twin.errors import BridgeError, Problem, nearest
+from twin.plugins.execution import run_file
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -47,18 +46,12 @@ def _function(place: str) -> tuple[Path, Callable[[Bus], Any]]:
         raise BridgeError(f"{place} names no nodes; {_FORM}")
     if not file.is_file():
         raise BridgeError(f"{file}: there is no such file; {_FORM}")
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    if spec is None or spec.loader is None:
+    if file.suffix != ".py":
         raise BridgeError(f"{file}: not a Python file; {_FORM}")
-    module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(file.parent.resolve()))  # as Python does for a script
     try:
-        sys.modules[file.stem] = module  # dataclasses look their module up
-        spec.loader.exec_module(module)
+        module = run_file(file, function)
     except Exception as error:
         raise _fault(file, error) from error
-    finally:
-        sys.path.remove(str(file.parent.resolve()))
     found = getattr(module, function, None)
     if not callable(found):
         names = [n for n, value in vars(module).items() if callable(value) and not n.startswith("_")]
