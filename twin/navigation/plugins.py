@@ -34,6 +34,7 @@ from twin.navigation.planning.config import (
 from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
+    from twin.navigation.behavior_trees.node import TreeNode
     from twin.navigation.control.controller import Controller
     from twin.navigation.control.critic import Critic, Trajectories
     from twin.navigation.control.goal_checker import GoalChecker
@@ -62,6 +63,10 @@ PLANNERS: Kind[GlobalPlanner] = Kind(
 SMOOTHERS: Kind[Smoother] = Kind(
     "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
 )
+TREE_NODES: Kind[TreeNode] = Kind(
+    "behaviour tree node", base="twin.navigation.behavior_trees.node:TreeNode", group="twin.bt_nodes"
+)
+"""Beside those of BehaviorTree.CPP and Nav2."""
 _CONFIGS: dict[tuple[str, str], type] = {}
 """Of what ships, by kind and name."""
 
@@ -140,12 +145,12 @@ def create(kind: Kind[T], config: Any, **setup: Any) -> T:
         PluginError: a user's plugin cannot be made; also later, when it answers nonsense.
     """
     plugin = plugin_of(kind, config)
-    made = _checked(plugin)
+    made: Callable[..., T] = checked(plugin)
     with plugin.guard:
         return made(config=config, **setup)
 
 
-def _checked(plugin: Plugin[T]) -> Callable[..., T]:
+def checked(plugin: Plugin[T]) -> type[T]:
     """Return a plugin's class; of a user's one that looks at what its methods answer."""
     loaded = plugin.load()
     if plugin.ships:
@@ -156,6 +161,13 @@ def _checked(plugin: Plugin[T]) -> Callable[..., T]:
         for name, answer in _ANSWERS.items()
         if hasattr(base, name)
     }
+
+    def begin(self: Any, *args: Any, **kwargs: Any) -> None:
+        loaded.__init__(self, *args, **kwargs)
+        if vars(self).keys().isdisjoint(_OF_EVERY_BASE):
+            raise plugin.error("does not call super().__init__ with what it is made with")
+
+    members["__init__"] = begin
     return type(loaded.__name__, (loaded,), {**members, "__module__": loaded.__module__})
 
 
@@ -168,7 +180,7 @@ def _answering(
         try:
             return answer(plugin, said, *args)
         except (TypeError, ValueError):
-            shown = f"answers {method.__name__} with {said!r:.200}"
+            shown = f"answers {method.__name__} with {' '.join(repr(said).split()):.60}"
             raise plugin.error(f"{shown}; it must return {valid}") from None
 
     return call
@@ -208,6 +220,15 @@ def _score(plugin: Plugin[Any], answer: Any, trajectories: Trajectories) -> np.n
     return score
 
 
+def _status(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
+    if getattr(answer, "name", None) not in _STATUSES:
+        raise TypeError
+    return answer
+
+
+_OF_EVERY_BASE = ("config", "status")
+"""One of these is made by the constructor of what a plugin is derived from."""
+_STATUSES = ("RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
 _A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
 _A_TRUTH = (_truth, "True or False")
 _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
@@ -218,6 +239,7 @@ _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
         "smooth": _A_PATH,
         "is_goal_reached": _A_TRUTH,
         "check": _A_TRUTH,
+        "tick": (_status, f"Status.{', Status.'.join(_STATUSES)}"),
     }
 )
 """What methods must return: what reads an answer, and raises a ValueError; the same in words."""

@@ -5,10 +5,12 @@ Every one is optional: `overrides()` holds only what the file gives, the rest ke
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 
+from twin.navigation.plugins import TREE_NODES
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
@@ -18,6 +20,7 @@ from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.scenario.planners import PlannerParameters, SmootherParameters
+from twin.scenario.plugin_groups import PluginListGroup
 from twin.strict_yaml import StrictModel
 
 
@@ -27,9 +30,12 @@ class CostmapParameters(ParameterGroup):
 
 
 @keys_of(BtNavigatorConfig)
-class NavigatorParameters(ParameterGroup):
+class NavigatorParameters(PluginListGroup):
     """Parameters of `/bt_navigator`."""
 
+    list_of, list_key = TREE_NODES, "plugins"
+    plugins: Sequence[str] = ()
+    """Nodes of yours that trees may have, by the names of their classes."""
     bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 

@@ -26,7 +26,8 @@ from twin.navigation.planning.config import PlannerConfig
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.messages import path_msg, pose_stamped
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
-from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig, BtNavigatorNode
+from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
