@@ -7,6 +7,7 @@ from what he wrote, and so knows whose it is, also where two plugins share their
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from types import MappingProxyType
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from twin.navigation.control.critic import Critic, Trajectories
     from twin.navigation.control.goal_checker import GoalChecker
     from twin.navigation.control.progress_checker import ProgressChecker
+    from twin.navigation.costmaps.layer import Layer
     from twin.navigation.planning.planner import GlobalPlanner
     from twin.navigation.planning.smoother import Smoother
 
@@ -63,6 +65,8 @@ PLANNERS: Kind[GlobalPlanner] = Kind(
 SMOOTHERS: Kind[Smoother] = Kind(
     "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
 )
+LAYERS: Kind[Layer] = Kind("layer", base="twin.navigation.costmaps.layer:Layer", group="twin.layers")
+"""Of costmaps, beside those that ship: `costmap_config.LAYERS`."""
 TREE_NODES: Kind[TreeNode] = Kind(
     "behaviour tree node", base="twin.navigation.behavior_trees.node:TreeNode", group="twin.bt_nodes"
 )
@@ -179,7 +183,7 @@ def _answering(
         said = method(self, *args, **kwargs)
         try:
             return answer(plugin, said, *args)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, AttributeError):
             shown = f"answers {method.__name__} with {' '.join(repr(said).split()):.60}"
             raise plugin.error(f"{shown}; it must return {valid}") from None
 
@@ -226,6 +230,11 @@ def _status(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
     return answer
 
 
+def _window(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
+    corners = [operator.index(getattr(answer, name)) for name in ("x0", "y0", "x1", "y1")]
+    return type(answer)(*corners)
+
+
 _OF_EVERY_BASE = ("config", "status")
 """One of these is made by the constructor of what a plugin is derived from."""
 _STATUSES = ("RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
@@ -239,6 +248,7 @@ _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
         "smooth": _A_PATH,
         "is_goal_reached": _A_TRUTH,
         "check": _A_TRUTH,
+        "update_bounds": (_window, "a Window(x0, y0, x1, y1) of cells"),
         "tick": (_status, f"Status.{', Status.'.join(_STATUSES)}"),
     }
 )
