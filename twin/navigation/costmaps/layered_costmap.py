@@ -65,7 +65,7 @@ class LayeredCostmap:
         self._resolution = config.resolution if static is None else static.resolution
         if static is not None and "static_layer" not in config.plugins:
             unknown = NO_INFORMATION if config.track_unknown_space else FREE_SPACE
-            self._static = np.full(static.data.shape, unknown, dtype=np.uint8)
+            self._static: Cells = np.full(static.data.shape, unknown, dtype=np.uint8)
             origin = (static.origin.x, static.origin.y)
         elif static is None:
             shape = round(config.height / self._resolution), round(config.width / self._resolution)
@@ -107,11 +107,9 @@ class LayeredCostmap:
             "range_sensor_layer": self._ranges,
             **self._own,
         }
-        found = [(name, there.get(name)) for name in names]
         at = names.index("inflation_layer") if "inflation_layer" in names else len(names)
-        below, above = (
-            [layer for _, layer in part if layer is not None] for part in (found[:at], found[at:])
-        )
+        below = [layer for name in names[:at] if (layer := there.get(name)) is not None]
+        above = [layer for name in names[at:] if (layer := there.get(name)) is not None]
         return (below + zones, above) if self.config.keepout_before_inflation else (below, above + zones)
 
     @property
