@@ -7,6 +7,7 @@ from what he wrote, and so knows whose it is, also where two plugins share their
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from types import MappingProxyType
@@ -34,10 +35,12 @@ from twin.navigation.planning.config import (
 from twin.plugins import Kind, Plugin, require_finite
 
 if TYPE_CHECKING:
+    from twin.navigation.behavior_trees.node import TreeNode
     from twin.navigation.control.controller import Controller
     from twin.navigation.control.critic import Critic, Trajectories
     from twin.navigation.control.goal_checker import GoalChecker
     from twin.navigation.control.progress_checker import ProgressChecker
+    from twin.navigation.costmaps.layer import Layer
     from twin.navigation.planning.planner import GlobalPlanner
     from twin.navigation.planning.smoother import Smoother
 
@@ -62,6 +65,12 @@ PLANNERS: Kind[GlobalPlanner] = Kind(
 SMOOTHERS: Kind[Smoother] = Kind(
     "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
 )
+LAYERS: Kind[Layer] = Kind("layer", base="twin.navigation.costmaps.layer:Layer", group="twin.layers")
+"""Of costmaps, beside those that ship: `costmap_config.LAYERS`."""
+TREE_NODES: Kind[TreeNode] = Kind(
+    "behaviour tree node", base="twin.navigation.behavior_trees.node:TreeNode", group="twin.bt_nodes"
+)
+"""Beside those of BehaviorTree.CPP and Nav2."""
 _CONFIGS: dict[tuple[str, str], type] = {}
 """Of what ships, by kind and name."""
 
@@ -140,12 +149,12 @@ def create(kind: Kind[T], config: Any, **setup: Any) -> T:
         PluginError: a user's plugin cannot be made; also later, when it answers nonsense.
     """
     plugin = plugin_of(kind, config)
-    made = _checked(plugin)
+    made: Callable[..., T] = checked(plugin)
     with plugin.guard:
         return made(config=config, **setup)
 
 
-def _checked(plugin: Plugin[T]) -> Callable[..., T]:
+def checked(plugin: Plugin[T]) -> type[T]:
     """Return a plugin's class; of a user's one that looks at what its methods answer."""
     loaded = plugin.load()
     if plugin.ships:
@@ -156,6 +165,13 @@ def _checked(plugin: Plugin[T]) -> Callable[..., T]:
         for name, answer in _ANSWERS.items()
         if hasattr(base, name)
     }
+
+    def begin(self: Any, *args: Any, **kwargs: Any) -> None:
+        loaded.__init__(self, *args, **kwargs)
+        if vars(self).keys().isdisjoint(_OF_EVERY_BASE):
+            raise plugin.error("does not call super().__init__ with what it is made with")
+
+    members["__init__"] = begin
     return type(loaded.__name__, (loaded,), {**members, "__module__": loaded.__module__})
 
 
@@ -167,8 +183,8 @@ def _answering(
         said = method(self, *args, **kwargs)
         try:
             return answer(plugin, said, *args)
-        except (TypeError, ValueError):
-            shown = f"answers {method.__name__} with {said!r:.200}"
+        except (TypeError, ValueError, AttributeError):
+            shown = f"answers {method.__name__} with {' '.join(repr(said).split()):.60}"
             raise plugin.error(f"{shown}; it must return {valid}") from None
 
     return call
@@ -208,6 +224,20 @@ def _score(plugin: Plugin[Any], answer: Any, trajectories: Trajectories) -> np.n
     return score
 
 
+def _status(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
+    if getattr(answer, "name", None) not in _STATUSES:
+        raise TypeError
+    return answer
+
+
+def _window(plugin: Plugin[Any], answer: Any, *_: Any) -> Any:
+    corners = [operator.index(getattr(answer, name)) for name in ("x0", "y0", "x1", "y1")]
+    return type(answer)(*corners)
+
+
+_OF_EVERY_BASE = ("config", "status")
+"""One of these is made by the constructor of what a plugin is derived from."""
+_STATUSES = ("RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
 _A_PATH = (_path, "a path of shape (n, 3): x, y [m], yaw [rad]")
 _A_TRUTH = (_truth, "True or False")
 _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
@@ -218,6 +248,8 @@ _ANSWERS: Mapping[str, tuple[Callable[..., Any], str]] = MappingProxyType(
         "smooth": _A_PATH,
         "is_goal_reached": _A_TRUTH,
         "check": _A_TRUTH,
+        "update_bounds": (_window, "a Window(x0, y0, x1, y1) of cells"),
+        "tick": (_status, f"Status.{', Status.'.join(_STATUSES)}"),
     }
 )
 """What methods must return: what reads an answer, and raises a ValueError; the same in words."""

@@ -5,10 +5,13 @@ Every one is optional: `overrides()` holds only what the file gives, the rest ke
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Collection, Mapping, Sequence
+from typing import Annotated, Any
 
 from pydantic import Field
 
+from twin.navigation.costmaps.costmap_config import LAYERS as SHIPPED_LAYERS
+from twin.navigation.plugins import LAYERS, TREE_NODES
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
@@ -16,20 +19,31 @@ from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
-from twin.scenario.parameter_group import ParameterGroup, keys_of
+from twin.scenario.parameter_group import keys_of
 from twin.scenario.planners import PlannerParameters, SmootherParameters
+from twin.scenario.plugin_groups import PluginListGroup
 from twin.strict_yaml import StrictModel
 
 
 @keys_of(CostmapNodeConfig)
-class CostmapParameters(ParameterGroup):
-    """Parameters of a costmap."""
+class CostmapParameters(PluginListGroup):
+    """Parameters of a costmap; those of a layer of yours stand beside `plugins`, by the name of its class."""
+
+    list_of, list_key = LAYERS, "plugins"
+
+    @classmethod
+    def ships(cls, data: Mapping[str, Any]) -> Collection[str]:
+        """Return the names of the layers that ship."""
+        return SHIPPED_LAYERS
 
 
 @keys_of(BtNavigatorConfig)
-class NavigatorParameters(ParameterGroup):
+class NavigatorParameters(PluginListGroup):
     """Parameters of `/bt_navigator`."""
 
+    list_of, list_key = TREE_NODES, "plugins"
+    plugins: Sequence[str] = ()
+    """Nodes of yours that trees may have, by the names of their classes."""
     bt_loop_frequency: Annotated[Hertz, Positive, Le(1000)] | None = None
     """Rate of the tree's ticks [Hz]."""
 

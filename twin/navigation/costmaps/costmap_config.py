@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from twin.geometry import Array
 from twin.navigation.costmaps import footprint as footprints
-from twin.parameters import Derived, Fraction, Interval, Le, Metres, NotNegative, PerMetre, Positive, Seconds
+from twin.parameters import (
+    Derived,
+    Flat,
+    Fraction,
+    Interval,
+    Le,
+    Metres,
+    NotNegative,
+    PerMetre,
+    Positive,
+    Seconds,
+)
 
+LAYERS = ("static_layer", "obstacle_layer", "range_sensor_layer", "inflation_layer")
+"""Those that ship, as Nav2 orders them."""
 _MOST_CELLS = 4000
 """Along an edge of a rolling costmap."""
 
@@ -105,6 +119,10 @@ class CostmapConfig:
     keepout_before_inflation: bool = True
     """Whether keep-out zones are inflated, so that the whole robot keeps out, not only its centre. In Nav2
     `keepout_filter` is among the `plugins` then, before `inflation_layer`, and not among the `filters`."""
+    plugins: tuple[str, ...] = LAYERS
+    """Layers in their order. Zones are before or after all of them, as `keepout_before_inflation` says."""
+    own_layers: Annotated[Mapping[str, Any], Flat] = field(default_factory=dict)
+    """Parameters of layers that a user brings, by the names that `plugins` has for them."""
     range_sensor_layer: RangeSensorConfig = field(default_factory=RangeSensorConfig)
     """Of the layer of sonars and infrared sensors."""
     keepout_filter: KeepoutConfig = field(default_factory=KeepoutConfig)

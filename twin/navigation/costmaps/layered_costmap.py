@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,15 +16,32 @@ from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.kernels import Cells
+from twin.navigation.costmaps.layer import Layer
 from twin.navigation.costmaps.obstacle_layer import ObstacleLayer
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
 from twin.navigation.costmaps.static_layer import static_costs
 from twin.navigation.costmaps.window import NOTHING, Window, everything, raised
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.plugins import LAYERS, create
 
 __all__ = ["CostmapConfig", "LayeredCostmap"]
 
 _SAME_FRAME = Pose2(0.0, 0.0, 0.0)
+
+
+class _Zones(Layer):
+    """The mask of a keep-out filter on the grid."""
+
+    is_known = True
+
+    def __init__(self, cells: Cells) -> None:
+        super().__init__()
+        self._cells = cells
+
+    def update_costs(self, grid: Costmap, window: Window) -> None:
+        """Raise the costs to the mask's."""
+        at = window.slices
+        grid.costs[at] = raised(grid.costs[at], self._cells[at])
 
 
 @dataclass(kw_only=True)
@@ -45,7 +63,11 @@ class LayeredCostmap:
         if static is not None and (static.origin.yaw != 0.0 or config.rolling_window):
             raise MapError("a costmap takes a static map only with origin yaw 0 and without rolling_window")
         self._resolution = config.resolution if static is None else static.resolution
-        if static is None:
+        if static is not None and "static_layer" not in config.plugins:
+            unknown = NO_INFORMATION if config.track_unknown_space else FREE_SPACE
+            self._static: Cells = np.full(static.data.shape, unknown, dtype=np.uint8)
+            origin = (static.origin.x, static.origin.y)
+        elif static is None:
             shape = round(config.height / self._resolution), round(config.width / self._resolution)
             unknown = config.track_unknown_space and not config.rolling_window
             self._static = np.full(shape, NO_INFORMATION if unknown else FREE_SPACE, dtype=np.uint8)
@@ -66,14 +88,29 @@ class LayeredCostmap:
             cost_scaling_factor=config.cost_scaling_factor,
             inflate_unknown=config.inflate_unknown,
         )
+        self._own = {name: create(LAYERS, own) for name, own in config.own_layers.items()}
         self._obstacles = ObstacleLayer(self.shape)
         self._ranges: RangeSensorLayer | None = None
         self._keepout: Cells | None = None
-        self._master = self._static.copy()
         self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._master = self._wrap(np.empty_like(self._static), origin)
         self._known: Costmap | None = None
         self._dirty = everything(self.shape)
         self._all_costs_stale = True
+
+    def _layers(self) -> tuple[list[Layer], list[Layer]]:
+        """Return the layers that are inflated, over the static one, and those that come after, in order."""
+        names: tuple[str, ...] = self.config.plugins
+        zones: list[Layer] = [] if self._keepout is None else [_Zones(self._keepout)]
+        there: dict[str, Layer | None] = {
+            "obstacle_layer": self._obstacles,
+            "range_sensor_layer": self._ranges,
+            **self._own,
+        }
+        at = names.index("inflation_layer") if "inflation_layer" in names else len(names)
+        below = [layer for name in names[:at] if (layer := there.get(name)) is not None]
+        above = [layer for name in names[at:] if (layer := there.get(name)) is not None]
+        return (below + zones, above) if self.config.keepout_before_inflation else (below, above + zones)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -92,14 +129,12 @@ class LayeredCostmap:
     def known(self) -> Costmap:
         """What the map and the masks say without anything that a sensor has seen; kept until one changes."""
         if self._known is None:
-            master, keepout = self._static, self._keepout
-            if keepout is not None and self.config.keepout_before_inflation:
-                master = raised(master, keepout)
-            costs = np.empty_like(self._static)
-            self._inflation.write(costs, master, everything(self.shape))
-            if keepout is not None:
-                costs = raised(costs, keepout)
-            self._known = self._wrap(costs, self._grid.origin)
+            whole, origin = everything(self.shape), self._grid.origin
+            master, known = (self._wrap(np.empty_like(self._static), origin) for _ in range(2))
+            below, above = ([one for one in layers if one.is_known] for layers in self._layers())
+            self._combine(master, below, whole)
+            self._finish(known, master, above, whole)
+            self._known = known
         return self._known
 
     def update(self, scan_points: ArrayLike, sensor_origin: ArrayLike, robot: Pose2 | None = None) -> None:
@@ -182,8 +217,17 @@ class LayeredCostmap:
         self._keepout = None  # the mask stays where it is: whoever has it lays it anew
         origin = (old[0] + dx * self._resolution, old[1] + dy * self._resolution)
         self._grid = self._wrap(np.empty_like(self._static), origin)
+        self._master = self._wrap(self._master.costs, origin)
         self._known = None
         self._stale()
+
+    def update_layers(self, robot: Pose2 | None, now_ns: int) -> None:
+        """Let the layers of a user say what changes; see `Layer.update_bounds`."""
+        for layer in self._own.values():
+            window = layer.update_bounds(self._grid, robot, now_ns).clipped(self.shape)
+            if not window.empty:
+                self._touch(window)
+                self._known = None if layer.is_known else self._known
 
     def adopt(self, old: LayeredCostmap) -> None:
         """Take what sensors have seen on another costmap in the same frame, where it lies on this one.
@@ -194,6 +238,7 @@ class LayeredCostmap:
         Args:
             old: The costmap of the map before.
         """
+        self._own = old._own
         if not math.isclose(old._resolution, self._resolution, rel_tol=1e-6):
             return
         dx, dy = (
@@ -239,6 +284,9 @@ class LayeredCostmap:
         if window.empty and not outside:
             return
         self._touch(self._obstacles.forget(window, outside=outside))
+        for layer in self._own.values():
+            layer.reset()
+            self._stale()
         if self._ranges is not None:
             self._touch(self._ranges.forget(window, outside=outside))
 
@@ -260,19 +308,25 @@ class LayeredCostmap:
     def _refresh(self) -> None:
         """Combine the layers where they changed, and inflate as far around as that reaches."""
         window, self._dirty = self._dirty, NOTHING
-        at = window.slices
-        master = raised(self._static[at], self._obstacles.cells[at])
-        if self._ranges is not None:
-            master = raised(master, self._ranges.costs(window))
-        keepout, inflated_zones = self._keepout, self.config.keepout_before_inflation
-        if keepout is not None and inflated_zones:
-            master = raised(master, keepout[at])
-        self._master[at] = master
+        below, above = self._layers()
+        self._combine(self._master, below, window)
         around = everything(self.shape)
         if not self._all_costs_stale:
             around = window.grown(self._inflation.reach).clipped(self.shape)
         self._all_costs_stale = False
-        costs = self._grid.costs
-        self._inflation.write(costs, self._master, around)
-        if keepout is not None and not inflated_zones:
-            costs[around.slices] = raised(costs[around.slices], keepout[around.slices])
+        self._finish(self._grid, self._master, above, around)
+
+    def _combine(self, master: Costmap, layers: Sequence[Layer], window: Window) -> None:
+        """Lay layers over the static one."""
+        master.costs[window.slices] = self._static[window.slices]
+        for layer in layers:
+            layer.update_costs(master, window)
+
+    def _finish(self, grid: Costmap, master: Costmap, layers: Sequence[Layer], window: Window) -> None:
+        """Inflate, and lay layers over that."""
+        if "inflation_layer" in self.config.plugins:
+            self._inflation.write(grid.costs, master.costs, window)
+        else:
+            grid.costs[window.slices] = master.costs[window.slices]
+        for layer in layers:
+            layer.update_costs(grid, window)

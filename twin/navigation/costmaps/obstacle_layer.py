@@ -8,19 +8,34 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION
+from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.costmaps.kernels import Cells, trace_scan
-from twin.navigation.costmaps.window import NOTHING, Window, cut_out, differing, everything, shifted
+from twin.navigation.costmaps.layer import Layer
+from twin.navigation.costmaps.window import (
+    NOTHING,
+    Window,
+    cut_out,
+    differing,
+    everything,
+    raised,
+    shifted,
+)
 
 
-class ObstacleLayer:
+class ObstacleLayer(Layer):
     """Cells that were seen: 254 lethal, 0 free, 255 never seen.
 
     An obstacle stays until a ray passes through its cell, the robot stands on it, or it is cleared by name.
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
+        super().__init__()
         self.cells: Cells = np.full(shape, NO_INFORMATION, dtype=np.uint8)
+
+    def update_costs(self, grid: Costmap, window: Window) -> None:
+        """Raise the costs to what was seen."""
+        at = window.slices
+        grid.costs[at] = raised(grid.costs[at], self.cells[at])
 
     def trace(
         self, points: Array, sensor: tuple[float, float], ranges: Array, frame: tuple[float, float, float]

@@ -9,16 +9,17 @@ from numpy.typing import NDArray
 
 from twin.geometry import Pose2
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION
+from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.costmaps.costmap_config import RangeSensorConfig
 from twin.navigation.costmaps.kernels import Cells
-from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, shifted
+from twin.navigation.costmaps.layer import Layer
+from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, raised, shifted
 
 _EVEN = int(0.5 * LETHAL_OBSTACLE)
 """A probability of one half, as nav2's layer stores it."""
 
 
-class RangeSensorLayer:
+class RangeSensorLayer(Layer):
     """Bayes' rule per cell, with the sensor model of nav2's RangeSensorLayer (van der Poel's sonar layer)."""
 
     def __init__(self, shape: tuple[int, int], config: RangeSensorConfig | None = None) -> None:
@@ -90,6 +91,11 @@ class RangeSensorLayer:
         if not least <= distance <= greatest:
             return None
         return distance, distance >= greatest and self.config.clear_on_max_reading
+
+    def update_costs(self, grid: Costmap, window: Window) -> None:
+        """Raise the costs where the readings decide."""
+        at = window.slices
+        grid.costs[at] = raised(grid.costs[at], self.costs(window))
 
     def costs(self, window: Window) -> Cells:
         """Return the costs of a window's cells: lethal, free, or unknown where the readings do not decide."""

@@ -10,9 +10,11 @@ from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import PoseStamped, new
+from twin.navigation.behavior_trees.factory import Registry
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 from twin.nodes.navigation.behavior_trees.log import TreeLog
 from twin.nodes.navigation.behavior_trees.navigator import Navigator, NavigatorSetup
+from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
@@ -24,9 +26,22 @@ class BtNavigatorNode:
     """Serves both actions, one goal at a time; also takes goals from `goal_pose`, as RViz sends them."""
 
     def __init__(
-        self, bus: Bus, robot_pose: RobotPose, config: BtNavigatorConfig | None = None, *, namespace: str = ""
+        self,
+        bus: Bus,
+        robot_pose: RobotPose,
+        config: BtNavigatorConfig | None = None,
+        *,
+        tree_nodes: Registry = NAVIGATOR_NODES,
+        namespace: str = "",
     ) -> None:
         """Make the node with its default trees.
+
+        Args:
+            bus: Whose node.
+            robot_pose: What the robot believes about its pose.
+            config: Its parameters.
+            tree_nodes: What trees may be made of.
+            namespace: Of the robot.
 
         Raises:
             NavigationError: a default tree that cannot be used.
@@ -43,6 +58,7 @@ class BtNavigatorNode:
             filter_duration_ns=round(config.filter_duration * 1e9),
             server_timeout_ns=config.default_server_timeout * _MS,
             goal_reached_tol=config.goal_reached_tol,
+            tree_nodes=tree_nodes,
         )
         log = TreeLog(node)
         context.on_transition = log.take

@@ -11,7 +11,7 @@ from twin.geometry import Array
 from twin.models.specs import DriveSpec
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
-from twin.navigation.plugins import PLANNERS, SMOOTHERS, config_of, configs_of
+from twin.navigation.plugins import LAYERS, PLANNERS, SMOOTHERS, config_of, configs_of
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
@@ -177,4 +177,6 @@ def _limits(speed: float, acceleration: float, deceleration: float, drive: float
 def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     if group.robot_radius is not None:
         config = replace(config, layers=replace(config.layers, footprint=()))
+    own = {name: config_of_use(LAYERS, used) for name, used in group.listed.items()}
+    config = replace(config, layers=replace(config.layers, own_layers=own))
     return overridden(config, group.overrides())

@@ -7,8 +7,10 @@ from dataclasses import replace
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
+from twin.navigation.plugins import TREE_NODES
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
+from twin.nodes.navigation.behavior_trees.registry import nodes_with
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
 from twin.nodes.navigation.controller_server.server import ControllerServerNode
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
@@ -88,7 +90,10 @@ def build_navigation(
             boxes=TOTE_POSES,
             namespace=namespace,
         )
-    navigator = BtNavigatorNode(bus, pose, parameters.navigator, namespace=namespace)
+    brought = {name: TREE_NODES.find(used.reference) for name, used in config.navigator.listed.items()}
+    navigator = BtNavigatorNode(
+        bus, pose, parameters.navigator, tree_nodes=nodes_with(brought), namespace=namespace
+    )
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)

@@ -6,6 +6,7 @@ import math
 from collections import deque
 from dataclasses import fields
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 from twin.bridge.actions import ActionClient
@@ -17,6 +18,7 @@ from twin.bridge.services import Client
 from twin.bridge.types import ActionType, ServiceType
 from twin.bridge.types.default_values import new
 from twin.geometry import Pose2
+from twin.navigation.behavior_trees.factory import Registry
 from twin.navigation.behavior_trees.node import TreeContext
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -80,6 +82,7 @@ class NavigatorContext(TreeContext):
         filter_duration_ns: int,
         server_timeout_ns: int,
         goal_reached_tol: float,
+        tree_nodes: Registry = MappingProxyType({}),
     ) -> None:
         super().__init__(lambda: node.now_ns)
         self.node = node
@@ -91,6 +94,8 @@ class NavigatorContext(TreeContext):
         """How long a server may take to accept a goal, or a service to answer [ns]."""
         self.goal_reached_tol = goal_reached_tol
         """[m]"""
+        self.tree_nodes = tree_nodes
+        """What trees may be made of."""
         self._clients: dict[tuple[str, str], ActionClient | Client] = {}
         self._topics: dict[str, Latest] = {}
 

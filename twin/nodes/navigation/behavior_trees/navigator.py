@@ -17,7 +17,6 @@ from twin.navigation.behavior_trees.node import Status
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext, fill
 from twin.nodes.navigation.behavior_trees.progress import Progress
-from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 
 SHIPPED = FilePath(__file__).parent / "trees"
 
@@ -114,7 +113,7 @@ class Navigator:
 
     def _load(self, name: str) -> Tree:
         if name not in self._trees:
-            builder = TreeBuilder(tree_file(name), NAVIGATOR_NODES)
+            builder = TreeBuilder(tree_file(name), self._context.tree_nodes)
             self._trees[name] = builder.build(self._context, self.blackboard)
         return self._trees[name]
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from twin.navigation.behavior_trees.factory import BASIC_NODES, Registry
 from twin.navigation.behavior_trees.node import TreeNode
+from twin.navigation.behavior_trees.ports import Port
+from twin.navigation.plugins import checked
 from twin.nodes.navigation.behavior_trees import (
     actions,
     conditions,
@@ -15,6 +19,7 @@ from twin.nodes.navigation.behavior_trees import (
 )
 from twin.nodes.navigation.behavior_trees.cancelling import CANCEL_NODES
 from twin.nodes.navigation.behavior_trees.selectors import SELECTORS
+from twin.plugins import Plugin
 
 _CLASSES: tuple[type[TreeNode], ...] = (
     actions.ComputePathToPose,
@@ -83,3 +88,20 @@ NAVIGATOR_NODES: Registry = {
     **_OTHER_NAMES,
 }
 """BehaviorTree.CPP's nodes, and Nav2's."""
+
+
+def nodes_with(plugins: Mapping[str, Plugin[TreeNode]]) -> Registry:
+    """Return these, and nodes of a user by their names in the XML.
+
+    Raises:
+        PluginError: one cannot be used, or has a name that is taken.
+    """
+    registry = dict(NAVIGATOR_NODES)
+    for name, plugin in plugins.items():
+        node = checked(plugin)
+        if name in registry:
+            raise plugin.error(f"has the name of a node that ships; call it otherwise than {name}")
+        if not all(isinstance(port, Port) for port in node.PORTS):
+            raise plugin.error("has PORTS that are none; they are made by inputs(...) and outputs(...)")
+        registry[name] = node
+    return registry

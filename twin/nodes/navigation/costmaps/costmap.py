@@ -213,6 +213,7 @@ class CostmapNode:
         for message in self._ranges:
             self._take_range(layers, message)
         self._ranges.clear()
+        layers.update_layers(robot, self.node.now_ns)
         if self._keepout is not None:
             self._keepout.update(layers, robot)
         if self._speed is not None:

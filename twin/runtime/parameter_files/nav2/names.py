@@ -157,6 +157,9 @@ def is_same(plugin: str, config: Any) -> bool:
     """Whether a plugin is of a config's kind, as RegulatedPurePursuitController is."""
     kind = type(config).__name__.removesuffix("Config").casefold()
     name = class_of(plugin)
+    brought = getattr(config, "plugin", None)
+    if brought is not None:
+        return bool(brought.name == plugin)
     if kind == "docktype":
         return name in _DOCKS
     same = PLANNERS.get(name, "").replace("_", "").replace("smac", "")

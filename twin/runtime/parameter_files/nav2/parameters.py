@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+from twin.navigation import plugins
 from twin.navigation.localisation.amcl_config import AmclConfig
+from twin.navigation.plugins import CONTROLLERS
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
+from twin.plugins import Kind
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
@@ -47,9 +50,12 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     chosen = file.plugin("controller_server", "FollowPath")
     if chosen == "RotationShimController":
         primary = file.plugin("controller_server", "FollowPath", "primary_controller")
-        update = {"rotation_shim": True, "plugin": _CONTROLLERS.get(primary)}
+        update = {
+            "rotation_shim": True,
+            "plugin": _CONTROLLERS.get(primary) or _brought(CONTROLLERS, primary),
+        }
     else:
-        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen)}
+        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen) or _brought(CONTROLLERS, chosen)}
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
     if update["plugin"] and may_be and "rotation_shim" not in given:
@@ -61,10 +67,21 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         chosen = classes.get(file.plugin("controller_server", section), "")
         if chosen and key not in controller.model_fields_set:
             controller = controller.model_copy(update={key: chosen})
-    found = PLANNERS.get(file.plugin("planner_server", "GridBased"))
+    chosen = file.plugin("planner_server", "GridBased")
+    found = PLANNERS.get(chosen) or _brought(plugins.PLANNERS, chosen)
     if found and "plugin" not in planner.model_fields_set:
         planner = planner.model_copy(update={"plugin": found})
     return config.model_copy(update={"controller": controller, "planner": planner})
+
+
+def _controller(plugin: str) -> str | None:
+    return _CONTROLLERS.get(plugin) or _brought(CONTROLLERS, plugin)
+
+
+def _brought(kind: Kind[Any], plugin: str) -> str | None:
+    """Return the name of a user's plugin, if the file names one: `module:Class`, or an entry point."""
+    known = plugin in kind.names() and plugin not in kind.shipped
+    return plugin if ":" in plugin or known else None
 
 
 @dataclass(frozen=True, kw_only=True)
