@@ -1,6 +1,6 @@
 """A sensor of one's own: `python examples/python/own_sensor.py` reads the thermometer of the rover.
 
-In a scenario file it is `sensors: [own_sensor.py:Thermometer]`; the robot's file has a `<sensor>` of its type.
+In a scenario file it is `sensors: [own_sensor.py:Thermometer]`; the robot's file has a `<sensor>` for it.
 """
 
 from __future__ import annotations
