@@ -1,4 +1,4 @@
-"""Writes the tables of docs/scenarios.md, arenas.md and navigation.md: `python docs/reference.py`.
+"""Writes the tables of docs/scenarios.md, arenas.md, navigation.md and api.md: `python docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. With `--check`
 nothing is written; the exit code is 1 if a page is not up to date.
@@ -12,6 +12,8 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
+
+from api_reference import api
 
 from twin.bridge.bus import Bus
 from twin.bridge.node import Node
@@ -316,6 +318,7 @@ def pages() -> dict[Path, str]:
     text = updated(navigation.read_text("utf-8"), "nodes", nodes)
     return {
         navigation: updated(text, "parameters", parameters),
+        DOCS / "api.md": updated((DOCS / "api.md").read_text("utf-8"), "names", api()),
         scenarios: updated(scenarios.read_text("utf-8"), "scenario keys", tables(json_schema(), {})),
         arenas: updated(
             arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)

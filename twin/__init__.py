@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from twin.api.robot import Robot, load_robot
     from twin.api.simulation import Simulation, run
     from twin.api.truth import Truth
-    from twin.api.world import World
+    from twin.api.world import PlacedRobot, World
     from twin.bridge import action_types as actions
     from twin.bridge import msgs, srvs
     from twin.bridge.wire.session import SessionConfig
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Arena",
     "Bag",
+    "PlacedRobot",
     "Pose2",
     "Pose3",
     "Recording",
@@ -51,6 +52,7 @@ __all__ = [
 _HOMES = {
     "Arena": "twin.warehouse.arena",
     "Bag": "twin.api.bags",
+    "PlacedRobot": "twin.api.world",
     "Pose2": "twin.geometry",
     "Pose3": "twin.geometry",
     "Recording": "twin.recording.read_back",

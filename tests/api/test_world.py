@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,12 @@ def test_mistakes_are_one_sentence() -> None:
         twin.World(ROBOT, control_period=0.003)
     with pytest.raises(twin.TwinError, match="no drive plugin"):
         twin.World(twin.load_robot("r2d2")).robots["r2d2"].drive(1.0, 0.0)
+
+
+def test_a_sensor_of_ones_own() -> None:
+    folder = Path(__file__).parents[2] / "examples" / "python"
+    rover = twin.load_robot(folder / "rover.urdf", sensors=[f"{folder / 'own_sensor.py'}:Thermometer"])
+    assert "thermometer" not in twin.World(twin.load_robot(folder / "rover.urdf")).robots["rover"].sensors
+    world = twin.World(rover.at((2.0, 0.0, 0.0)))
+    world.step()
+    assert world.robots["rover"].read("thermometer") == pytest.approx(22.0, abs=0.3)

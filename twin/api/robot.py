@@ -15,6 +15,7 @@ from twin.models.dynamics import degrees_of_freedom, mass_matrix_and_gravity
 from twin.models.kinematics import Positions, link_poses
 from twin.models.loader import load
 from twin.models.options import ReadOptions
+from twin.models.sensors import SENSORS
 
 if TYPE_CHECKING:
     import mujoco
@@ -190,6 +191,7 @@ def load_robot(
     args: Mapping[str, Any] | None = None,
     *,
     packages: Mapping[str, str | Path] | None = None,
+    sensors: Sequence[str] = (),
     repair: bool = False,
 ) -> Robot:
     """Read a robot.
@@ -198,14 +200,18 @@ def load_robot(
         name_or_path: Of a robot that comes with twin, or a URDF or xacro file.
         args: Values of `<xacro:arg>`.
         packages: Folders of ROS packages that the file names, if they are not near it.
+        sensors: Types of sensors of your own, `FILE.py:Class` or `module:Class`; they are executed.
         repair: Take the nearest physical inertia for a moving part whose own is impossible.
 
     Raises:
         ModelError: With every fault of the file, each with its line.
+        PluginError: A sensor of your own is not there, or wrong.
     """
     options = ReadOptions(
         args={name: _text(value) for name, value in (args or {}).items()},
         packages={name: Path(folder) for name, folder in (packages or {}).items()},
+        sensors=tuple(map(SENSORS.find, sensors)),
+        execute=True,
         repair=repair,
     )
     return Robot(load(name_or_path, options), options)

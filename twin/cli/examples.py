@@ -40,7 +40,7 @@ def examples(
 
 def catalogue() -> Mapping[str, Path]:
     """Return the files of the programs by name; modules that they share are none."""
-    files = sorted(beside("examples").glob("*.py"))
+    files = sorted(beside("examples").rglob("*.py"))
     return {file.stem: file for file in files if "__main__" in read_text(file)}
 
 
