@@ -22,22 +22,33 @@ ROOT = Path(__file__).parents[1]
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900), pytest.mark.xdist_group("wheel")]
 
 
+def build(source: Path, place: Path) -> Path:
+    """Make a wheel without a network."""
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "--wheel-dir", str(place)]
+    command = [sys.executable, "-m", "pip", "wheel", *options, str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=source)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = place.iterdir()
+    return wheel
+
+
+def install(wheel: Path, home: Path) -> None:
+    options = ["--quiet", "--no-deps", "--no-index", str(wheel)]
+    pip = [sys.executable, "-m", "pip", "--python", str(home / "bin" / "python"), "install", *options]
+    subprocess.run(pip, check=True, cwd=home)
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build it from what is tracked, and from nothing that lies about; without a network."""
+    """Build it from what is tracked, and from nothing that lies about."""
     if not (ROOT / ".git").exists():
         pytest.skip("not a git checkout")
-    place = tmp_path_factory.mktemp("wheel")
+    source = tmp_path_factory.mktemp("source")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in filter(None, listed.stdout.split("\0")):
-        (place / "source" / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, place / "source" / name)
-    options = ["--no-deps", "--no-build-isolation", "--no-index", "--wheel-dir", str(place / "dist")]
-    command = [sys.executable, "-m", "pip", "wheel", *options, str(place / "source")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=place)
-    assert done.returncode == 0, done.stdout + done.stderr
-    (built,) = (place / "dist").iterdir()
-    return built
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, source / name)
+    return build(source, tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +60,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     home = tmp_path_factory.mktemp("environment")
     venv.create(home)
-    python = home / "bin" / "python"
-    options = ["--quiet", "--no-deps", "--no-index", str(wheel)]
-    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", *options]
-    subprocess.run(pip, check=True, cwd=home)
+    install(wheel, home)
     (site,) = home.glob("lib/python*/site-packages")
     (site / "dependencies.pth").write_text(f"{Path(typer.__file__).parents[1]}\n", encoding="utf-8")
     return home / "bin"
@@ -90,7 +98,7 @@ def test_it_runs_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
     assert "charger" in outside(installed, tmp_path, "twin", "arenas")
     assert set(robots()) <= set(outside(installed, tmp_path, "twin", "robots").split())
     assert "PASS" in outside(installed, tmp_path, "twin", "run", "diff_bot_figure8", "--no-record")
-    assert "2 of 2 passed" in outside(installed, tmp_path, "twin", "test", "r2d2_circle", "sp1s_square")
+    assert "1 of 1 passed" in outside(installed, tmp_path, "twin", "test", "r2d2_circle")
     program = outside(installed, tmp_path, "twin", "examples", "gps_publisher").strip()
     assert "--connect" in outside(installed, tmp_path, "python", program, "--help")
 
@@ -98,12 +106,31 @@ def test_it_runs_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
 def test_a_new_project_passes_as_it_is(installed: Path, tmp_path: Path) -> None:
     outside(installed, tmp_path, "twin", "new", "rover")
     project = tmp_path / "rover"
-    assert "no faults found" in outside(
-        installed, project, "twin", "check", "--strict", "robots/rover.urdf.xacro"
-    )
+    checked = outside(installed, project, "twin", "check", "--strict", "rover/rover.urdf.xacro")
+    assert "no faults found" in checked
     assert "rover drives around the wall" in outside(installed, project, "twin", "scenarios")
     assert "PASS" in outside(installed, project, "twin", "run", "rover")
     (recording,) = project.glob("runs/rover/*/rover.rrd")
     assert recording.stat().st_size > 10_000
     assert "1 of 1 passed" in outside(installed, project, "twin", "test", "--junit", "results.xml")
     assert "1 passed" in outside(installed, project, "python", "-m", "pytest", "-q")
+
+
+OTHER = """\
+name: other
+duration: 1 s
+world: {arena: rover_hall}
+robots: [{model: rover, start: start}]
+checks: [{rover_visits: {points: [[-3, -2]]}}]
+"""
+
+
+def test_an_installed_project_has_names_everywhere(installed: Path, tmp_path: Path) -> None:
+    outside(installed, tmp_path, "twin", "new", "rover")
+    install(build(tmp_path / "rover", tmp_path / "wheels"), installed.parent)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert "rover" in outside(installed, elsewhere, "twin", "robots").split()
+    assert "rover_hall" in outside(installed, elsewhere, "twin", "arenas").split()
+    (elsewhere / "other.yaml").write_text(OTHER, encoding="utf-8")
+    assert "PASS" in outside(installed, elsewhere, "twin", "run", "other.yaml", "--no-record")

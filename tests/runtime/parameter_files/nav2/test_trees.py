@@ -47,6 +47,14 @@ def test_trees_in_packages_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert (Path(got.navigator.default_nav_to_pose_bt_xml), told) == (package / "go.xml", [])
 
 
+def test_a_path_starts_at_the_parameter_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "trees").mkdir()
+    (tmp_path / "trees" / "go.xml").write_text(TREE)
+    monkeypatch.chdir(tmp_path / "trees")
+    got, told = applied(tmp_path, navigator("trees/go.xml"))
+    assert (Path(got.navigator.default_nav_to_pose_bt_xml), told) == (tmp_path / "trees" / "go.xml", [])
+
+
 def test_a_tree_that_is_nowhere_is_refused_with_its_line(tmp_path: Path) -> None:
     key = "default_nav_through_poses_bt_xml"
     with pytest.raises(NavigationError) as caught:

@@ -1,1 +1,1 @@
-"""What my_robot brings for twin."""
+"""What my_robot is: the robot, its arena, its checks."""

@@ -38,7 +38,7 @@ def with_trees(
     for name in (one.name for one in fields_of(config).values() if one.is_path):
         if name in keep or not isinstance(said.get(name), str):
             continue
-        tree = _in_packages(said[name], file)
+        tree = _located(said[name], file)
         try:
             tree_file(tree)
         except NavigationError as fault:
@@ -55,7 +55,9 @@ def with_trees(
     return replace(config, **trees), told
 
 
-def _in_packages(text: str, file: Nav2Parameters) -> str:
-    """Return a path with `$(find-pkg-share NAME)` replaced by the folders of packages that are found."""
+def _located(text: str, file: Nav2Parameters) -> str:
+    """Return a path: in the folders of packages that `$(find-pkg-share NAME)` finds, else beside the file."""
     packages = Packages(PackagePath.of(file.path, DEFAULTS))
-    return _SHARE.sub(lambda found: str(packages.get(found[1], found[0])), text)
+    path = _SHARE.sub(lambda found: str(packages.get(found[1], found[0])), text)
+    beside = file.path.parent / path
+    return str(beside) if beside.is_file() else path
