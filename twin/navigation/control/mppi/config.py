@@ -80,7 +80,7 @@ class CostCriticConfig(CriticConfig):
     """Nearer to the goal only collisions count: goals may be near obstacles."""
     consider_footprint: bool = True
     """Whether the outline is checked; otherwise the centre's inscribed cost is a collision."""
-    footprint_padding: Annotated[Metres, NotNegative] = 0.03
+    footprint_padding: Annotated[Metres, Interval(ge=0, le=1)] = 0.03
     """Within this of the outline an obstacle is near: a point costs critical_cost; not Nav2's."""
     trajectory_point_step: _Step = 2
     """Every so many points of a rollout are looked at."""
