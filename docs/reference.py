@@ -143,7 +143,8 @@ def _references(item: Mapping[str, Any], suffix: str = "") -> Iterator[tuple[str
 def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     """Return what a key takes, in words."""
     choices = [choice for choice in item.get("anyOf", (item,)) if choice.get("type") != "null"]
-    units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice), None)
+    brings = any(choice.get("pattern") == ":" for choice in choices)  # a plugin's name
+    units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice and not brings), None)
     if units is not None:
         number = next(choice for choice in choices if "pattern" not in choice)
         return QUANTITIES[units] + _bounds(number)
@@ -151,7 +152,8 @@ def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     if "prefixItems" in choice:
         return "list of " + ", ".join(_value(schema, part) for part in choice["prefixItems"])
     if "enum" in choice:
-        return ", ".join(f"`{value}`" for value in choice["enum"])
+        own = ", or [your own](navigation/plugins.md)" if brings else ""
+        return ", ".join(f"`{value}`" for value in choice["enum"]) + own
     if "const" in choice:
         return f"`{choice['const']}`"
     if choice.get("type") == "array":

@@ -65,7 +65,7 @@ class ServerParameters(ProgressCheckerParameters):
 class PluginParameters(GoalCheckerParameters):
     """What each controller has, whatever its plugin."""
 
-    plugin: plugin_name(CONTROLLERS) | None = None  # type: ignore[valid-type]
+    plugin: plugin_name(CONTROLLERS, "rotation_shim") | None = None  # type: ignore[valid-type]
     """What follows the path: `regulated_pure_pursuit`, `dwb`, `mppi`, or a plugin of yours, whose parameters
     stand beside it; absent: `regulated_pure_pursuit`."""
     rotation_shim: bool | None = None

@@ -115,9 +115,9 @@ def config_of_use(kind: Kind[Any], used: PluginUse) -> Any:
     return bound(plugin, used.config(plugin))
 
 
-def plugin_name(kind: Kind[Any]) -> Any:
-    """Return the type of a key that names a plugin."""
-    return Annotated[str, WithJsonSchema(_names(kind))]
+def plugin_name(kind: Kind[Any], *without: str) -> Any:
+    """Return the type of a key that names a plugin, but for some that ship and are asked for otherwise."""
+    return Annotated[str, WithJsonSchema(_names(kind, *without))]
 
 
 def plugin_choice(kind: Kind[Any]) -> Any:
@@ -140,5 +140,6 @@ def plugin_choice(kind: Kind[Any]) -> Any:
     return Annotated[str | PluginUse, BeforeValidator(read), schema]
 
 
-def _names(kind: Kind[Any]) -> dict[str, list[dict[str, Any]]]:
-    return {"anyOf": [{"enum": list(kind.names())}, {"type": "string", "pattern": ":"}]}
+def _names(kind: Kind[Any], *without: str) -> dict[str, list[dict[str, Any]]]:
+    known = [name for name in kind.names() if name not in without]
+    return {"anyOf": [{"enum": known}, {"type": "string", "pattern": ":"}]}
