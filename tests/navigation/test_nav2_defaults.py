@@ -1,4 +1,4 @@
-"""A parameter that nobody sets is what it is in Nav2 (tests/oracles/nav2_defaults.py), but for those named."""
+"""A parameter that nobody sets is what it is in Nav2 (tests/oracles/nav2_defaults.py), but for some."""
 
 from __future__ import annotations
 
