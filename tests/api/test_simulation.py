@@ -312,4 +312,4 @@ def test_a_hundred_in_one_process_are_the_same_run_and_take_no_more_memory(circl
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     different, after_50, after_100 = map(float, done.stdout.split())
     assert different == 1
-    assert after_100 - after_50 < 4.0, "megabytes"
+    assert after_100 - after_50 < 8.0, "megabytes; a run that stayed would be 50 times several"
