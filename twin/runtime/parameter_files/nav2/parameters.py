@@ -15,7 +15,7 @@ from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
 from twin.plugins import Kind
 from twin.runtime.defaults.navigation import NavigationParameters
-from twin.runtime.parameter_files.nav2 import scenario_first as nav2_given
+from twin.runtime.parameter_files.nav2 import scenario_first
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
@@ -157,7 +157,7 @@ def with_file(
         smoother=file.applied(
             "velocity_smoother",
             parameters.smoother,
-            keep=nav2_given.for_smoother(config),
+            keep=scenario_first.for_smoother(config),
         ),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
@@ -165,24 +165,24 @@ def with_file(
             "planner_server",
             parameters.planner,
             prefix="GridBased.",
-            keep=nav2_given.for_planner(config.planner),
+            keep=scenario_first.for_planner(config.planner),
         ),
         controller_server=file.applied(
             "controller_server",
             parameters.controller_server,
-            keep=nav2_given.for_controllers(config),
+            keep=scenario_first.for_controllers(config),
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
-        docking=file.applied("docking_server", docking, keep=nav2_given.for_docking(config.docking)),
+        docking=file.applied("docking_server", docking, keep=scenario_first.for_docking(config.docking)),
         path_smoother=file.applied("smoother_server", parameters.path_smoother),
         navigator=file.applied(
             "bt_navigator",
             parameters.navigator,
-            keep=nav2_given.for_navigator(config.navigator),
+            keep=scenario_first.for_navigator(config.navigator),
         ),
         waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
-    navigator, told = with_trees(file, changed.navigator, nav2_given.for_navigator(config.navigator))
+    navigator, told = with_trees(file, changed.navigator, scenario_first.for_navigator(config.navigator))
     changed = replace(changed, navigator=navigator)
     if config.collision_monitor is None:
         monitor_of(file)
@@ -190,7 +190,7 @@ def with_file(
 
 
 def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
-    node, keep = f"{config.name}/{config.name}", nav2_given.for_costmap(group)
+    node, keep = f"{config.name}/{config.name}", scenario_first.for_costmap(group)
     scans, ranges = sources_of(file, node)
     config = replace(
         config,
