@@ -18,7 +18,7 @@ class DockTypeParameters(ParameterGroup):
 
     is_charger: bool | None = None
     """Whether docking ends only when the battery is charged."""
-    detection: Literal["none", "face", "tote"] | None = None
+    detection: Literal["none", "face", "box"] | None = None
     """What tells where the dock is: the map alone, a line in the scan, or that and a box there."""
     use_external_detection_pose: bool | None = None
     """Whether `detected_dock_pose` tells it instead."""

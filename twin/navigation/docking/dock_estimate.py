@@ -30,9 +30,9 @@ class DockEstimateConfig:
     """A line turned further than this against the expected face is another thing [rad]."""
     min_length: float = 0.3
     """A shorter line is another thing [m]."""
-    tote_reach: float = 0.2
+    box_reach: float = 0.2
     """A box further aside of the expected point is another one; less than half of boxes' spacing [m]."""
-    tote_depth: float = 0.2
+    box_depth: float = 0.2
     """So is one further behind the face than this, or before it [m]."""
     width_tolerance: float = 0.08
     """A face of known width that differs by more is not all in sight; two beams' distance or more [m]."""
@@ -120,7 +120,7 @@ class DockEstimate:
             return
         ends = face[[int(np.argmin(aside)), int(np.argmax(aside))]]
         x, y = T_expected_base.apply(ends).mean(axis=0).tolist()
-        if abs(y) <= self.config.tote_reach:
+        if abs(y) <= self.config.box_reach:
             self._middles.append((x, y))
 
     def take_boxes(self, boxes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
@@ -130,7 +130,7 @@ class DockEstimate:
         T_expected_base = self._expected.inverse() @ T_odom_base
         edge, config = self._edge(), self.config
         seen = [T_expected_base @ box for box in boxes]
-        there = [t for t in seen if abs(t.x - edge.x) <= config.tote_depth and abs(t.y) <= config.tote_reach]
+        there = [t for t in seen if abs(t.x - edge.x) <= config.box_depth and abs(t.y) <= config.box_reach]
         if not there:
             return False
         nearest = min(there, key=lambda box: abs(box.y))

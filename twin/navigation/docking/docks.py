@@ -9,7 +9,7 @@ from types import MappingProxyType
 from twin.errors import nearest
 from twin.geometry import Pose2
 
-DETECTIONS = ("none", "face", "tote")
+DETECTIONS = ("none", "face", "box")
 DOCK_NOT_IN_DB, DOCK_NOT_VALID = 901, 902
 
 
@@ -20,7 +20,7 @@ class DockType:
     is_charger: bool = False
     """Whether docking ends only when the battery is charged."""
     detection: str = "face"
-    """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a box)."""
+    """What tells where the dock is: none (the map), face (a line in the scan), box (that and a box)."""
     use_external_detection_pose: bool = False
     """Whether `detected_dock_pose` tells instead."""
     face_width: float = 0.0
