@@ -85,7 +85,7 @@ def test_everything_that_ships_is_in_it_and_nothing_else(wheel: Path) -> None:
     ship = {name for name in tracked if name.startswith("twin/")}
     ship |= {f"twin/{name}" for name in tracked if name.startswith(("scenarios/", "examples/"))}
     assert held == ship
-    tests = {name for name in held if re.search(r"(^|/)(tests|docs)/", name)}
+    tests = {name for name in held if re.search(r"(^|/)(tests|docs|benchmarks)/", name)}
     assert all(name.startswith("twin/project/template/tests/") for name in tests)
 
 

@@ -35,7 +35,7 @@ from twin.warehouse.skills import Station
 SHELF = Station(name="shelf", face=Pose2(5.0, 2.0, np.pi / 2), surface_z=0.8)
 TABLE = Station(name="table", face=Pose2(8.0, 0.0, 0.0), surface_z=0.4)
 TOTE_IN_BASE = Pose2(0.6, 0.02, 0.05)
-TASK = {"tote_width": 0.24, "tote_depth": 0.30, "tote_height": 0.18, "pick": SHELF, "place": TABLE}
+TASK = {"tote_width": 0.24, "box_depth": 0.30, "tote_height": 0.18, "pick": SHELF, "place": TABLE}
 
 Answer = Callable[[GoalHandle], Any]
 

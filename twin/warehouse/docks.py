@@ -11,6 +11,6 @@ TOTE_POSES = "tote_poses"
 """Topic of the totes that `/tote_detector` sees."""
 
 DOCK_TYPES: Mapping[str, DockType] = MappingProxyType(
-    {"tote": DockType(detection="tote"), "shelf": DockType(), "table": DockType()}
+    {"tote": DockType(detection="box"), "shelf": DockType(), "table": DockType()}
 )
 """By name."""

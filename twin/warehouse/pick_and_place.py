@@ -20,7 +20,7 @@ class PickAndPlaceTask:
     tote: str
     tote_width: float
     """Between the fingers [m]."""
-    tote_depth: float
+    box_depth: float
     """Along the reach [m]."""
     tote_height: float
     """[m]"""
@@ -124,7 +124,7 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.look(),
                 self.stop_looking(),
                 self.report(f"{task.tote}: reach"),
-                self.reach_for_tote(grasp_z, task.tote_depth),
+                self.reach_for_tote(grasp_z, task.box_depth),
                 self.report(f"{task.tote}: grasp"),
                 self.close_on(task.tote_width),
                 self.holding(

@@ -95,9 +95,9 @@ class DockEstimateConfig:
     """A line turned further than this against the expected face is another thing."""
     min_length: Annotated[Metres, NotNegative] = 0.3
     """A shorter line is another thing."""
-    tote_reach: Annotated[Metres, NotNegative] = 0.2
+    box_reach: Annotated[Metres, NotNegative] = 0.2
     """A box further aside of the expected point is another one; less than half of boxes' spacing."""
-    tote_depth: Annotated[Metres, NotNegative] = 0.2
+    box_depth: Annotated[Metres, NotNegative] = 0.2
     """So is one further behind the face than this, or before it."""
     width_tolerance: Annotated[Metres, NotNegative] = 0.08
     """A face of known width that differs by more is not all in sight; two beams' distance or more."""

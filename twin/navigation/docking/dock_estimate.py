@@ -96,7 +96,7 @@ class DockEstimate:
             return
         ends = face[[int(np.argmin(aside)), int(np.argmax(aside))]]
         x, y = T_expected_base.apply(ends).mean(axis=0).tolist()
-        if abs(y) <= self.config.tote_reach:
+        if abs(y) <= self.config.box_reach:
             self._middles.append((x, y))
 
     def take_boxes(self, boxes: Sequence[Pose2], T_odom_base: Pose2) -> bool:
@@ -106,7 +106,7 @@ class DockEstimate:
         T_expected_base = self._expected.inverse() @ T_odom_base
         edge, config = self._edge(), self.config
         seen = [T_expected_base @ box for box in boxes]
-        there = [t for t in seen if abs(t.x - edge.x) <= config.tote_depth and abs(t.y) <= config.tote_reach]
+        there = [t for t in seen if abs(t.x - edge.x) <= config.box_depth and abs(t.y) <= config.box_reach]
         if not there:
             return False
         nearest = min(there, key=lambda box: abs(box.y))

@@ -12,7 +12,7 @@ from twin.errors import nearest
 from twin.geometry import Pose2
 from twin.parameters import Amperes, Flat, Interval, Le, Metres, NotNegative, Positive, Radians, Seconds
 
-Detection = Literal["none", "face", "tote"]
+Detection = Literal["none", "face", "box"]
 Offset = Annotated[Metres, Interval(ge=-10.0, le=10.0)]
 Turn = Annotated[Radians, Interval(ge=-math.tau, le=math.tau)]
 DOCK_NOT_IN_DB, DOCK_NOT_VALID = 901, 902
@@ -25,7 +25,7 @@ class DockType:
     is_charger: bool = False
     """Whether docking ends only when the battery is charged."""
     detection: Detection = "face"
-    """What tells where the dock is: none (the map), face (a line in the scan), tote (that and a box)."""
+    """What tells where the dock is: none (the map), face (a line in the scan), box (that and a box there)."""
     use_external_detection_pose: bool = False
     """Whether `detected_dock_pose` tells instead."""
     face_width: Annotated[Metres, NotNegative, Le(100.0)] = 0.0

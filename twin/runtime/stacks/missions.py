@@ -243,7 +243,7 @@ def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNod
         tasks.append(
             PickAndPlaceTask(
                 tote=task.tote,
-                tote_depth=depth,
+                box_depth=depth,
                 tote_width=width,
                 tote_height=height,
                 pick=Station(name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height),

@@ -41,7 +41,7 @@ class DockDetection:
             self._estimate = DockEstimate(
                 face,
                 self._config,
-                wants_box=type_.detection == "tote",
+                wants_box=type_.detection == "box",
                 face_width=type_.face_width,
             )
 
@@ -63,7 +63,7 @@ class DockDetection:
         """What is not in sight."""
         if self._estimate is None:
             return "detected_dock_pose"
-        return "box" if self._estimate.seen_face and self._type.detection == "tote" else "face of the dock"
+        return "box" if self._estimate.seen_face and self._type.detection == "box" else "face of the dock"
 
     def _from_topic(self) -> Pose2 | None:
         told = self._told
