@@ -62,9 +62,13 @@ def _walk(config: Any, path: tuple[str, ...], prefix: str, separator: str = ".")
             inner = f"{prefix}{name}{separator}" if name else prefix
             is_joined = declaration is not None and declaration.is_underscored
             yield from _walk(value, here, inner, "_" if is_joined else ".")
-        elif declaration is not None and declaration.domain is not None and value not in (None, ()):
+        elif declaration is not None and declaration.domain is not None and not _is_absent(value):
             whole = prefix[:-1] if declaration.is_itself and prefix else prefix + name
             yield Placed(whole, here, declaration)
+
+
+def _is_absent(value: Any) -> bool:
+    return value is None or (isinstance(value, tuple) and not value)
 
 
 def replaced(config: C, path: tuple[str, ...], value: Any) -> C:
