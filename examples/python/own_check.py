@@ -19,7 +19,7 @@ from twin.scenario.observation import CheckContext, Observation
 class GentleConfig:
     """Parameters of `Gentle`."""
 
-    max_deceleration: Annotated[float, MetresPerSecondSquared, Positive] = 1.5
+    max_deceleration: Annotated[MetresPerSecondSquared, Positive] = 1.5
     """Hardest braking that passengers forgive."""
 
 

@@ -21,9 +21,9 @@ from twin.parameters import Metres, MetresPerSecond, Positive
 class PursuitConfig:
     """Parameters of `Pursuit`."""
 
-    speed: Annotated[float, MetresPerSecond, Positive] = 0.3
+    speed: Annotated[MetresPerSecond, Positive] = 0.3
     """Where the path is straight."""
-    lookahead: Annotated[float, Metres, Positive] = 0.4
+    lookahead: Annotated[Metres, Positive] = 0.4
     """Distance of the point that it steers for."""
 
 

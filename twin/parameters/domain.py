@@ -182,7 +182,9 @@ def _taken_apart(hint: Any) -> tuple[Any, list[object], bool]:
     if get_origin(hint) is Annotated:
         inner, *metadata = get_args(hint)
         kind, found, is_optional = _taken_apart(inner)
-        return kind, [*found, *metadata], is_optional
+        for one in metadata:  # `Annotated[float, Metres]` is meant as `Metres`
+            found += _taken_apart(one)[1] if get_origin(one) is Annotated else [one]
+        return kind, found, is_optional
     if get_origin(hint) in (Union, types.UnionType):
         others = [one for one in get_args(hint) if one is not type(None)]
         if len(others) == 1:
