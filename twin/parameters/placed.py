@@ -68,7 +68,8 @@ def _walk(config: Any, path: tuple[str, ...], prefix: str, separator: str = ".")
 
 
 def _is_absent(value: Any) -> bool:
-    return value is None or (isinstance(value, tuple) and not value)
+    """Whether a value is no parameter: what is None or empty, and what was computed in numpy's types."""
+    return not value if isinstance(value, tuple) else type(value) not in (bool, int, float, str)
 
 
 def replaced(config: C, path: tuple[str, ...], value: Any) -> C:
