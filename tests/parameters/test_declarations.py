@@ -216,6 +216,7 @@ OTHERS = {
     "map_frame": "of slam_toolbox, whose frames are the robot's",
     "odom_frame": "of slam_toolbox, whose frames are the robot's",
     "base_frame": "of slam_toolbox, whose frames are the robot's",
+    "closed_loop": "a check",
     "use_imu": "a key of a scenario's localisation",
 }
 """Names that are something else, too."""

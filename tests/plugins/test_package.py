@@ -24,7 +24,7 @@ class Calm(Check):
 """,
     "missions": """
 from dataclasses import dataclass
-from twin.nodes.missions import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 
 class Nap(MissionNode):
     @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,7 @@ class Mine(Check):
         return CheckResult(name=self.name, passed=self.config.size == 0.03, value=self.config.size)
 """
 MISSION = """
-from twin.nodes.missions import MissionNode
+from twin.nodes.missions.mission_node import MissionNode
 
 class Mine(MissionNode):
     def __init__(self, context, config):

@@ -16,6 +16,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema, to_json
 
+from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.parameters import (
     Hertz,
@@ -34,7 +35,7 @@ from twin.scenario.plugins import PluginUse, use
 from twin.strict_yaml import StrictModel
 
 if TYPE_CHECKING:
-    from twin.nodes.missions import MissionNode
+    from twin.nodes.missions.mission_node import MissionNode
 
 
 class PickAndPlaceTask(StrictModel):
@@ -148,23 +149,14 @@ class Behaviors(StrictModel):
     """How often to run all steps."""
 
 
-class RandomGoals(StrictModel):
+@keys_of(RandomGoalsConfig, whole=True)
+class RandomGoals(ParameterGroup):
     """Drive to random places of `/map`, one after the other: a soak test of navigation."""
 
     type: Literal["random_goals"]
     """`random_goals`"""
     robot: str
     """Name of the robot."""
-    distance: Annotated[Metres, Positive]
-    """The mission is done when odometry has counted so much [m]."""
-    clearance: Annotated[Metres, Positive] = 0.7
-    """Distance of a goal from what the map shows [m]."""
-    min_goal_distance: Annotated[Metres, NotNegative] = 3.0
-    """Distance of a goal from the robot, as the crow flies [m]."""
-    max_failed: Annotated[int, NotNegative] = 0
-    """How many goals may be given up; one more ends the mission."""
-    retries: Annotated[int, NotNegative] = 3
-    """How often a goal that the navigator gives up is sent again, after another one."""
 
 
 class VelocityStep(StrictModel):
@@ -223,7 +215,9 @@ class Idle(StrictModel):
     """`idle`"""
 
 
-MISSIONS: Kind[MissionNode] = Kind("mission", base="twin.nodes.missions:MissionNode", group="twin.missions")
+MISSIONS: Kind[MissionNode] = Kind(
+    "mission", base="twin.nodes.missions.mission_node:MissionNode", group="twin.missions"
+)
 
 MISSIONS.register("pick_and_place", "twin.runtime.stacks.missions:pick_and_place")
 MISSIONS.register("behaviors", "twin.runtime.stacks.missions:behaviors")

@@ -287,7 +287,7 @@ def test_a_charger_a_beam_too_narrow_is_another_thing() -> None:
     """The plan's width is compared with the face's, not with the distance of its first and last hit."""
     for width, is_it in ((0.6, True), (0.578, True), (0.563, False), (0.622, True), (0.637, False)):
         config = DockEstimateConfig(width_tolerance=0.03)
-        dock = DockEstimate(Pose2(2.0, 0.0, 0.0), config, wants_tote=False, face_width=0.6)
+        dock = DockEstimate(Pose2(2.0, 0.0, 0.0), config, wants_box=False, face_width=0.6)
         for aside in np.linspace(-0.01, 0.01, 9):
             dock.take_scan(cast([(2.0, aside - width / 2, 2.0, aside + width / 2)]), ORIGIN)
         assert dock.seen == is_it, width

@@ -16,7 +16,8 @@ from twin.bridge.conversions import pose2_from_pose, twist_from_planar
 from twin.bridge.msgs import Twist, new
 from twin.geometry import Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.nodes.missions.random_goals import RandomGoalsConfig, RandomGoalsNode, open_places
+from twin.nodes.missions.random_goals import RandomGoalsNode, open_places
+from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.navigation.mapping.map_server import MapServerNode
 
 

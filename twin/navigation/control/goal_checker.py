@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.configured import Configured
 from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians, RadiansPerSecond
+from twin.parameters.declaration import names_of
 
 _AT_REST = (0.0, 0.0)
 
@@ -24,7 +25,7 @@ class GoalChecker(Configured, ABC):
     @property
     def xy_tolerance(self) -> float:
         """How near counts as there [m]: a controller that turns at the goal does it from there on."""
-        return float(getattr(self.config, "xy_goal_tolerance", 0.25))
+        return float(getattr(self.config, names_of(PositionGoalCheckerConfig).xy_goal_tolerance, 0.25))
 
     def reset(self) -> None:
         """Start on a new goal."""

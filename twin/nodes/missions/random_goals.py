@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
@@ -17,25 +16,9 @@ from twin.geometry import Array, Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.messages import pose_stamped
 from twin.nodes.missions.mission_node import MissionNode
+from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
-
-
-@dataclass(frozen=True, kw_only=True)
-class RandomGoalsConfig:
-    """What the goals are."""
-
-    distance: float
-    """The mission is done when odometry has counted so much [m]."""
-    clearance: float = 0.7
-    """Of a goal from what the map shows [m]."""
-    min_goal_distance: float = 3.0
-    """Of a goal from the robot, as the crow flies [m]."""
-    max_failed: int = 0
-    """How many goals may be given up; one more ends the mission."""
-    retries: int = 3
-    """How often a goal that the navigator gives up is sent again, after another one: who stands on it now
-    has gone by then."""
 
 
 class RandomGoalsNode(MissionNode):

@@ -21,6 +21,7 @@ from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPureP
 from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
+from twin.parameters.declaration import names_of
 from twin.runtime.defaults.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.plugin_groups import config_of_use
@@ -77,7 +78,9 @@ def _controller(parameters: ControllerParameters, smoother: VelocitySmootherConf
     elif parameters.chosen == "dwb":
         controller = overridden(_dwb(parameters, smoother), overrides)
     else:
-        tolerance = getattr(_goal_checker(parameters), "xy_goal_tolerance", _TOLERANCE)
+        tolerance = getattr(
+            _goal_checker(parameters), names_of(GoalCheckerConfig).xy_goal_tolerance, _TOLERANCE
+        )
         controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
     if parameters.listed:
         own = {name: config_of_use(CRITICS, used) for name, used in parameters.listed.items()}

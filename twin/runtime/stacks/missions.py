@@ -24,13 +24,15 @@ from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps import footprint as footprints
 from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.nodes.messages import pose_stamped
-from twin.nodes.missions import MissionNode
 from twin.nodes.missions.explore import ExploreMissionNode
-from twin.nodes.missions.random_goals import RandomGoalsConfig, RandomGoalsNode
+from twin.nodes.missions.mission_node import MissionNode
+from twin.nodes.missions.random_goals import RandomGoalsNode
+from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.missions.simple import ActionSequenceNode, ActionStep, VelocityProfileNode
 from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.parameters.declaration import fields_of
 from twin.runtime.defaults.navigation import overridden
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario import missions
@@ -134,13 +136,8 @@ def behaviors(context: MissionContext, mission: Behaviors) -> MissionNode:
 
 def random_goals(context: MissionContext, mission: RandomGoals) -> MissionNode:
     """Return a drive to random places."""
-    goals = RandomGoalsConfig(
-        distance=mission.distance,
-        clearance=mission.clearance,
-        min_goal_distance=mission.min_goal_distance,
-        max_failed=mission.max_failed,
-        retries=mission.retries,
-    )
+    own = {name: getattr(mission, name) for name in fields_of(RandomGoalsConfig)}
+    goals = RandomGoalsConfig(**own)
     pose = context.robot.robot_pose
     return RandomGoalsNode(context.bus, pose, goals, seed=context.seed, namespace=context.namespace)
 

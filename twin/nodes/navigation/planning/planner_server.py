@@ -36,6 +36,7 @@ from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Flat, Name, ReadOnly
+from twin.parameters.declaration import names_of
 
 DEFAULT_ID = "GridBased"
 """Nav2's name for the planner that is used unless a request names another one."""
@@ -59,7 +60,7 @@ class PlannerParameters:
     """How paths are smoothed."""
 
 
-_SHARED = ("tolerance", "allow_unknown")
+_SHARED = (names_of(ThetaStarConfig).tolerance, names_of(ThetaStarConfig).allow_unknown)
 
 
 def _by_id(chosen: Any) -> dict[str, Any]:
