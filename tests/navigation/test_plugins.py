@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.runtime.nav2_robot import applied
 
+from tests.runtime.parameter_files.nav2.robot import applied
 from twin.errors import PluginError, TwinError
 from twin.runtime.run import run
 from twin.scenario.schema import load
