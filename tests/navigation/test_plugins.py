@@ -9,7 +9,7 @@ import pytest
 
 from tests.runtime.parameter_files.nav2.robot import applied
 from twin.errors import PluginError, TwinError
-from twin.runtime.run import run
+from twin.runtime.open_run import run
 from twin.scenario.schema import load
 from twin.scenario.verdict import Verdict
 
