@@ -82,6 +82,7 @@ class OpenRun:
         Raises:
             TwinError: The run cannot be made.
         """
+        gc.collect()  # a run that has ended is of the oldest generation, which is hardly ever looked at
         self._digest = RunDigest()
         self._out = out
         self._outside = outside
