@@ -33,7 +33,8 @@ def build(source: Path, place: Path) -> Path:
 
 
 def install(wheel: Path, home: Path) -> None:
-    options = ["--quiet", "--no-deps", "--no-index", str(wheel)]
+    # Whatever else is in the path of the tests, such as this checkout, is no reason to install nothing.
+    options = ["--quiet", "--no-deps", "--no-index", "--ignore-installed", str(wheel)]
     pip = [sys.executable, "-m", "pip", "--python", str(home / "bin" / "python"), "install", *options]
     subprocess.run(pip, check=True, cwd=home)
 
