@@ -14,8 +14,8 @@ The exit code is 0 if no more than a tenth is listed so and 85 % of the others a
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
-import random
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -36,20 +36,32 @@ MOST_EXCUSED, LEAST_KILLED = 0.10, 0.85
 
 
 def draw(root: Path, reach: Reach, seed: int, count: int) -> list[Mutant]:
-    """Return so many changes, at most one a line, of lines that tests reach."""
+    """Return so many changes, at most one a line, of lines that tests reach.
+
+    Each line has its rank by a hash of its text, so that an edit elsewhere does not draw others.
+    """
     places = [root / "twin" / name for name in PACKAGES]
     modules = sorted(m for place in places for m in ([place] if place.is_file() else place.rglob("*.py")))
-    lines: dict[tuple[str, int], list[Site]] = {}
+    lines: dict[tuple[str, str, int], list[Site]] = {}
     for module in modules:
+        texts = module.read_text("utf-8").splitlines()
         for site in filter(reach.reaches, sites_of(root, module.relative_to(root).as_posix())):
-            lines.setdefault((site.file, site.line), []).append(site)
-    rng, drawn = random.Random(seed), list[Mutant]()
-    while len(drawn) < count and lines:
-        for line in rng.sample(sorted(lines), min(count - len(drawn), len(lines))):
-            mutant = mutant_at(root, rng.choice(lines.pop(line)))
-            if mutant is not None:
-                drawn.append(mutant)
+            text = texts[site.line - 1].strip()
+            same = sum(1 for other in texts[: site.line - 1] if other.strip() == text)
+            lines.setdefault((site.file, text, same), []).append(site)
+    drawn = list[Mutant]()
+    for place in sorted(lines, key=lambda place: _hash(seed, *place)):
+        _, site = min(enumerate(lines[place]), key=lambda numbered: _hash(seed, *place, numbered[0]))
+        mutant = mutant_at(root, site)
+        if mutant is not None:
+            drawn.append(mutant)
+        if len(drawn) == count:
+            break
     return drawn
+
+
+def _hash(*key: object) -> bytes:
+    return hashlib.sha256(repr(key).encode()).digest()
 
 
 def tried(
