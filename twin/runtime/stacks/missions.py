@@ -33,7 +33,7 @@ from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.parameters.declaration import fields_of
-from twin.runtime.defaults.navigation import overridden
+from twin.runtime.defaults.overrides import overridden
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario import missions
 from twin.scenario.missions import (
