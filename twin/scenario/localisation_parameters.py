@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, ClassVar, Self
 
 from pydantic import AfterValidator, model_validator
 
@@ -16,24 +16,29 @@ from twin.parameters.placed import overridden
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 
 
-@keys_of(AmclConfig)
-class AmclParameters(ParameterGroup):
-    """Parameters of `/amcl`."""
+class _Checked(ParameterGroup):
+    """Parameters that must fit together, and to the defaults of a config."""
+
+    among: ClassVar[type]
 
     @model_validator(mode="after")
-    def _can_be(self) -> AmclParameters:
-        overridden(AmclConfig(), self.overrides())
+    def _can_be(self) -> Self:
+        overridden(self.among(), self.overrides())
         return self
+
+
+@keys_of(AmclConfig)
+class AmclParameters(_Checked):
+    """Parameters of `/amcl`."""
+
+    among = AmclConfig
 
 
 @keys_of(SlamNodeConfig)
-class SlamParameters(ParameterGroup):
+class SlamParameters(_Checked):
     """Parameters of `/slam_toolbox`."""
 
-    @model_validator(mode="after")
-    def _can_be(self) -> SlamParameters:
-        overridden(SlamNodeConfig(), self.overrides())
-        return self
+    among = SlamNodeConfig
 
 
 @keys_of(EkfSource)
@@ -51,13 +56,9 @@ SourceName = Annotated[str, AfterValidator(_source_name)]
 
 
 @keys_of(EkfNodeConfig)
-class EkfParameters(ParameterGroup):
+class EkfParameters(_Checked):
     """Parameters of `/ekf_filter_node`."""
 
+    among = EkfConfig
     sources: Mapping[SourceName, EkfSourceParameters] = {}
     """What it listens to besides, or instead of, `odom0` (wheels) and `imu0`."""
-
-    @model_validator(mode="after")
-    def _can_be(self) -> EkfParameters:
-        overridden(EkfConfig(), self.overrides())
-        return self

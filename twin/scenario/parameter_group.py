@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field, create_model
 
+from twin.errors import ScenarioError
 from twin.parameters.declaration import Declaration, fields_of
+from twin.parameters.placed import overridden
 from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
+C = TypeVar("C")
 G = TypeVar("G", bound="ParameterGroup")
 
 
@@ -34,6 +37,17 @@ class ParameterGroup(StrictModel):
             name: value.overrides() if isinstance(value, ParameterGroup) else value
             for name, value in given.items()
         }
+
+    def over(self, config: C) -> C:
+        """Return a config with those of the given parameters that are its own.
+
+        Raises:
+            ScenarioError: they cannot be together.
+        """
+        try:
+            return overridden(config, self.overrides())
+        except ValueError as error:
+            raise ScenarioError(str(error)) from error
 
 
 def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:

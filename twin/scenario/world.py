@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -59,6 +59,11 @@ class GoodOverride(StrictModel):
     """Mass [kg]."""
     friction: Annotated[float, NotNegative] | None = None
     """Coulomb coefficient; of a good and a gripper's pads the lower one counts."""
+
+    @property
+    def properties(self) -> dict[str, Any]:
+        """What is given."""
+        return self.model_dump(exclude={"name"}, exclude_none=True)
 
 
 class WorldConfig(StrictModel):

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig
@@ -22,7 +21,6 @@ from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.parameters.declaration import names_of
-from twin.runtime.defaults.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.plugin_groups import config_of_use
 from twin.scenario.plugins import PluginUse
@@ -77,14 +75,14 @@ def with_scenario(
     """
 
     def given(configs: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: overridden(one, by_id.get(name, first).overrides()) for name, one in configs.items()}
+        return {name: by_id.get(name, first).over(one) for name, one in configs.items()}
 
     first = by_id[_FIRST]
     if first.maneuvers is not None:
         reach = ManeuverConfig().reach if first.maneuvers else 0.0
         server = replace(server, maneuver=replace(server.maneuver, reach=reach))
     return replace(
-        overridden(server, first.overrides()),
+        first.over(server),
         controllers=given(server.controllers),
         goal_checkers=given(server.goal_checkers),
         progress_checkers=given(server.progress_checkers),
@@ -134,7 +132,7 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         rotate_to_heading_min_angle=0.6,
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
-        max_linear_decel=_braking(smoother.linear),
+        max_linear_decel=smoother.linear.braking,
         cost_scaling_dist=0.7,
     )
 
@@ -155,7 +153,7 @@ def _mppi(parameters: ControllerParameters, smoother: VelocitySmootherConfig, pe
         vx_min=-0.15,
         wz_max=angular.max_velocity,
         ax_max=linear.max_acceleration,
-        ax_min=-_braking(linear),
+        ax_min=-linear.braking,
         az_max=angular.max_acceleration,
         vx_std=max(0.2, 0.2 * speed),
         noise_time_constant=0.6,
@@ -177,14 +175,10 @@ def _dwb(parameters: ControllerParameters, smoother: VelocitySmootherConfig) -> 
         max_vel_x=linear.max_velocity,
         max_vel_theta=angular.max_velocity,
         acc_lim_x=linear.max_acceleration,
-        decel_lim_x=-_braking(linear),
+        decel_lim_x=-linear.braking,
         acc_lim_theta=angular.max_acceleration,
-        decel_lim_theta=-_braking(angular),
+        decel_lim_theta=-angular.braking,
     )
-
-
-def _braking(limits: AxisLimits) -> float:
-    return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
 
 
 def _goal_checker(parameters: ControllerParameters) -> Any:

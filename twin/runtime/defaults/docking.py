@@ -7,7 +7,6 @@ from dataclasses import replace
 from twin.errors import ScenarioError
 from twin.navigation.docking.docks import Dock, DockDatabase, DockError, DockType
 from twin.nodes.navigation.docking.config import DockingServerConfig
-from twin.runtime.defaults.overrides import overridden
 from twin.scenario.docking import DockingParameters
 from twin.warehouse.docks import DOCK_TYPES
 
@@ -36,6 +35,5 @@ def with_scenario(config: DockingServerConfig, group: DockingParameters) -> Dock
     """Return a config with what a scenario gives of the server and of types of docks."""
     types = dict(config.database.types)
     for name, parameters in group.types.items():
-        types[name] = overridden(types.get(name, DockType()), parameters.overrides())
-    config = replace(config, database=replace(config.database, types=types))
-    return overridden(config, group.overrides())
+        types[name] = parameters.over(types.get(name, DockType()))
+    return group.over(replace(config, database=replace(config.database, types=types)))

@@ -22,7 +22,6 @@ from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults import controllers, docking
-from twin.runtime.defaults.overrides import overridden
 from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
 from twin.scenario.planners import PlannerParameters, SmootherParameters
 from twin.scenario.plugin_groups import config_of_use
@@ -120,20 +119,21 @@ def navigation_parameters(
 
 def with_scenario(parameters: NavigationParameters, config: NavigationConfig) -> NavigationParameters:
     """Return parameters with what a scenario gives: it goes before a robot's defaults, and before a file."""
-    planner, smoothers = config.planner.overrides(), parameters.path_smoother.smoothers
+    smoothers = parameters.path_smoother.smoothers
     first = next(iter(smoothers))
-    smoother = overridden(smoothers[first], config.smoother.overrides())
     by_id = {"FollowPath": config.controller, **config.controllers}
     return replace(
         parameters,
         global_costmap=_costmap(parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(parameters.local_costmap, config.local_costmap),
-        planner=overridden(parameters.planner, planner),
-        planner_server=overridden(parameters.planner_server, planner),
-        commitment=overridden(parameters.commitment, planner),
-        goal_access=overridden(parameters.goal_access, planner),
+        planner=config.planner.over(parameters.planner),
+        planner_server=config.planner.over(parameters.planner_server),
+        commitment=config.planner.over(parameters.commitment),
+        goal_access=config.planner.over(parameters.goal_access),
         controller_server=controllers.with_scenario(parameters.controller_server, by_id),
-        path_smoother=replace(parameters.path_smoother, smoothers={**smoothers, first: smoother}),
+        path_smoother=replace(
+            parameters.path_smoother, smoothers={**smoothers, first: config.smoother.over(smoothers[first])}
+        ),
         docking=docking.with_scenario(parameters.docking, config.docking),
         navigator=_navigator(parameters.navigator, config.navigator),
     )
@@ -181,7 +181,7 @@ def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherCon
 
 
 def _navigator(config: BtNavigatorConfig, group: NavigatorParameters) -> BtNavigatorConfig:
-    config, frequency = overridden(config, group.overrides()), group.bt_loop_frequency
+    config, frequency = group.over(config), group.bt_loop_frequency
     return config if frequency is None else replace(config, bt_loop_duration=max(1, round(1e3 / frequency)))
 
 
@@ -202,4 +202,4 @@ def _with_own(layers: CostmapConfig, group: CostmapParameters) -> CostmapConfig:
 def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     if group.robot_radius is not None:
         config = replace(config, layers=replace(config.layers, footprint=()))
-    return overridden(config, group.overrides())
+    return group.over(config)

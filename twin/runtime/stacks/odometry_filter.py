@@ -9,7 +9,6 @@ from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource, for_robot
 from twin.nodes.navigation.localisation.ekf_sources import KINDS
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.ekf import ekf_with_file
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished
 from twin.runtime.stacks.context import StackContext
@@ -88,4 +87,4 @@ def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNode
             sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
         except TypeError:
             raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
-    return replace(overridden(config, parameters.overrides()), sources=sources)
+    return replace(parameters.over(config), sources=sources)

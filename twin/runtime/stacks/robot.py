@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.controllers.drive_config import drive_config, odometry_noise
+from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
@@ -34,9 +35,7 @@ class RobotStack:
         description = handle.description
         self.name = handle.name
         self.handle = handle
-        self._context = context
-        self.spawn_height = context.spawn_height
-        self.start = context.start
+        self.context = context
         drive = description.drive
         base_frame = drive.base_frame if drive else description.root
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
@@ -72,10 +71,14 @@ class RobotStack:
         if fused is not None:
             warn_of_unpublished_sources(context, fused)
 
+    def standing(self, pose: Pose2) -> Pose3:
+        """Return the pose of the base when it stands on the floor at `pose`."""
+        return Pose3.from_pose2(pose, self.context.spawn_height)
+
     def _build_drive(
         self, description: RobotDescription, *, enable_odom_tf: bool
     ) -> DiffDriveControllerNode | None:
-        drive, context = description.drive, self._context
+        drive, context = description.drive, self.context
         if drive is None:
             return None
         node = DiffDriveControllerNode(
@@ -101,7 +104,7 @@ class RobotStack:
         return node
 
     def _build_arm(self, description: RobotDescription) -> None:
-        bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware
+        bus, namespace, hardware = self.context.bus, self.context.namespace, self.handle.hardware
         if self.manipulator is None:
             if description.commands:
                 PositionControllerNode(bus, hardware, tuple(description.commands), namespace=namespace)
@@ -111,8 +114,8 @@ class RobotStack:
             bus,
             hardware,
             self.manipulator.gripper_joint,
-            period_ns=self._context.control_period_ns,
+            period_ns=self.context.control_period_ns,
             namespace=namespace,
         )
-        detector = None if self._context.config.detector is None else self._context.config.detector.build()
+        detector = None if self.context.config.detector is None else self.context.config.detector.build()
         ToteDetectorNode(bus, self.robot_pose, detector, namespace=namespace)

@@ -23,6 +23,7 @@ from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
+from twin.scenario.localisation_parameters import AmclParameters as AmclGroup
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 
 _CONTROLLERS = {
@@ -92,24 +93,23 @@ class AmclParameters:
 
 
 def amcl_with_file(
-    config: AmclConfig, given: frozenset[str], params_file: str | None, namespace: str
+    group: AmclGroup, params_file: str | None, namespace: str
 ) -> tuple[AmclParameters, list[str]]:
     """Return the parameters of `/amcl` with those of a file, and what of them was not understood.
 
     Args:
-        config: What holds without the file.
-        given: Parameters that the scenario gives: they stay.
+        group: What the scenario gives: it goes before the file.
         params_file: Absent: there is none.
         namespace: Of the robot.
 
     Raises:
         NavigationError: the file is wrong.
     """
-    parameters = AmclParameters(filter=config, node=AmclNodeConfig())
+    parameters = AmclParameters(filter=group.over(AmclConfig()), node=AmclNodeConfig())
     if params_file is None:
         return parameters, []
     file = Nav2Parameters(Path(params_file), namespace)
-    parameters = file.applied("amcl", parameters, keep=given)
+    parameters = group.over(file.applied("amcl", parameters))
     return parameters, file.ignored()
 
 
