@@ -49,7 +49,7 @@ class JointTrajectoryControllerNode:
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
                 goal.canceled()
-                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="canceled")
+                return _result(_SUCCESSFUL, "canceled")
             self._command(names, trajectory.sample(elapsed))
             yield
         self._command(names, trajectory.positions[-1])
@@ -59,18 +59,12 @@ class JointTrajectoryControllerNode:
         """Return the result that refuses a goal which cannot be followed, else None."""
         unknown = [name for name in names if name not in self._index]
         if unknown:
-            return new(
-                FollowJointTrajectory.Result,
-                error_code=_INVALID_JOINTS,
-                error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
-            )
+            said = f"unknown joints {unknown}; this controller has {list(self._index)}"
+            return _result(_INVALID_JOINTS, said)
         usable = all(len(p.positions) == len(names) and np.isfinite(p.positions).all() for p in points)
         if not (names and points and usable):
-            return new(
-                FollowJointTrajectory.Result,
-                error_code=_INVALID_GOAL,
-                error_string=f"every point needs {len(names)} finite positions, and there must be a point",
-            )
+            said = f"every point needs {len(names)} finite positions, and there must be a point"
+            return _result(_INVALID_GOAL, said)
         return None
 
     def _settle(
@@ -85,15 +79,11 @@ class JointTrajectoryControllerNode:
             }
             worst = max(errors, key=lambda name: abs(errors[name]))
             if abs(errors[worst]) <= self._tolerance:
-                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="")
+                return _result(_SUCCESSFUL)
             if self.node.now_ns > deadline:
                 goal.abort()
-                return new(
-                    FollowJointTrajectory.Result,
-                    error_code=_GOAL_TOLERANCE_VIOLATED,
-                    error_string=f"'{worst}' is {errors[worst]:+.4f} away from its goal, "
-                    f"{self._tolerance} is allowed",
-                )
+                said = f"'{worst}' is {errors[worst]:+.4f} away from its goal, {self._tolerance} is allowed"
+                return _result(_GOAL_TOLERANCE_VIOLATED, said)
             yield
 
     def _with_start(self, names: list[str], points: Sequence[Any]) -> Trajectory:
@@ -112,3 +102,7 @@ class JointTrajectoryControllerNode:
     def _command(self, names: list[str], positions: Any) -> None:
         for name, value in zip(names, positions, strict=True):
             self._hardware.command(name, float(value))
+
+
+def _result(code: int, text: str = "") -> Any:
+    return new(FollowJointTrajectory.Result, error_code=code, error_string=text)

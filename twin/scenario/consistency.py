@@ -109,14 +109,8 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, Idle):
         return
     robots = [robot.id for robot in scenario.robots]
-    if mission.robot is None:
-        if len(robots) > 1:
-            yield Fault(("mission",), f"the mission must name its robot; valid: {', '.join(robots)}")
-        return
+    yield from _robot(mission.robot, robots, ("mission",), "the mission")
     if mission.robot not in robots:
-        yield Fault(
-            ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"
-        )
         return
     index = robots.index(mission.robot)
     at, robot = ("robots", index), scenario.robots[index]
@@ -137,6 +131,14 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
         yield from _behaviors(mission, robot)
 
 
+def _robot(name: str | None, robots: list[str], loc: Loc, what: str) -> Iterator[Fault]:
+    """Yield why a name does not mean a robot; without one it is the only one."""
+    if name is None and len(robots) > 1:
+        yield Fault(loc, f"{what} must name its robot, there are several; valid: {', '.join(robots)}")
+    elif name is not None and name not in robots:
+        yield Fault((*loc, "robot"), f"unknown robot '{name}'; {nearest(name, robots)}")
+
+
 def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
     docks = robot.navigation.docking.docks if robot.navigation is not None else {}
     for i, step in enumerate(mission.steps):
@@ -155,11 +157,7 @@ def _faults(scenario: Scenario) -> Iterator[Fault]:
         config, loc = entry.config, ("faults", i, entry.kind)
         if not isinstance(config, RobotFault):
             continue
-        if config.robot is None and len(robots) > 1:
-            names = ", ".join(robots)
-            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
-        elif config.robot is not None and config.robot not in robots:
-            yield Fault((*loc, "robot"), f"unknown robot '{config.robot}'; {nearest(config.robot, robots)}")
+        yield from _robot(config.robot, robots, loc, entry.kind)
         if config.at >= scenario.duration:
             yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
 
@@ -172,11 +170,8 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
-        if robot is not None and robot not in robots:
-            yield Fault((*loc, "robot"), f"unknown robot '{robot}'; {nearest(robot, robots)}")
-        if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
-            names = ", ".join(robots)
-            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        if robot is not None or ("robot" in subjects and entry.kind != "no_collision"):
+            yield from _robot(robot, robots, loc, entry.kind)
         subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
         if subject is not None and "robot" in subjects:
             yield from _lacking(entry, subject, loc)

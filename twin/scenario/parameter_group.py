@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 from pydantic import Field, create_model
 
 from twin.errors import ScenarioError
+from twin.parameters import Derived
+from twin.parameters import NameOrPath as IsNameOrPath
 from twin.parameters.declaration import Declaration, fields_of
 from twin.parameters.placed import overridden
 from twin.scenario.fields import NameOrPath
@@ -92,7 +94,7 @@ def _keyed(config: type) -> Iterator[Declaration]:
     for declaration in fields_of(config).values():
         if declaration.config is not None and not declaration.name:
             yield from _keyed(declaration.config)
-        elif not declaration.is_derived:
+        elif Derived not in declaration.markers:
             yield declaration
 
 
@@ -104,7 +106,7 @@ def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | 
     domain = declaration.domain
     if domain is None:
         return None
-    kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
+    kind: Any = NameOrPath if IsNameOrPath in declaration.markers else Annotated[domain.annotation, domain]
     if whole and declaration.is_required:
         return kind, Field(description=declaration.text)
     if whole:

@@ -14,6 +14,7 @@ from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.position_controller import PositionControllerNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
@@ -43,10 +44,12 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        fusion = odometry_filter(context, self.frames)
-        wheels_tell = fusion is None or not fusion.config.publish_tf
-        self.drive = self._build_drive(description, enable_odom_tf=wheels_tell)
-        fused = None if fusion is None else fusion.build(context)
+        fusion, told = odometry_filter(context, self.frames)
+        self.drive = self._build_drive(description, enable_odom_tf=fusion is None or not fusion.publish_tf)
+        fused = None if fusion is None else EkfNode(bus, fusion, namespace=namespace)
+        if fused is not None:
+            for sentence in told:
+                fused.node.get_logger().warn(sentence)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)

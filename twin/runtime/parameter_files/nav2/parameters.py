@@ -23,20 +23,9 @@ from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.localisation_parameters import AmclParameters as AmclGroup
+from twin.scenario.localisation import AmclParameters as AmclGroup
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 
-_CONTROLLERS = {
-    "RegulatedPurePursuitController": "regulated_pure_pursuit",
-    "DWBLocalPlanner": "dwb",
-    "MPPIController": "mppi",
-}
-_GOAL_CHECKERS = {
-    "SimpleGoalChecker": "simple",
-    "StoppedGoalChecker": "stopped",
-    "PositionGoalChecker": "position",
-}
-_PROGRESS_CHECKERS = {"SimpleProgressChecker": "simple", "PoseProgressChecker": "pose"}
 _DOCKS = frozenset({"docks", "pose", "type", "frame"})
 """Of a dock: these are read together, by `database_of`."""
 
@@ -52,20 +41,23 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     file = Nav2Parameters(Path(config.params_file), namespace)
     controller, planner = config.controller, config.planner
     chosen = file.plugin("controller_server", "FollowPath")
-    if shim := chosen == "RotationShimController":
+    if shim := _shipped(CONTROLLERS, chosen) == "rotation_shim":
         chosen = file.plugin("controller_server", "FollowPath", "primary_controller")
-    update = {"rotation_shim": shim, "plugin": _controller(chosen)}
+    update = {
+        "rotation_shim": shim,
+        "plugin": _shipped(CONTROLLERS, chosen) or _brought(CONTROLLERS, chosen),
+    }
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
     if update["plugin"] and may_be and "rotation_shim" not in given:
         controller = controller.model_copy(update=update)
-    for key, section, classes in (
-        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
-        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS),
+    for key, section, kind in (
+        ("goal_checker", "general_goal_checker", plugins.GOAL_CHECKERS),
+        ("progress_checker", "progress_checker", plugins.PROGRESS_CHECKERS),
     ):
-        chosen = classes.get(file.plugin("controller_server", section), "")
-        if chosen and key not in controller.model_fields_set:
-            controller = controller.model_copy(update={key: chosen})
+        checker = _shipped(kind, file.plugin("controller_server", section))
+        if checker and key not in controller.model_fields_set:
+            controller = controller.model_copy(update={key: checker})
     chosen = file.plugin("planner_server", "GridBased")
     found = PLANNERS.get(chosen) or _brought(plugins.PLANNERS, chosen)
     if found and "plugin" not in planner.model_fields_set:
@@ -73,9 +65,10 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     return config.model_copy(update={"controller": controller, "planner": planner})
 
 
-def _controller(plugin: str) -> str | None:
-    """Return the scenario's name of a controller of the file."""
-    return _CONTROLLERS.get(plugin) or _brought(CONTROLLERS, plugin)
+def _shipped(kind: Kind[Any], plugin: str) -> str | None:
+    """Return the name of what ships for a plugin of Nav2, whose class begins as the one here does."""
+    classes = ((name, target.rpartition(":")[2]) for name, target in kind.shipped.items())
+    return next((name for name, own in classes if plugin.startswith(own)), None)
 
 
 def _brought(kind: Kind[Any], plugin: str) -> str | None:
