@@ -15,6 +15,10 @@ from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
 _SUCCESSFUL, _INVALID_GOAL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -1, -2, -5
+_TOLERANCE = 0.005
+"""As near to its goal as this a joint has arrived [rad or m]."""
+_PATIENCE_NS = 2_000_000_000
+"""How long joints may take to arrive once the trajectory is over."""
 
 
 class JointTrajectoryControllerNode:
@@ -26,17 +30,14 @@ class JointTrajectoryControllerNode:
         hardware: HardwareInterface,
         joints: Sequence[str],
         *,
-        name: str = "arm_controller",
         namespace: str = "",
-        goal_tolerance: float = 0.005,
-        goal_time_tolerance_s: float = 2.0,
     ) -> None:
-        self.node = bus.create_node(name, namespace)
+        self.node = bus.create_node("arm_controller", namespace)
         self._hardware = hardware
         self._index = {joint: hardware.joint_names.index(joint) for joint in joints}
-        self._tolerance = goal_tolerance
-        self._patience_ns = int(goal_time_tolerance_s * 1e9)
-        ActionServer(self.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory", self._execute)
+        ActionServer(
+            self.node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory", self._execute
+        )
 
     def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
@@ -70,7 +71,7 @@ class JointTrajectoryControllerNode:
     def _settle(
         self, goal: GoalHandle, names: list[str], trajectory: Trajectory
     ) -> Generator[None, None, Any]:
-        deadline = self.node.now_ns + self._patience_ns
+        deadline = self.node.now_ns + _PATIENCE_NS
         while True:
             measured = self._hardware.read().position
             errors = {
@@ -78,11 +79,11 @@ class JointTrajectoryControllerNode:
                 for name, target in zip(names, trajectory.positions[-1], strict=True)
             }
             worst = max(errors, key=lambda name: abs(errors[name]))
-            if abs(errors[worst]) <= self._tolerance:
+            if abs(errors[worst]) <= _TOLERANCE:
                 return _result(_SUCCESSFUL)
             if self.node.now_ns > deadline:
                 goal.abort()
-                said = f"'{worst}' is {errors[worst]:+.4f} away from its goal, {self._tolerance} is allowed"
+                said = f"'{worst}' is {errors[worst]:+.4f} away from its goal, {_TOLERANCE} is allowed"
                 return _result(_GOAL_TOLERANCE_VIOLATED, said)
             yield
 

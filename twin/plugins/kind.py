@@ -47,8 +47,8 @@ class Kind(Generic[T]):
     @property
     def shipped(self) -> Mapping[str, str]:
         """What ships, `module:Class` by name, in the order of registration."""
-        own = {name: target for name, target in self._registered.items() if _is_own(target)}
-        return MappingProxyType({name: target for name, target in own.items() if isinstance(target, str)})
+        own = ((name, target) for name, target in self._registered.items() if _is_own(target))
+        return MappingProxyType({name: target for name, target in own if isinstance(target, str)})
 
     def names(self) -> tuple[str, ...]:
         """Return every name that is known: registered, then of installed packages; imports nothing."""

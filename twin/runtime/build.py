@@ -46,6 +46,7 @@ from twin.sim.world import World
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
 from twin.warehouse.map_files import map_of_arena, named_map
+from twin.warehouse.shelf import Zone as ArenaZone
 
 INPROC = SessionConfig()
 """No network: nobody else takes part."""
@@ -231,15 +232,6 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
 def _check_context(
     scenario: Scenario, scene: Scene, arena: Arena | None, stacks: Mapping[str, RobotStack]
 ) -> CheckContext:
-    zones = {}
-    if arena is not None:
-        for name, zone in arena.zones.items():
-            table = zone.table
-            zones[name] = (
-                Zone(centre=zone.pose, size=(zone.area.size_x, zone.area.size_y))
-                if table is None
-                else Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
-            )
     bottoms = {
         good.name: max(
             (_half_height(shape) - float(shape.T_body_geometry.xyz[2]) for shape in good.shapes), default=0.0
@@ -248,10 +240,16 @@ def _check_context(
     }
     return CheckContext(
         robots=tuple(stacks),
-        zones=zones,
+        zones={} if arena is None else {name: _zone(zone) for name, zone in arena.zones.items()},
         good_bottoms=bottoms,
         surroundings={name: surroundings(scene, stack) for name, stack in stacks.items()},
     )
+
+
+def _zone(zone: ArenaZone) -> Zone:
+    if (table := zone.table) is None:
+        return Zone(centre=zone.pose, size=(zone.area.size_x, zone.area.size_y))
+    return Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
 
 
 def _half_height(shape: Shape) -> float:

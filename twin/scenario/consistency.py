@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from twin.errors import nearest
 from twin.periods import period_of
 from twin.scenario.faults import RobotFault
+from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.scenario.missions import (
     Behaviors,
     Explore,
@@ -59,10 +60,9 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
         yield Fault(("physics", "control_period"), text)
         return
     rates: list[tuple[Loc, str, float]] = []
+    poses_hz = scenario.recording.poses_hz
     if scenario.recording.enabled:
-        rates.append(
-            (("recording", "poses_hz"), "the rate of the recorded poses", scenario.recording.poses_hz)
-        )
+        rates.append((("recording", "poses_hz"), "the rate of the recorded poses", poses_hz))
     if isinstance(scenario.mission, R2D2StatePublisher):
         rates.append((("mission", "rate"), "the rate of the publisher", scenario.mission.rate))
     for loc, what, rate in rates:
@@ -84,13 +84,10 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
         return
     message = "needs an arena; name one as world.arena"
     for i, robot in enumerate(scenario.robots):
+        localisation = robot.localisation
         if robot.start is not None:
             yield Fault(("robots", i, "start"), f"the start '{robot.start}' {message}")
-        if (
-            robot.localisation is not None
-            and robot.localisation.type == "amcl"
-            and robot.localisation.map is None
-        ):
+        if isinstance(localisation, AmclLocalisation) and localisation.map is None:
             yield Fault(("robots", i, "localisation"), f"amcl without a map {message}, or a map")
     for i, good in enumerate(scenario.world.goods):
         yield Fault(("world", "goods", i), f"the good '{good.name}' {message}")
@@ -116,16 +113,13 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     at, robot = ("robots", index), scenario.robots[index]
     if isinstance(mission, R2D2StatePublisher) and robot.base != "kinematic":
         yield Fault((*at, "base"), "the mission r2d2_state_publisher needs the base 'kinematic'")
-    if isinstance(mission, Explore) and (
-        robot.navigation is None or robot.localisation is None or robot.localisation.type != "slam"
-    ):
-        yield Fault(
-            at,
-            f"the mission explore needs a navigation of robot '{robot.id}' and its localisation of type slam",
-        )
+    maps = isinstance(robot.localisation, SlamLocalisation)
+    if isinstance(mission, Explore) and not (maps and robot.navigation is not None):
+        needs = f"needs a navigation of robot '{robot.id}' and its localisation of type slam"
+        yield Fault(at, f"the mission explore {needs}")
     if isinstance(mission, PickAndPlace | RandomGoals) and robot.navigation is None:
         yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
-    if isinstance(mission, RandomGoals) and (robot.localisation is None or robot.localisation.type != "amcl"):
+    if isinstance(mission, RandomGoals) and not isinstance(robot.localisation, AmclLocalisation):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
     if isinstance(mission, Behaviors):
         yield from _behaviors(mission, robot)
@@ -186,6 +180,6 @@ def _lacking(entry: CheckEntry, robot: RobotConfig, loc: Loc) -> Iterator[Fault]
     """Yield what a robot has not got that a check is about."""
     if entry.kind == "recoveries" and robot.navigation is None:
         yield Fault(loc, f"recoveries needs a navigation of robot '{robot.id}'")
-    slam = robot.localisation is not None and robot.localisation.type == "slam"
-    if entry.kind in ("map_accuracy", "map_coverage") and not slam:
+    maps = isinstance(robot.localisation, SlamLocalisation)
+    if entry.kind in ("map_accuracy", "map_coverage") and not maps:
         yield Fault(loc, f"{entry.kind} needs the localisation of robot '{robot.id}' of type slam")

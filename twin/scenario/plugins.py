@@ -43,12 +43,8 @@ class PluginUse(StrictModel):
         try:
             return configured(plugin, self.params)
         except Faults as wrong:
-            raise PluginError(
-                [
-                    plugin.error(f"has a wrong parameter: {fault.message}").problems[0]
-                    for fault in wrong.faults
-                ]
-            ) from None
+            errors = [plugin.error(f"has a wrong parameter: {fault.message}") for fault in wrong.faults]
+            raise PluginError([error.problems[0] for error in errors]) from None
 
 
 def reference(kind: Kind[Any]) -> AfterValidator:
