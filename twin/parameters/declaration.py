@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, get_type_hints
 
 from twin.parameters.domain import Domain, domain_of, metadata_of
@@ -87,19 +87,9 @@ def _fields_of(config: type) -> Mapping[str, Declaration]:
     return MappingProxyType({field.name: _declaration(config, field, hints[field.name]) for field in fields})
 
 
-class _Names:
-    """The names of a config's parameters by field."""
-
-    def __init__(self, config: type) -> None:
-        self._fields = fields_of(config)
-
-    def __getattr__(self, field: str) -> str:
-        return self._fields[field].name
-
-
-def names_of(config: type) -> _Names:
+def names_of(config: type) -> SimpleNamespace:
     """Return what a config's parameters are called: `names_of(AmclConfig).sigma_hit` is 'sigma_hit'."""
-    return _Names(config)
+    return SimpleNamespace(**{field: one.name for field, one in fields_of(config).items()})
 
 
 def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:

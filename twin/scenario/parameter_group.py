@@ -77,13 +77,9 @@ def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]
     return decorate
 
 
+@cache
 def group_of(config: type) -> type[ParameterGroup]:
     """Return the group of a config that needs no other keys than its own."""
-    return _group_of(config)
-
-
-@cache
-def _group_of(config: type) -> type[ParameterGroup]:
     name = f"{config.__name__.removesuffix('Config')}Parameters"
     body = {"__doc__": config.__doc__, "__module__": config.__module__}
     return keys_of(config)(type(name, (ParameterGroup,), body))
