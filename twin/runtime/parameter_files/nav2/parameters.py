@@ -45,7 +45,7 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         chosen = file.plugin("controller_server", "FollowPath", "primary_controller")
     update = {
         "rotation_shim": shim,
-        "plugin": _shipped(CONTROLLERS, chosen) or _brought(CONTROLLERS, chosen),
+        "plugin": _brought(CONTROLLERS, chosen) or _shipped(CONTROLLERS, chosen),
     }
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
