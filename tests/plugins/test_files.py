@@ -12,7 +12,7 @@ from twin.models import ReadOptions, load
 from twin.models.catalogue import catalogue
 from twin.models.checks import check
 from twin.scenario import schema
-from twin.scenario.detectors import AnyDetector, DetectorEntry
+from twin.scenario.detectors import DetectorEntry
 
 URDF = """<robot name="stone"><link name="base_link"><inertial><mass value="1"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial></link>
@@ -102,7 +102,7 @@ def test_what_a_detector_finds_is_looked_at(returned: str, message: str, tmp_pat
         "from twin.geometry import Pose2\nfrom twin.navigation.docking.detectors import Detector\n\n"
         f"class Eye(Detector):\n    def detect(self, points):\n        return {returned}\n"
     )
-    entry: AnyDetector = DetectorEntry.model_validate({f"{tmp_path}/eye.py:Eye": None})
+    entry = DetectorEntry.model_validate({f"{tmp_path}/eye.py:Eye": None})
     with pytest.raises(PluginError, match=message):
         entry.build().detect(np.zeros((3, 2)))
 

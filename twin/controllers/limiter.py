@@ -20,6 +20,11 @@ class AxisLimits:
     max_deceleration: Annotated[float, Positive, MayBeInfinite, Nav2("max_decel")] | None = None
     """When braking; None: as max_acceleration."""
 
+    @property
+    def braking(self) -> float:
+        """The deceleration that holds."""
+        return self.max_acceleration if self.max_deceleration is None else self.max_deceleration
+
 
 class SpeedLimiter:
     """Clamps a velocity and its rate of change; braking may be harder than speeding up."""
@@ -47,7 +52,4 @@ class SpeedLimiter:
         """Return the largest change within `dt` [s]."""
         limits, target = self.limits, self._clamped(target)
         braking = abs(target) < abs(self.value) or target * self.value < 0.0
-        rate = limits.max_acceleration
-        if braking and limits.max_deceleration is not None:
-            rate = limits.max_deceleration
-        return rate * dt
+        return (limits.braking if braking else limits.max_acceleration) * dt

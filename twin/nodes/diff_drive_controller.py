@@ -9,27 +9,15 @@ from typing import Annotated
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import (
-    Header,
-    Imu,
-    Point,
-    Pose,
-    PoseWithCovariance,
-    Quaternion,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-    stamp,
-)
-from twin.bridge.msgs import (
-    Odometry as OdometryMsg,
-)
+from twin.bridge.conversions import pose_from_pose2, twist_from_planar
+from twin.bridge.msgs import Imu, PoseWithCovariance, Twist, TwistWithCovariance, header
+from twin.bridge.msgs import Odometry as OdometryMsg
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
-from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
+from twin.geometry import Array, Pose2, Pose3
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Flat, Le, PeriodNs, Positive
@@ -123,25 +111,17 @@ class DiffDriveControllerNode:
         self._publish(pose)
 
     def _publish(self, pose: Pose2) -> None:
-        now = self.node.now_ns
-        w, _, _, z = quat_wxyz_from_yaw(pose.yaw)
-        linear, angular = self.odometry.velocity
+        now, odometry = self.node.now_ns, self.odometry
         self._publisher.publish(
             OdometryMsg(
-                header=Header(stamp=stamp(now), frame_id=self.config.odom_frame),
+                header=header(now, self.config.odom_frame),
                 child_frame_id=self.config.base_frame,
                 pose=PoseWithCovariance(
-                    pose=Pose(
-                        position=Point(x=pose.x, y=pose.y, z=0.0),
-                        orientation=Quaternion(x=0.0, y=0.0, z=z, w=w),
-                    ),
-                    covariance=planar_covariance(self.odometry.covariance),
+                    pose=pose_from_pose2(pose), covariance=planar_covariance(odometry.covariance)
                 ),
                 twist=TwistWithCovariance(
-                    twist=Twist(
-                        linear=Vector3(x=linear, y=0.0, z=0.0), angular=Vector3(x=0.0, y=0.0, z=angular)
-                    ),
-                    covariance=planar_covariance(self.odometry.velocity_covariance),
+                    twist=twist_from_planar(*odometry.velocity),
+                    covariance=planar_covariance(odometry.velocity_covariance),
                 ),
             )
         )

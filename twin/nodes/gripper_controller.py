@@ -27,12 +27,11 @@ class GripperControllerNode:
         hardware: HardwareInterface,
         joint: str,
         *,
-        config: GripperConfig | None = None,
         period_ns: int = 20_000_000,
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("gripper_controller", namespace)
-        self.config = config or GripperConfig()
+        self.config = GripperConfig()
         self._hardware = hardware
         self._joint = joint
         self._index = hardware.joint_names.index(joint)

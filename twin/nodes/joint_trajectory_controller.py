@@ -15,6 +15,10 @@ from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
 _SUCCESSFUL, _INVALID_GOAL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -1, -2, -5
+_TOLERANCE = 0.005
+"""As near to its goal as this a joint has arrived [rad or m]."""
+_PATIENCE_NS = 2_000_000_000
+"""How long joints may take to arrive once the trajectory is over."""
 
 
 class JointTrajectoryControllerNode:
@@ -26,17 +30,14 @@ class JointTrajectoryControllerNode:
         hardware: HardwareInterface,
         joints: Sequence[str],
         *,
-        name: str = "arm_controller",
         namespace: str = "",
-        goal_tolerance: float = 0.005,
-        goal_time_tolerance_s: float = 2.0,
     ) -> None:
-        self.node = bus.create_node(name, namespace)
+        self.node = bus.create_node("arm_controller", namespace)
         self._hardware = hardware
         self._index = {joint: hardware.joint_names.index(joint) for joint in joints}
-        self._tolerance = goal_tolerance
-        self._patience_ns = int(goal_time_tolerance_s * 1e9)
-        ActionServer(self.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory", self._execute)
+        ActionServer(
+            self.node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory", self._execute
+        )
 
     def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
@@ -49,7 +50,7 @@ class JointTrajectoryControllerNode:
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
                 goal.canceled()
-                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="canceled")
+                return _result(_SUCCESSFUL, "canceled")
             self._command(names, trajectory.sample(elapsed))
             yield
         self._command(names, trajectory.positions[-1])
@@ -59,24 +60,18 @@ class JointTrajectoryControllerNode:
         """Return the result that refuses a goal which cannot be followed, else None."""
         unknown = [name for name in names if name not in self._index]
         if unknown:
-            return new(
-                FollowJointTrajectory.Result,
-                error_code=_INVALID_JOINTS,
-                error_string=f"unknown joints {unknown}; this controller has {list(self._index)}",
-            )
+            said = f"unknown joints {unknown}; this controller has {list(self._index)}"
+            return _result(_INVALID_JOINTS, said)
         usable = all(len(p.positions) == len(names) and np.isfinite(p.positions).all() for p in points)
         if not (names and points and usable):
-            return new(
-                FollowJointTrajectory.Result,
-                error_code=_INVALID_GOAL,
-                error_string=f"every point needs {len(names)} finite positions, and there must be a point",
-            )
+            said = f"every point needs {len(names)} finite positions, and there must be a point"
+            return _result(_INVALID_GOAL, said)
         return None
 
     def _settle(
         self, goal: GoalHandle, names: list[str], trajectory: Trajectory
     ) -> Generator[None, None, Any]:
-        deadline = self.node.now_ns + self._patience_ns
+        deadline = self.node.now_ns + _PATIENCE_NS
         while True:
             measured = self._hardware.read().position
             errors = {
@@ -84,16 +79,12 @@ class JointTrajectoryControllerNode:
                 for name, target in zip(names, trajectory.positions[-1], strict=True)
             }
             worst = max(errors, key=lambda name: abs(errors[name]))
-            if abs(errors[worst]) <= self._tolerance:
-                return new(FollowJointTrajectory.Result, error_code=_SUCCESSFUL, error_string="")
+            if abs(errors[worst]) <= _TOLERANCE:
+                return _result(_SUCCESSFUL)
             if self.node.now_ns > deadline:
                 goal.abort()
-                return new(
-                    FollowJointTrajectory.Result,
-                    error_code=_GOAL_TOLERANCE_VIOLATED,
-                    error_string=f"'{worst}' is {errors[worst]:+.4f} away from its goal, "
-                    f"{self._tolerance} is allowed",
-                )
+                said = f"'{worst}' is {errors[worst]:+.4f} away from its goal, {_TOLERANCE} is allowed"
+                return _result(_GOAL_TOLERANCE_VIOLATED, said)
             yield
 
     def _with_start(self, names: list[str], points: Sequence[Any]) -> Trajectory:
@@ -112,3 +103,7 @@ class JointTrajectoryControllerNode:
     def _command(self, names: list[str], positions: Any) -> None:
         for name, value in zip(names, positions, strict=True):
             self._hardware.command(name, float(value))
+
+
+def _result(code: int, text: str = "") -> Any:
+    return new(FollowJointTrajectory.Result, error_code=code, error_string=text)

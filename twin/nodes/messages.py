@@ -11,9 +11,9 @@ from twin.bridge.msgs import Path, PoseStamped, header
 from twin.geometry import Array, Pose2
 
 
-def pose_stamped(pose: Pose2, frame: str, time_ns: int, z: float = 0.0) -> PoseStamped:
+def pose_stamped(pose: Pose2, frame: str, time_ns: int) -> PoseStamped:
     """Return a planar pose in `frame` as a stamped message."""
-    return PoseStamped(header=header(time_ns, frame), pose=pose_from_pose2(pose, z))
+    return PoseStamped(header=header(time_ns, frame), pose=pose_from_pose2(pose))
 
 
 def path_msg(poses: Sequence[Pose2] | Array, frame: str, time_ns: int) -> Path:

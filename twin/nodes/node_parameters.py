@@ -11,6 +11,7 @@ from twin.bridge.node import Node
 from twin.bridge.parameters.values import Parameter
 from twin.bridge.types.default_values import new
 from twin.errors import BridgeError
+from twin.parameters import ReadOnly
 from twin.parameters.declaration import Declaration
 from twin.parameters.placed import overlay, parameters_of
 
@@ -63,7 +64,7 @@ def descriptor_of(declaration: Declaration, *, read_only: bool = False) -> Param
         ParameterDescriptor,
         description=declaration.text,
         additional_constraints=domain.said,
-        read_only=read_only or declaration.is_read_only,
+        read_only=read_only or ReadOnly in declaration.markers,
     )
     least, most = domain.bounds.least, domain.bounds.most
     if least is None and most is None:

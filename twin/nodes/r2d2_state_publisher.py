@@ -38,7 +38,6 @@ class R2D2StatePublisherNode(MissionNode):
         radius: float = 2.0,
         rate_hz: float = 30.0,
         degrees_per_cycle: float = 0.25,
-        turns: float = 1.0,
         namespace: str = "",
     ) -> None:
         super().__init__(bus, namespace=namespace)
@@ -47,7 +46,6 @@ class R2D2StatePublisherNode(MissionNode):
         self._move_base = move_base
         self._radius = radius
         self._step = degrees_per_cycle * _DEGREE
-        self._end = turns * 2.0 * math.pi
         self._angle = 0.0
         self._positions = {"tilt": 0.0, "swivel": 0.0, "periscope": 0.0}
         self._rates = {"tilt": -_DEGREE, "swivel": _DEGREE, "periscope": 0.005}
@@ -71,7 +69,7 @@ class R2D2StatePublisherNode(MissionNode):
         targets = np.array([self._positions[joint] for joint in self._joints])
         self._commands.publish(Float64MultiArray(layout=layout, data=targets))
         self._advance()
-        if self._angle > self._end:
+        if self._angle > 2.0 * math.pi:
             self.finish(succeeded=True)
 
     def _advance(self) -> None:

@@ -7,20 +7,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, get_type_hints
 
 from twin.parameters.domain import Domain, domain_of, metadata_of
-from twin.parameters.forms import (
-    Derived,
-    Form,
-    Itself,
-    Name,
-    NameOrPath,
-    Nav2,
-    ReadOnly,
-    Underscored,
-)
+from twin.parameters.forms import Form, Marker, Name, Nav2
 from twin.parameters.texts import texts_of
 
 _END_OF_CLAUSE = re.compile(r"(?<=[^\s.])(?= ?\.\.\.|[.;:](\s|$))")
@@ -46,15 +37,8 @@ class Declaration:
     """The config inside, if the annotation names just one."""
     default: Any
     """As configs keep it; None if it is made anew each time, MISSING if there is none."""
-    is_read_only: bool
-    is_derived: bool
-    """Whether it is made of others, so that scenarios have no key for it."""
-    is_underscored: bool
-    """Of configs by name: whether what is in them is called 'name_field' instead of 'name.field'."""
-    is_itself: bool
-    """Whether the parameter is called as the section that it is in."""
-    is_path: bool
-    """Whether it is the name of what ships, or a path."""
+    markers: frozenset[Marker]
+    """What else holds of it, such as `ReadOnly`."""
 
     @property
     def is_required(self) -> bool:
@@ -99,27 +83,13 @@ def fields_of(config: type | object) -> Mapping[str, Declaration]:
 @cache
 def _fields_of(config: type) -> Mapping[str, Declaration]:
     hints = get_type_hints(config, include_extras=True)
-    found = {field.name: _declaration(config, field, hints[field.name]) for field in _init(config)}
-    return MappingProxyType(found)
+    fields = [field for field in dataclasses.fields(config) if field.init]
+    return MappingProxyType({field.name: _declaration(config, field, hints[field.name]) for field in fields})
 
 
-class _Names:
-    """The names of a config's parameters by field."""
-
-    def __init__(self, config: type) -> None:
-        self._fields = fields_of(config)
-
-    def __getattr__(self, field: str) -> str:
-        return self._fields[field].name
-
-
-def names_of(config: type) -> _Names:
+def names_of(config: type) -> SimpleNamespace:
     """Return what a config's parameters are called: `names_of(AmclConfig).sigma_hit` is 'sigma_hit'."""
-    return _Names(config)
-
-
-def _init(config: type) -> list[dataclasses.Field[Any]]:
-    return [field for field in dataclasses.fields(config) if field.init]
+    return SimpleNamespace(**{field: one.name for field, one in fields_of(config).items()})
 
 
 def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declaration:
@@ -140,9 +110,5 @@ def _declaration(owner: type, of: dataclasses.Field[Any], hint: Any) -> Declarat
         nav2=tuple(one for one in metadata if isinstance(one, Nav2)),
         config=kind if isinstance(kind, type) and dataclasses.is_dataclass(kind) else None,
         default=of.default if of.default_factory is dataclasses.MISSING else None,
-        is_read_only=ReadOnly in metadata,
-        is_derived=Derived in metadata,
-        is_underscored=Underscored in metadata,
-        is_itself=Itself in metadata,
-        is_path=NameOrPath in metadata,
+        markers=frozenset(one for one in metadata if isinstance(one, Marker)),
     )

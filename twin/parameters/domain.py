@@ -142,10 +142,9 @@ class Domain:
         return core_schema.no_info_before_validator_function(self.parsed, handler(source))
 
 
-def domain_of(hint: Any, metadata: Iterable[object] = ()) -> Domain | None:
+def domain_of(hint: Any) -> Domain | None:
     """Return which values a type hint takes; None for what is no parameter, such as a config or an array."""
     kind, found, is_optional = _taken_apart(hint)
-    found = [*metadata, *found]
     form = next((one for one in found if isinstance(one, Form)), None)
     unit = form.unit if form is not None else next((one for one in found if isinstance(one, Unit)), None)
     common: Mapping[str, Any] = {"is_optional": is_optional, "metadata": tuple(found)}

@@ -8,6 +8,7 @@ from functools import reduce
 from typing import Any, TypeVar
 
 from twin.parameters.declaration import Declaration, fields_of
+from twin.parameters.forms import Itself, Underscored
 
 C = TypeVar("C")
 
@@ -60,10 +61,10 @@ def _walk(config: Any, path: tuple[str, ...], prefix: str, separator: str = ".")
         here, name = (*path, key), key if declaration is None else declaration.name
         if dataclasses.is_dataclass(value) or isinstance(value, Mapping):
             inner = f"{prefix}{name}{separator}" if name else prefix
-            is_joined = declaration is not None and declaration.is_underscored
+            is_joined = declaration is not None and Underscored in declaration.markers
             yield from _walk(value, here, inner, "_" if is_joined else ".")
         elif declaration is not None and declaration.domain is not None and not _is_absent(value):
-            whole = prefix[:-1] if declaration.is_itself and prefix else prefix + name
+            whole = prefix[:-1] if Itself in declaration.markers and prefix else prefix + name
             yield Placed(whole, here, declaration)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from twin.errors import PluginError
-from twin.plugins.installed import installed
+from twin.plugins.installed import installed, owner_of
 from twin.plugins.places import folder_of
 
 
@@ -33,13 +33,13 @@ class Files(Mapping[str, Path]):
     def __getitem__(self, name: str) -> Path:
         points = installed(self._group).get(name, ())
         owners = ["twin"] if name in self._shipped else []
-        owners += [point.told for point in points]
+        owners += map(owner_of, points)
         if len(owners) > 1:
             told = " and ".join(owners)
             raise PluginError(f"two {self._what}s are called '{name}': of {told}; remove one, or give a path")
         if not points:
             return self._shipped[name]
-        what = f"{self._what} '{name}' of {points[0].told}"
+        what = f"{self._what} '{name}' of {owner_of(points[0])}"
         folder = folder_of(points[0].value, what)
         for place in (folder, folder / name):
             for ending in self._endings:

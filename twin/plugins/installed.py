@@ -4,25 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib import metadata
+from importlib.metadata import EntryPoint
 from types import MappingProxyType
 
 
-@dataclass(frozen=True)
-class EntryPoint:
-    """One line of a package's metadata: `name = "module:Class"` in a group."""
-
-    name: str
-    value: str
-    package: str
-    version: str
-
-    @property
-    def told(self) -> str:
-        """The package, for messages and verdicts."""
-        return f"{self.package} {self.version}"
+def owner_of(point: EntryPoint) -> str:
+    """Return the package of an entry point, with its version, for messages and verdicts."""
+    return "? ?" if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
 def installed(group: str) -> Mapping[str, tuple[EntryPoint, ...]]:
@@ -45,15 +35,9 @@ def _packages(_path: tuple[str, ...]) -> Mapping[str, list[str]]:
 def _by_name(group: str, _path: tuple[str, ...]) -> Mapping[str, tuple[EntryPoint, ...]]:
     found: dict[str, dict[tuple[str, str], EntryPoint]] = {}
     for point in metadata.entry_points(group=group):
-        owner = point.dist
-        package, version = (owner.name, owner.version) if owner is not None else ("?", "?")
+        package = owner_of(point).partition(" ")[0]
         # A package that is on the path twice is one package: the first one counts, as for imports.
-        found.setdefault(point.name, {}).setdefault(
-            (package, point.value), EntryPoint(point.name, point.value, package, version)
-        )
+        found.setdefault(point.name, {}).setdefault((package, point.value), point)
     return MappingProxyType(
-        {
-            name: tuple(sorted(points.values(), key=lambda point: point.package))
-            for name, points in sorted(found.items())
-        }
+        {name: tuple(sorted(points.values(), key=owner_of)) for name, points in sorted(found.items())}
     )

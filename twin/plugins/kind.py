@@ -5,12 +5,13 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import MappingProxyType
 from typing import Generic, TypeVar
 
 from twin.errors import PluginError, nearest
-from twin.plugins.installed import EntryPoint, installed
+from twin.plugins.installed import installed, owner_of
 from twin.plugins.places import Place, in_file, in_module
 from twin.plugins.plugin import Plugin
 
@@ -47,8 +48,8 @@ class Kind(Generic[T]):
     @property
     def shipped(self) -> Mapping[str, str]:
         """What ships, `module:Class` by name, in the order of registration."""
-        own = {name: target for name, target in self._registered.items() if _is_own(target)}
-        return MappingProxyType({name: target for name, target in own.items() if isinstance(target, str)})
+        own = ((name, target) for name, target in self._registered.items() if _is_own(target))
+        return MappingProxyType({name: target for name, target in own if isinstance(target, str)})
 
     def names(self) -> tuple[str, ...]:
         """Return every name that is known: registered, then of installed packages; imports nothing."""
@@ -79,7 +80,7 @@ class Kind(Generic[T]):
         points = installed(self.group).get(name, ())
         registered = self._registered.get(name)
         owners = [] if registered is None else [_told(registered)]
-        owners += [f"'{point.value}' of {point.told}" for point in points]
+        owners += [f"'{point.value}' of {owner_of(point)}" for point in points]
         if len(owners) > 1:
             raise PluginError(
                 f"two plugins are called '{name}': the {self.name}s {' and '.join(owners)}; "
@@ -97,13 +98,13 @@ class Kind(Generic[T]):
         return replace(self.find(registered), name=name)
 
     def _of(self, point: EntryPoint) -> Plugin[T]:
-        module, _, attribute = point.value.partition(":")
-        what = f"{self.name} '{point.name}' of {point.told}"
+        (module, _, attribute), owner = point.value.partition(":"), owner_of(point)
+        what = f"{self.name} '{point.name}' of {owner}"
         if not attribute:
             raise PluginError(
                 f"{what}: its entry point '{point.value}' names no class; valid is module:Class"
             )
-        return Plugin(self, point.name, in_module(module, attribute, what), version=point.told)
+        return Plugin(self, point.name, in_module(module, attribute, what), version=owner)
 
 
 def _is_own(target: str | type) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -119,8 +118,6 @@ def _abstract(cls: type) -> frozenset[str]:
 def _shown(base: type, method: str) -> str:
     """Return the parameters of a method as text, `self` left out; nothing for a property."""
     function = getattr(base, method)
-    return "" if not inspect.isfunction(function) else f"({', '.join(_parameters(function))})"
-
-
-def _parameters(function: Any) -> Iterator[str]:
-    yield from list(inspect.signature(function).parameters)[1:]
+    if not inspect.isfunction(function):
+        return ""
+    return f"({', '.join([*inspect.signature(function).parameters][1:])})"

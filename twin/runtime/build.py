@@ -17,17 +17,18 @@ from twin.bridge.programs.ros_args import RosArguments
 from twin.bridge.topics import Sample
 from twin.bridge.wire.session import SessionConfig
 from twin.convert import convert
-from twin.errors import MapError, ScenarioError
+from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.sensors import SENSORS
 from twin.models.shapes import Box
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.nodes.missions.mission_node import MissionNode
 from twin.runtime.defaults.drives import with_drive
 from twin.runtime.events.obstacles import hidden_pose, standing_pose
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished_scans
 from twin.runtime.stacks.context import StackContext
-from twin.runtime.stacks.missions import MissionHandle, build_mission
+from twin.runtime.stacks.missions import IdleMission, build_mission
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
 from twin.scenario.localisation import AmclLocalisation
@@ -36,7 +37,7 @@ from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
-from twin.scenario.world import GoodOverride, Obstacle
+from twin.scenario.world import Obstacle
 from twin.sim.drive_check import calibrated_track_ratio
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
@@ -45,6 +46,7 @@ from twin.sim.world import World
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
 from twin.warehouse.map_files import map_of_arena, named_map
+from twin.warehouse.shelf import Zone as ArenaZone
 
 INPROC = SessionConfig()
 """No network: nobody else takes part."""
@@ -64,7 +66,7 @@ class Parts:
     bus: Bus
     clock: Clock
     stacks: Mapping[str, RobotStack]
-    mission: MissionHandle
+    mission: MissionNode | IdleMission
     checks: CheckContext
     control_period_ns: int
 
@@ -123,7 +125,6 @@ def build(
         control_period_ns = round(scenario.physics.control_period * 1e9)
         alone = len(scenario.robots) == 1
         bus.node_options = None if alone else _TREE_EACH
-        namespaces = {robot.id: "" if alone else f"/{robot.id}" for robot in scenario.robots}
         stacks = {
             robot.id: RobotStack(
                 StackContext(
@@ -136,14 +137,12 @@ def build(
                     control_period_ns=control_period_ns,
                     spawn_height=heights[robot.id],
                     track_ratio=ratios[robot.id],
-                    namespace=namespaces[robot.id],
+                    namespace="" if alone else f"/{robot.id}",
                 )
             )
             for robot in scenario.robots
         }
-        mission = build_mission(
-            bus, scenario.mission, stacks, arena, namespaces, scenario.seed, control_period_ns
-        )
+        mission = build_mission(scenario.mission, stacks, arena)
         bus.node_options = None
         for place in outside.nodes:
             create_nodes(bus, place)
@@ -167,8 +166,7 @@ def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:
         return robot.pose.pose
     if robot.start is None:
         return Pose2(0.0, 0.0, 0.0)
-    if arena is None:
-        raise ScenarioError(f"robot '{robot.id}' starts at '{robot.start}', but there is no arena with poses")
+    assert arena is not None  # as the scenario's checks say
     return arena.pose(robot.start)
 
 
@@ -187,79 +185,43 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
     if arena is None:
         return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed)
-    totes = (
-        {task.tote for task in scenario.mission.tasks}
-        if isinstance(scenario.mission, PickAndPlace)
-        else set()
-    )
-    overrides = {good.name: good for good in scenario.world.goods}
-    scene = arena.scene(totes | set(overrides), seed=scenario.seed, obstacles=statics)
-    goods = [_overridden(good, overrides.get(good.name)) for good in scene.goods]
-    return Scene(
-        name=scene.name,
-        floor_friction=scene.floor_friction,
-        floor_size=scene.floor_size,
-        statics=scene.statics,
-        goods=(*goods, *movable),
-        placed=placed,
-    )
-
-
-def _overridden(good: FreeBody, override: GoodOverride | None) -> FreeBody:
-    if override is None:
-        return good
-    return replace(
-        good,
-        mass=good.mass if override.mass is None else override.mass,
-        friction=good.friction if override.friction is None else override.friction,
-    )
+    tasks = scenario.mission.tasks if isinstance(scenario.mission, PickAndPlace) else ()
+    given = {good.name: good.properties for good in scenario.world.goods}
+    scene = arena.scene({*given, *(task.tote for task in tasks)}, seed=scenario.seed, obstacles=statics)
+    goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
+    return replace(scene, goods=(*goods, *movable), placed=placed)
 
 
 def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
-    pose = standing_pose(obstacle)
+    pose = standing_pose(obstacle) if obstacle.appears_within is None else hidden_pose(obstacle)
     shapes = (Shape(geometry=Box(size=obstacle.size), rgba=_OBSTACLE_RGBA),)
-    if obstacle.appears_within is not None:
-        hidden = hidden_pose(obstacle)
-        return PlacedBody(name=obstacle.name, T_world_body=hidden, shapes=shapes, friction=obstacle.friction)
-    if obstacle.route is not None:
-        return PlacedBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
-    if obstacle.mass is None:
-        return StaticBody(name=obstacle.name, T_world_body=pose, shapes=shapes, friction=obstacle.friction)
-    return FreeBody(
-        name=obstacle.name, T_world_body=pose, shapes=shapes, mass=obstacle.mass, friction=obstacle.friction
-    )
+    name, friction = obstacle.name, obstacle.friction
+    if obstacle.mass is not None:
+        return FreeBody(name=name, T_world_body=pose, shapes=shapes, mass=obstacle.mass, friction=friction)
+    moves = obstacle.appears_within is not None or obstacle.route is not None
+    kind = PlacedBody if moves else StaticBody
+    return kind(name=name, T_world_body=pose, shapes=shapes, friction=friction)
 
 
 def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
     """Return the map a robot localises on, or None.
 
     Raises:
-        MapError: There is none, or it does not cover the arena.
+        MapError: It cannot be read, or does not cover the arena.
     """
     if not isinstance(robot.localisation, AmclLocalisation):
         return None
-    name = robot.localisation.map
-    if name is None and arena is None:
-        raise MapError(
-            f"robot '{robot.id}' localises with amcl but names no map, and there is no arena with one"
-        )
-    if name is None:
-        assert arena is not None
+    if robot.localisation.map is None:
+        assert arena is not None  # as the scenario's checks say
         return map_of_arena(arena)
-    path = named_map(name)
+    path = named_map(robot.localisation.map)
     grid = OccupancyMap.load(path)
     if arena is not None:
         height, width = grid.data.shape
         hall = arena.file.hall
         x0, y0 = grid.origin.x, grid.origin.y
         x1, y1 = x0 + width * grid.resolution, y0 + height * grid.resolution
-        slack = 2.0 * grid.resolution
-        if (
-            x0 > hall.x[0] + slack
-            or y0 > hall.y[0] + slack
-            or x1 < hall.x[1] - slack
-            or y1 < hall.y[1] - slack
-        ):
+        if max(x0 - hall.x[0], y0 - hall.y[0], hall.x[1] - x1, hall.y[1] - y1) > 2.0 * grid.resolution:
             raise MapError(
                 f"{path}: the map covers x {x0:.2f} … {x1:.2f}, y {y0:.2f} … {y1:.2f} m, but the arena "
                 f"'{arena.name}' spans x {hall.x[0]:g} … {hall.x[1]:g}, y {hall.y[0]:g} … {hall.y[1]:g} m"
@@ -270,15 +232,6 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
 def _check_context(
     scenario: Scenario, scene: Scene, arena: Arena | None, stacks: Mapping[str, RobotStack]
 ) -> CheckContext:
-    zones = {}
-    if arena is not None:
-        for name, zone in arena.zones.items():
-            table = zone.table
-            zones[name] = (
-                Zone(centre=zone.pose, size=(zone.area.size_x, zone.area.size_y))
-                if table is None
-                else Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
-            )
     bottoms = {
         good.name: max(
             (_half_height(shape) - float(shape.T_body_geometry.xyz[2]) for shape in good.shapes), default=0.0
@@ -287,10 +240,16 @@ def _check_context(
     }
     return CheckContext(
         robots=tuple(stacks),
-        zones=zones,
+        zones={} if arena is None else {name: _zone(zone) for name, zone in arena.zones.items()},
         good_bottoms=bottoms,
         surroundings={name: surroundings(scene, stack) for name, stack in stacks.items()},
     )
+
+
+def _zone(zone: ArenaZone) -> Zone:
+    if (table := zone.table) is None:
+        return Zone(centre=zone.pose, size=(zone.area.size_x, zone.area.size_y))
+    return Zone(centre=table.pose, size=(table.depth, table.length), height=table.levels[0])
 
 
 def _half_height(shape: Shape) -> float:

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twin.geometry import Pose3
+from twin.nodes.missions.mission_node import MissionNode
 from twin.runtime.defaults.from_description import GRASP_FRAME
 from twin.runtime.payload import Payload
-from twin.runtime.stacks.missions import MissionHandle
+from twin.runtime.stacks.missions import IdleMission
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
@@ -24,7 +25,11 @@ class Observer:
     """Gathers what must not be missed at every control tick, and fills an `Observation` now and then."""
 
     def __init__(
-        self, world: World, stacks: Sequence[RobotStack], mission: MissionHandle, goods: Sequence[str]
+        self,
+        world: World,
+        stacks: Sequence[RobotStack],
+        mission: MissionNode | IdleMission,
+        goods: Sequence[str],
     ) -> None:
         self._world = world
         self._stacks = stacks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
-from twin.runtime.saved_maps import save_maps
+from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -187,7 +187,7 @@ class OpenRun:
         with self._ending:
             verdict = self._verdict()
             if self._out is not None:
-                save_maps(self.run.parts.stacks, self._out)
+                _save_maps(self.run.parts.stacks, self._out)
             if self._sink is not None:
                 self._sink.close(verdict.to_dict())
         return verdict
@@ -248,6 +248,25 @@ def run(
         return started.finish()
     finally:
         started.close()
+
+
+def _save_maps(stacks: Mapping[str, RobotStack], folder: Path) -> None:
+    """Write `map.yaml`, `map.pgm` and `map.posegraph` of the robot that maps; of several `<robot>_map`.
+
+    A robot that localises in a pose graph made none. Nothing is written where no map was published yet.
+    """
+    makers = {name: s.slam for name, s in stacks.items() if s.slam and s.slam.slam.mode == "mapping"}
+    for name, maker in makers.items():
+        grid = maker.fresh_map()
+        if grid is None:
+            continue
+        stem = "map" if len(stacks) == 1 else f"{name}_map"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            grid.save(folder / f"{stem}.yaml")
+            maker.slam.save(folder / f"{stem}.posegraph")
+        except OSError as fault:
+            raise RecordingError(f"{folder}: the map cannot be written there: {fault.strerror}") from fault
 
 
 def _save_model(parts: Parts, folder: Path) -> None:

@@ -7,14 +7,11 @@ from collections.abc import Iterator
 from twin.models.kinematics import link_poses
 from twin.models.shapes import Box
 from twin.navigation.costmaps.footprint import radii
+from twin.runtime.defaults.from_description import scan_lidar
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import Surroundings
-from twin.sensors.lidar import LidarSpec
 from twin.sim.scene import Scene
 from twin.warehouse.footprint import Rectangle
-
-_SCAN = "scan"
-"""The topic of the lidar that maps are made from."""
 
 
 def surroundings(scene: Scene, stack: RobotStack) -> Surroundings:
@@ -25,13 +22,13 @@ def surroundings(scene: Scene, stack: RobotStack) -> Surroundings:
         stack: The robot.
     """
     description = stack.handle.description
-    lidars = [s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == _SCAN]
+    lidar = scan_lidar(description)
     solids: tuple[Rectangle, ...] = ()
-    if lidars:
-        T_root_lidar = link_poses(description)[lidars[0].link]
-        solids = tuple(_sections(scene, stack.spawn_height + float(T_root_lidar.xyz[2])))
+    if lidar is not None:
+        T_root_lidar = link_poses(description)[lidar.link]
+        solids = tuple(_sections(scene, stack.context.spawn_height + float(T_root_lidar.xyz[2])))
     radius = radii(stack.footprint)[0] if len(stack.footprint) > 2 else 0.0
-    return Surroundings(solids=solids, start=stack.start, radius=radius)
+    return Surroundings(solids=solids, start=stack.context.start, radius=radius)
 
 
 def _sections(scene: Scene, height: float) -> Iterator[Rectangle]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from twin.errors import nearest
 from twin.periods import period_of
 from twin.scenario.faults import RobotFault
+from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.scenario.missions import (
     Behaviors,
     Explore,
@@ -59,10 +60,9 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
         yield Fault(("physics", "control_period"), text)
         return
     rates: list[tuple[Loc, str, float]] = []
+    poses_hz = scenario.recording.poses_hz
     if scenario.recording.enabled:
-        rates.append(
-            (("recording", "poses_hz"), "the rate of the recorded poses", scenario.recording.poses_hz)
-        )
+        rates.append((("recording", "poses_hz"), "the rate of the recorded poses", poses_hz))
     if isinstance(scenario.mission, R2D2StatePublisher):
         rates.append((("mission", "rate"), "the rate of the publisher", scenario.mission.rate))
     for loc, what, rate in rates:
@@ -84,13 +84,10 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
         return
     message = "needs an arena; name one as world.arena"
     for i, robot in enumerate(scenario.robots):
+        localisation = robot.localisation
         if robot.start is not None:
             yield Fault(("robots", i, "start"), f"the start '{robot.start}' {message}")
-        if (
-            robot.localisation is not None
-            and robot.localisation.type == "amcl"
-            and robot.localisation.map is None
-        ):
+        if isinstance(localisation, AmclLocalisation) and localisation.map is None:
             yield Fault(("robots", i, "localisation"), f"amcl without a map {message}, or a map")
     for i, good in enumerate(scenario.world.goods):
         yield Fault(("world", "goods", i), f"the good '{good.name}' {message}")
@@ -109,32 +106,31 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, Idle):
         return
     robots = [robot.id for robot in scenario.robots]
-    if mission.robot is None:
-        if len(robots) > 1:
-            yield Fault(("mission",), f"the mission must name its robot; valid: {', '.join(robots)}")
-        return
+    yield from _robot(mission.robot, robots, ("mission",), "the mission")
     if mission.robot not in robots:
-        yield Fault(
-            ("mission", "robot"), f"unknown robot '{mission.robot}'; {nearest(mission.robot, robots)}"
-        )
         return
     index = robots.index(mission.robot)
     at, robot = ("robots", index), scenario.robots[index]
     if isinstance(mission, R2D2StatePublisher) and robot.base != "kinematic":
         yield Fault((*at, "base"), "the mission r2d2_state_publisher needs the base 'kinematic'")
-    if isinstance(mission, Explore) and (
-        robot.navigation is None or robot.localisation is None or robot.localisation.type != "slam"
-    ):
-        yield Fault(
-            at,
-            f"the mission explore needs a navigation of robot '{robot.id}' and its localisation of type slam",
-        )
+    maps = isinstance(robot.localisation, SlamLocalisation)
+    if isinstance(mission, Explore) and not (maps and robot.navigation is not None):
+        needs = f"needs a navigation of robot '{robot.id}' and its localisation of type slam"
+        yield Fault(at, f"the mission explore {needs}")
     if isinstance(mission, PickAndPlace | RandomGoals) and robot.navigation is None:
         yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
-    if isinstance(mission, RandomGoals) and (robot.localisation is None or robot.localisation.type != "amcl"):
+    if isinstance(mission, RandomGoals) and not isinstance(robot.localisation, AmclLocalisation):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
     if isinstance(mission, Behaviors):
         yield from _behaviors(mission, robot)
+
+
+def _robot(name: str | None, robots: list[str], loc: Loc, what: str) -> Iterator[Fault]:
+    """Yield why a name does not mean a robot; without one it is the only one."""
+    if name is None and len(robots) > 1:
+        yield Fault(loc, f"{what} must name its robot, there are several; valid: {', '.join(robots)}")
+    elif name is not None and name not in robots:
+        yield Fault((*loc, "robot"), f"unknown robot '{name}'; {nearest(name, robots)}")
 
 
 def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
@@ -155,11 +151,7 @@ def _faults(scenario: Scenario) -> Iterator[Fault]:
         config, loc = entry.config, ("faults", i, entry.kind)
         if not isinstance(config, RobotFault):
             continue
-        if config.robot is None and len(robots) > 1:
-            names = ", ".join(robots)
-            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
-        elif config.robot is not None and config.robot not in robots:
-            yield Fault((*loc, "robot"), f"unknown robot '{config.robot}'; {nearest(config.robot, robots)}")
+        yield from _robot(config.robot, robots, loc, entry.kind)
         if config.at >= scenario.duration:
             yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
 
@@ -172,11 +164,8 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
-        if robot is not None and robot not in robots:
-            yield Fault((*loc, "robot"), f"unknown robot '{robot}'; {nearest(robot, robots)}")
-        if "robot" in subjects and robot is None and len(robots) > 1 and entry.kind != "no_collision":
-            names = ", ".join(robots)
-            yield Fault(loc, f"{entry.kind} must name its robot, there are several; valid: {names}")
+        if robot is not None or ("robot" in subjects and entry.kind != "no_collision"):
+            yield from _robot(robot, robots, loc, entry.kind)
         subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
         if subject is not None and "robot" in subjects:
             yield from _lacking(entry, subject, loc)
@@ -191,6 +180,6 @@ def _lacking(entry: CheckEntry, robot: RobotConfig, loc: Loc) -> Iterator[Fault]
     """Yield what a robot has not got that a check is about."""
     if entry.kind == "recoveries" and robot.navigation is None:
         yield Fault(loc, f"recoveries needs a navigation of robot '{robot.id}'")
-    slam = robot.localisation is not None and robot.localisation.type == "slam"
-    if entry.kind in ("map_accuracy", "map_coverage") and not slam:
+    maps = isinstance(robot.localisation, SlamLocalisation)
+    if entry.kind in ("map_accuracy", "map_coverage") and not maps:
         yield Fault(loc, f"{entry.kind} needs the localisation of robot '{robot.id}' of type slam")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from twin.navigation.control.dwb.config import DWBConfig, ScaleConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
@@ -19,10 +19,11 @@ from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRES
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.parameters.declaration import fields_of
 from twin.plugins import Kind
+from twin.scenario.fields import faultless
 from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
 from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_choice, plugin_name
 from twin.scenario.plugins import PluginUse
-from twin.strict_yaml import Fault, Faults
+from twin.strict_yaml import Fault
 
 
 def _not_the_first(name: str) -> str:
@@ -124,13 +125,7 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
         """Whether the rotation shim is in front of it."""
         return self.chosen in ("dwb", "mppi") if self.rotation_shim is None else self.rotation_shim
 
-    @model_validator(mode="after")
-    def _keys_of_the_plugin(self) -> ControllerParameters:
-        faults = list(self._foreign())
-        if faults:
-            raise Faults(faults)
-        return self
-
+    @faultless
     def _foreign(self) -> Iterator[Fault]:
         if self.chosen == "rotation_shim":
             yield Fault(("plugin",), "the rotation shim stands before a plugin: write 'rotation_shim: true'")
@@ -163,12 +158,7 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
 class FurtherControllerParameters(ControllerParameters):
     """Parameters of a controller beside FollowPath, and of a goal checker of the same name."""
 
-    @model_validator(mode="after")
-    def _keys_of_no_server(self) -> FurtherControllerParameters:
-        faults = [
-            Fault((name,), f"'{name}' holds for all controllers: give it under `controller`")
-            for name in sorted(self.model_fields_set & set(ServerParameters.model_fields))
-        ]
-        if faults:
-            raise Faults(faults)
-        return self
+    @faultless
+    def _of_the_server(self) -> Iterator[Fault]:
+        for name in sorted(self.model_fields_set & set(ServerParameters.model_fields)):
+            yield Fault((name,), f"'{name}' holds for all controllers: give it under `controller`")

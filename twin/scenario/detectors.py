@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from twin.geometry import Array, Pose2
 from twin.navigation.docking.detectors import Detector
 from twin.plugins import Kind, Plugin, require_finite
-from twin.scenario.plugins import OneOfKind, model_of
+from twin.scenario.plugins import OneOfKind, with_shipped
 
 DETECTORS: Kind[Detector] = Kind(
     "detector", base="twin.navigation.docking.detectors:Detector", group="twin.detectors"
@@ -16,7 +15,8 @@ DETECTORS: Kind[Detector] = Kind(
 DETECTORS.register("box_faces", "twin.navigation.docking.detectors:BoxFaces")
 
 
-class AnyDetector(OneOfKind):
+@with_shipped
+class DetectorEntry(OneOfKind):
     """One detector: exactly one of these keys, or the name of a detector of a user."""
 
     of = DETECTORS
@@ -43,9 +43,3 @@ class _GuardedDetector(Detector):
             raise self._plugin.error("must return a list of Pose2 from detect(points)")
         require_finite(self._plugin, "a pose", [value for p in found for value in (p.x, p.y, p.yaw)])
         return found
-
-
-if TYPE_CHECKING:
-    DetectorEntry = AnyDetector
-else:
-    DetectorEntry = model_of("DetectorEntry", AnyDetector)

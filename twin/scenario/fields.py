@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,6 +59,17 @@ def known(what: str, catalogue: Callable[[], Collection[str]]) -> AfterValidator
         raise Faults([Fault((), f"no {what} '{value}': neither a file nor known; {nearest(value, names)}")])
 
     return AfterValidator(check)
+
+
+def faultless(find: Callable[[Any], Iterable[Fault]]) -> Any:
+    """Return the validator of a model in which nothing may be found."""
+
+    def check(model: Any) -> Any:
+        if faults := tuple(find(model)):
+            raise Faults(faults)
+        return model
+
+    return model_validator(mode="after")(check)
 
 
 NameOrPath = Annotated[str, AfterValidator(_beside_the_file)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import (
     ConfigDict,
@@ -219,14 +219,6 @@ MISSIONS: Kind[MissionNode] = Kind(
     "mission", base="twin.nodes.missions.mission_node:MissionNode", group="twin.missions"
 )
 
-MISSIONS.register("pick_and_place", "twin.runtime.stacks.missions:pick_and_place")
-MISSIONS.register("behaviors", "twin.runtime.stacks.missions:behaviors")
-MISSIONS.register("random_goals", "twin.runtime.stacks.missions:random_goals")
-MISSIONS.register("velocity_profile", "twin.runtime.stacks.missions:velocity_profile")
-MISSIONS.register("r2d2_state_publisher", "twin.runtime.stacks.missions:r2d2_state_publisher")
-MISSIONS.register("explore", "twin.runtime.stacks.missions:explore")
-MISSIONS.register("idle", "twin.runtime.stacks.missions:idle")
-
 
 class UserMission(StrictModel):
     """A mission of your own; its other keys are its parameters."""
@@ -256,12 +248,9 @@ class _OrAUsers:
     def _validate(self, data: Any, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if isinstance(data, StrictModel):
             return data
-        name = data.get("type") if isinstance(data, Mapping) else None
-        if (
-            not isinstance(name, str)
-            or not (":" in name or name in MISSIONS.names())
-            or name in MISSIONS.shipped
-        ):
+        named = data.get("type") if isinstance(data, Mapping) else None
+        name = named if isinstance(named, str) else ""
+        if name in MISSIONS.shipped or not (":" in name or name in MISSIONS.names()):
             # Through JSON again: what comes to a validator is Python's, whose lists are strictly no tuples.
             return _SHIPPED.validate_json(to_json(data), strict=True, context=info.context)
         params = {key: value for key, value in data.items() if key not in ("type", "robot")}
@@ -269,19 +258,10 @@ class _OrAUsers:
         return UserMission.model_validate({**data, "type": used.reference}, strict=True)
 
 
-_Shipped = Annotated[
-    PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle,
-    Field(discriminator="type"),
-]
+_Ships = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle
+for _mission in get_args(_Ships):
+    (_name,) = get_args(_mission.model_fields["type"].annotation)
+    MISSIONS.register(_name, f"twin.runtime.stacks.missions:{_name}")
+_Shipped = Annotated[_Ships, Field(discriminator="type")]
 _SHIPPED: TypeAdapter[Any] = TypeAdapter(_Shipped)
-Mission = Annotated[
-    PickAndPlace
-    | Behaviors
-    | RandomGoals
-    | VelocityProfile
-    | R2D2StatePublisher
-    | Explore
-    | Idle
-    | UserMission,
-    _OrAUsers(),
-]
+Mission = Annotated[_Ships | UserMission, _OrAUsers()]

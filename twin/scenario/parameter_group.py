@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field, create_model
 
+from twin.errors import ScenarioError
+from twin.parameters import Derived
+from twin.parameters import NameOrPath as IsNameOrPath
 from twin.parameters.declaration import Declaration, fields_of
+from twin.parameters.placed import overridden
 from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
 
+C = TypeVar("C")
 G = TypeVar("G", bound="ParameterGroup")
 
 
@@ -34,6 +39,17 @@ class ParameterGroup(StrictModel):
             name: value.overrides() if isinstance(value, ParameterGroup) else value
             for name, value in given.items()
         }
+
+    def over(self, config: C) -> C:
+        """Return a config with those of the given parameters that are its own.
+
+        Raises:
+            ScenarioError: they cannot be together.
+        """
+        try:
+            return overridden(config, self.overrides())
+        except ValueError as error:
+            raise ScenarioError(str(error)) from error
 
 
 def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:
@@ -61,13 +77,9 @@ def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]
     return decorate
 
 
+@cache
 def group_of(config: type) -> type[ParameterGroup]:
     """Return the group of a config that needs no other keys than its own."""
-    return _group_of(config)
-
-
-@cache
-def _group_of(config: type) -> type[ParameterGroup]:
     name = f"{config.__name__.removesuffix('Config')}Parameters"
     body = {"__doc__": config.__doc__, "__module__": config.__module__}
     return keys_of(config)(type(name, (ParameterGroup,), body))
@@ -78,7 +90,7 @@ def _keyed(config: type) -> Iterator[Declaration]:
     for declaration in fields_of(config).values():
         if declaration.config is not None and not declaration.name:
             yield from _keyed(declaration.config)
-        elif not declaration.is_derived:
+        elif Derived not in declaration.markers:
             yield declaration
 
 
@@ -90,7 +102,7 @@ def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | 
     domain = declaration.domain
     if domain is None:
         return None
-    kind: Any = NameOrPath if declaration.is_path else Annotated[domain.annotation, domain]
+    kind: Any = NameOrPath if IsNameOrPath in declaration.markers else Annotated[domain.annotation, domain]
     if whole and declaration.is_required:
         return kind, Field(description=declaration.text)
     if whole:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, get_type_hints
+from typing import Annotated, Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import (
     AfterValidator,
@@ -24,6 +24,8 @@ from twin.plugins import Kind, Plugin
 from twin.scenario.fields import OneOf
 from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
 
+K = TypeVar("K", bound="OneOfKind")
+
 
 class PluginUse(StrictModel):
     """A plugin that a scenario names, with its parameters as they stand there."""
@@ -41,12 +43,8 @@ class PluginUse(StrictModel):
         try:
             return configured(plugin, self.params)
         except Faults as wrong:
-            raise PluginError(
-                [
-                    plugin.error(f"has a wrong parameter: {fault.message}").problems[0]
-                    for fault in wrong.faults
-                ]
-            ) from None
+            errors = [plugin.error(f"has a wrong parameter: {fault.message}") for fault in wrong.faults]
+            raise PluginError([error.problems[0] for error in errors]) from None
 
 
 def reference(kind: Kind[Any]) -> AfterValidator:
@@ -179,14 +177,13 @@ class OneOfKind(OneOf):
         return plugin, given if isinstance(given, config) else config(**_given(given))
 
 
-def model_of(name: str, base: type[OneOfKind]) -> type[OneOfKind]:
-    """Return the schema of a `OneOfKind`, with a field for each thing that ships, and any other name."""
-    kind = base.of
+def with_shipped(base: type[K]) -> type[K]:
+    """Return a `OneOfKind` with a key for each thing that ships, beside any other name."""
     fields: dict[str, Any] = {}
-    for shipped in kind.shipped:
-        config = kind.find(shipped).config
+    for shipped in base.of.shipped:
+        config = base.of.find(shipped).config
         assert config is not None
         model = config if issubclass(config, StrictModel) else _schema(config)
         summary = (config.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
         fields[shipped] = (Annotated[model | None, Field(description=summary)], None)
-    return create_model(name, __base__=base, __doc__=base.__doc__, **fields)
+    return create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)

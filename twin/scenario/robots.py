@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
-
-from pydantic import model_validator
 
 from twin.models.catalogue import catalogue
 from twin.parameters import NotNegative, Seconds
 from twin.scenario.detectors import DetectorEntry
-from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, known
+from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, faultless, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.scenario.navigation import NavigationConfig
-from twin.strict_yaml import Fault, Faults, StrictModel
+from twin.strict_yaml import Fault, StrictModel
 
 
 class RobotConfig(StrictModel):
@@ -52,16 +50,11 @@ class RobotConfig(StrictModel):
         """Whether something estimates the pose in `map`."""
         return self.localisation is not None and self.localisation.type != "none"
 
-    @model_validator(mode="after")
-    def _parts_fit(self) -> RobotConfig:
-        faults = []
+    @faultless
+    def _parts_fit(self) -> Iterator[Fault]:
         if self.pose is not None and self.start is not None:
-            faults.append(Fault(("start",), "give the robot either a pose or the name of a start, not both"))
+            yield Fault(("start",), "give the robot either a pose or the name of a start, not both")
         if self.navigation is not None and not self.is_localised:
-            message = "navigation needs a localisation of type odometry, amcl or slam"
-            faults.append(Fault(("navigation",), message))
+            yield Fault(("navigation",), "navigation needs a localisation of type odometry, amcl or slam")
         if self.navigation is not None and self.base != "free":
-            faults.append(Fault(("base",), f"navigation needs the base 'free', not '{self.base}'"))
-        if faults:
-            raise Faults(faults)
-        return self
+            yield Fault(("base",), f"navigation needs the base 'free', not '{self.base}'")

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
@@ -15,13 +15,13 @@ from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
-from twin.scenario.fields import RosName
+from twin.scenario.fields import RosName, faultless
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import Faults, StrictModel
+from twin.strict_yaml import StrictModel
 from twin.strict_yaml import load as load_yaml
 
 
@@ -53,12 +53,7 @@ class Scenario(StrictModel):
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
 
-    @model_validator(mode="after")
-    def _parts_fit(self) -> Scenario:
-        faults = tuple(consistency.faults(self))
-        if faults:
-            raise Faults(faults)
-        return self
+    _parts_fit = faultless(consistency.faults)
 
     def with_params_file(self, path: Path) -> Scenario:
         """Return the scenario with one Nav2 parameter file for every robot that navigates.

@@ -54,20 +54,8 @@ class Verdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `verdict.json`."""
-        return {
-            "scenario": self.scenario,
-            "seed": self.seed,
-            "verdict": self.verdict,
-            "error": self.error,
-            "checks": [asdict(check) for check in self.checks],
-            "metrics": dict(self.metrics),
-            "digest": self.digest,
-            "deterministic": self.deterministic,
-            "clock": self.clock,
-            "versions": dict(self.versions),
-            "plugins": dict(self.plugins),
-            "cpu": self.cpu,
-        }
+        first = {"scenario": self.scenario, "seed": self.seed, "verdict": self.verdict, "error": self.error}
+        return first | asdict(self) | {"checks": [asdict(check) for check in self.checks]}
 
     def to_json(self) -> str:
         """Return `verdict.json`; numbers that are not finite become null, as JSON has none."""

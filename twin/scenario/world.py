@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from twin.parameters import Hertz, Kilograms, Metres, MetresPerSecond, NotNegative, Positive, Seconds
-from twin.scenario.fields import NameOrPath, PoseConfig, RosName, known
-from twin.strict_yaml import Fault, Faults, StrictModel
+from twin.scenario.fields import NameOrPath, PoseConfig, RosName, faultless, known
+from twin.strict_yaml import Fault, StrictModel
 from twin.warehouse.catalogue import catalogue
 
 Length = Annotated[Metres, Positive]
@@ -39,15 +40,13 @@ class Obstacle(StrictModel):
     patience: Annotated[Seconds, NotNegative] = 3.0
     """... and turns back when that has lasted so long [s]."""
 
-    @model_validator(mode="after")
-    def _appears_or_moves(self) -> Obstacle:
+    @faultless
+    def _appears_or_moves(self) -> Iterator[Fault]:
         if self.route is not None and (self.mass is not None or self.appears_within is not None):
-            message = "an obstacle that walks is there from the start and cannot be pushed"
-            raise Faults([Fault(("route",), message)])
-        if self.appears_within is not None and self.mass is not None:
-            message = "an obstacle that appears later cannot be pushed; give it no mass"
-            raise Faults([Fault(("appears_within",), message)])
-        return self
+            yield Fault(("route",), "an obstacle that walks is there from the start and cannot be pushed")
+        elif self.appears_within is not None and self.mass is not None:
+            said = "an obstacle that appears later cannot be pushed; give it no mass"
+            yield Fault(("appears_within",), said)
 
 
 class GoodOverride(StrictModel):
@@ -59,6 +58,11 @@ class GoodOverride(StrictModel):
     """Mass [kg]."""
     friction: Annotated[float, NotNegative] | None = None
     """Coulomb coefficient; of a good and a gripper's pads the lower one counts."""
+
+    @property
+    def properties(self) -> dict[str, Any]:
+        """What is given."""
+        return self.model_dump(exclude={"name"}, exclude_none=True)
 
 
 class WorldConfig(StrictModel):

@@ -15,7 +15,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import LaserScan, Twist
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Sample
-from twin.geometry import Array, Pose2, Pose3, wrap_angle
+from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 from twin.runtime.build import build
 from twin.runtime.run import Run
@@ -106,11 +106,7 @@ class Bench:
 
     def carry(self, pose: Pose2) -> None:
         """Put the robot somewhere else; its wheels notice nothing."""
-        model, data, place = (
-            self._world.model,
-            self._world.data,
-            Pose3.from_pose2(pose, self.stack.spawn_height),
-        )
+        model, data, place = self._world.model, self._world.data, self.stack.standing(pose)
         joint = model.body(self.stack.handle.base).jntadr[0]
         position, velocity = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
         data.qpos[position : position + 7] = (*place.xyz, *place.quat_wxyz)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig
@@ -22,11 +21,11 @@ from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.plugins import CONTROLLERS, CRITICS, GOAL_CHECKERS, PROGRESS_CHECKERS, config_of
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.parameters.declaration import names_of
-from twin.runtime.defaults.overrides import overridden
 from twin.scenario.controllers import ControllerParameters
 from twin.scenario.plugin_groups import config_of_use
 from twin.scenario.plugins import PluginUse
 
+_FIRST, _GOAL_CHECKER = "FollowPath", "general_goal_checker"
 _PERIOD_NS = 60_000_000
 _PATIENCE_NS = 4_000_000_000
 """How long somebody in the way is waited for: until they have walked past, or are planned around."""
@@ -50,50 +49,74 @@ def controller_server_config(
         smoother: Its limits are the controllers'.
         further: More controllers, by id; each brings a goal checker of the same id.
     """
-    overrides, by_id = parameters.overrides(), {"FollowPath": parameters, **(further or {})}
+    by_id = {_FIRST: parameters, **(further or {})}
     server = ControllerServerConfig(
+        controllers={},
         goal_checkers={
-            "general_goal_checker" if name == "FollowPath" else name: _goal_checker(one)
-            for name, one in by_id.items()
+            _GOAL_CHECKER if name == _FIRST else name: _goal_checker(by_id[name]) for name in by_id
         },
         progress_checkers={"progress_checker": _progress_checker(parameters)},
         controller_period_ns=_PERIOD_NS,
-        maneuver=ManeuverConfig() if parameters.maneuvers is not False else ManeuverConfig(reach=0.0),
         failure_tolerance_ns=_PATIENCE_NS,
     )
-    server = overridden(server, overrides)
-    period = server.controller_period_ns * 1e-9
+    server = with_scenario(server, by_id)
+    controllers = {name: _controller(name, one, smoother, server) for name, one in by_id.items()}
+    return with_scenario(replace(server, controllers=controllers), by_id)
+
+
+def with_scenario(
+    server: ControllerServerConfig, by_id: Mapping[str, ControllerParameters]
+) -> ControllerServerConfig:
+    """Return the server's parameters with what a scenario gives of them.
+
+    Args:
+        server: The server.
+        by_id: What the scenario says of `FollowPath`, and of further controllers.
+    """
+
+    def given(configs: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: by_id.get(name, first).over(one) for name, one in configs.items()}
+
+    first = by_id[_FIRST]
+    if first.maneuvers is not None:
+        reach = ManeuverConfig().reach if first.maneuvers else 0.0
+        server = replace(server, maneuver=replace(server.maneuver, reach=reach))
     return replace(
-        server, controllers={name: _controller(one, smoother, period) for name, one in by_id.items()}
+        first.over(server),
+        controllers=given(server.controllers),
+        goal_checkers=given(server.goal_checkers),
+        progress_checkers=given(server.progress_checkers),
     )
 
 
-def _controller(parameters: ControllerParameters, smoother: VelocitySmootherConfig, period: float) -> Any:
-    overrides = parameters.overrides()
+def _controller(
+    name: str,
+    parameters: ControllerParameters,
+    smoother: VelocitySmootherConfig,
+    server: ControllerServerConfig,
+) -> Any:
     controller: Any
     if parameters.users is not None:
         controller = config_of_use(CONTROLLERS, parameters.users)
     elif parameters.chosen == "mppi":
-        controller = overridden(_mppi(parameters, smoother, period), overrides)
+        controller = _mppi(parameters, smoother, server.controller_period_ns * 1e-9)
     elif parameters.chosen == "dwb":
-        controller = overridden(_dwb(parameters, smoother), overrides)
+        controller = _dwb(parameters, smoother)
     else:
-        tolerance = getattr(
-            _goal_checker(parameters), names_of(GoalCheckerConfig).xy_goal_tolerance, _TOLERANCE
-        )
-        controller = overridden(_pure_pursuit(smoother, tolerance), overrides)
+        checker = server.goal_checkers[_GOAL_CHECKER if name == _FIRST else name]
+        tolerance = getattr(checker, names_of(GoalCheckerConfig).xy_goal_tolerance, _TOLERANCE)
+        controller = _pure_pursuit(smoother, tolerance)
     if parameters.listed:
         own = {name: config_of_use(CRITICS, used) for name, used in parameters.listed.items()}
         controller = replace(controller, own_critics=own)
     if not parameters.shim:
         return controller
-    shim = RotationShimConfig(
+    return RotationShimConfig(
         primary_controller=controller,
         rotate_to_heading_angular_vel=min(_TURN, smoother.angular.max_velocity),
         max_angular_accel=_TURN,
         rotate_to_goal_heading=True,
     )
-    return overridden(shim, overrides)
 
 
 def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> RegulatedPurePursuitConfig:
@@ -109,7 +132,7 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         rotate_to_heading_min_angle=0.6,
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
-        max_linear_decel=_braking(smoother.linear),
+        max_linear_decel=smoother.linear.braking,
         cost_scaling_dist=0.7,
     )
 
@@ -130,7 +153,7 @@ def _mppi(parameters: ControllerParameters, smoother: VelocitySmootherConfig, pe
         vx_min=-0.15,
         wz_max=angular.max_velocity,
         ax_max=linear.max_acceleration,
-        ax_min=-_braking(linear),
+        ax_min=-linear.braking,
         az_max=angular.max_acceleration,
         vx_std=max(0.2, 0.2 * speed),
         noise_time_constant=0.6,
@@ -152,14 +175,10 @@ def _dwb(parameters: ControllerParameters, smoother: VelocitySmootherConfig) -> 
         max_vel_x=linear.max_velocity,
         max_vel_theta=angular.max_velocity,
         acc_lim_x=linear.max_acceleration,
-        decel_lim_x=-_braking(linear),
+        decel_lim_x=-linear.braking,
         acc_lim_theta=angular.max_acceleration,
-        decel_lim_theta=-_braking(angular),
+        decel_lim_theta=-angular.braking,
     )
-
-
-def _braking(limits: AxisLimits) -> float:
-    return limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
 
 
 def _goal_checker(parameters: ControllerParameters) -> Any:
@@ -171,11 +190,11 @@ def _goal_checker(parameters: ControllerParameters) -> Any:
     )
     if isinstance(near, GoalCheckerConfig):
         near = replace(near, yaw_goal_tolerance=_TOLERANCE)
-    return overridden(near, parameters.overrides())
+    return near
 
 
 def _progress_checker(parameters: ControllerParameters) -> Any:
     chosen = parameters.progress_checker or "simple"
     if isinstance(chosen, PluginUse):
         return config_of_use(PROGRESS_CHECKERS, chosen)
-    return overridden(config_of(PROGRESS_CHECKERS.find(chosen))(), parameters.overrides())
+    return config_of(PROGRESS_CHECKERS.find(chosen))()

@@ -13,9 +13,12 @@ from twin.manipulation.trajectory import JointLimits
 from twin.models.description import Joint, RobotDescription
 from twin.models.kinematics import link_poses
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
+from twin.sensors.lidar import LidarSpec
 
 GRASP_FRAME = "grasp_frame"
 """Link between the fingers of a robot that can grasp."""
+SCAN = "scan"
+"""Topic of the lidar that maps are made from, and by which robots drive."""
 
 _ARM_ACCELERATION = 1.0
 """Of arm joints [m/s² or rad/s²]; URDF has no such limit."""
@@ -60,6 +63,11 @@ def wheels(description: RobotDescription) -> frozenset[str]:
         if joint.type == "continuous" and joint.name not in description.commands and joint.mimic is None
     )
     return frozenset((*drive.left_joints, *drive.right_joints, *free))
+
+
+def scan_lidar(description: RobotDescription) -> LidarSpec | None:
+    """Return the lidar on `scan`, if the robot has it."""
+    return next((s for s in description.sensors if isinstance(s, LidarSpec) and s.topic == SCAN), None)
 
 
 def _corners(geometry: object) -> Array:

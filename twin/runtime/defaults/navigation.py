@@ -21,9 +21,7 @@ from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
-from twin.runtime.defaults.controllers import controller_server_config
-from twin.runtime.defaults.docking import docking_config
-from twin.runtime.defaults.overrides import overridden as overridden
+from twin.runtime.defaults import controllers, docking
 from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
 from twin.scenario.planners import PlannerParameters, SmootherParameters
 from twin.scenario.plugin_groups import config_of_use
@@ -90,40 +88,61 @@ def navigation_parameters(
         expected_update_rate=0.0 if scan_rate is None else _MISSED_SCANS / scan_rate,
     )
     smoother = _smoother(config, drive)
-    return NavigationParameters(
+    defaults = NavigationParameters(
         smoother=smoother,
         # A whole hall is a big message, and changes slowly: it is published at half of Nav2's rate.
-        global_costmap=_costmap(
-            CostmapNodeConfig(
-                name="global_costmap",
-                frame=frames.map,
-                layers=in_map,
-                update_period_ns=500_000_000,
-                publish_period_ns=2_000_000_000,
-            ),
-            config.global_costmap,
+        global_costmap=CostmapNodeConfig(
+            name="global_costmap",
+            frame=frames.map,
+            layers=_with_own(in_map, config.global_costmap),
+            update_period_ns=500_000_000,
+            publish_period_ns=2_000_000_000,
         ),
-        local_costmap=_costmap(
-            CostmapNodeConfig(name="local_costmap", frame=frames.odom, layers=around), config.local_costmap
+        local_costmap=CostmapNodeConfig(
+            name="local_costmap", frame=frames.odom, layers=_with_own(around, config.local_costmap)
         ),
         planner=_planner(config.planner, mapping=mapping),
-        planner_server=overridden(PlannerServerConfig(), config.planner.overrides()),
-        commitment=overridden(CommitmentConfig(), config.planner.overrides()),
-        goal_access=overridden(GoalAccessConfig(), config.planner.overrides()),
-        controller_server=controller_server_config(config.controller, smoother, config.controllers),
+        planner_server=PlannerServerConfig(),
+        commitment=CommitmentConfig(),
+        goal_access=GoalAccessConfig(),
+        controller_server=controllers.controller_server_config(
+            config.controller, smoother, config.controllers
+        ),
         behaviors=BehaviorConfig(footprint=polygon),
         path_smoother=_path_smoother(config.smoother),
-        docking=docking_config(config.docking),
-        navigator=_navigator(config.navigator),
+        docking=docking.docking_config(config.docking),
+        navigator=BtNavigatorConfig(),
         waypoints=WaypointFollowerConfig(),
+    )
+    return with_scenario(defaults, config)
+
+
+def with_scenario(parameters: NavigationParameters, config: NavigationConfig) -> NavigationParameters:
+    """Return parameters with what a scenario gives: it goes before a robot's defaults, and before a file."""
+    smoothers = parameters.path_smoother.smoothers
+    first = next(iter(smoothers))
+    by_id = {"FollowPath": config.controller, **config.controllers}
+    return replace(
+        parameters,
+        global_costmap=_costmap(parameters.global_costmap, config.global_costmap),
+        local_costmap=_costmap(parameters.local_costmap, config.local_costmap),
+        planner=config.planner.over(parameters.planner),
+        planner_server=config.planner.over(parameters.planner_server),
+        commitment=config.planner.over(parameters.commitment),
+        goal_access=config.planner.over(parameters.goal_access),
+        controller_server=controllers.with_scenario(parameters.controller_server, by_id),
+        path_smoother=replace(
+            parameters.path_smoother, smoothers={**smoothers, first: config.smoother.over(smoothers[first])}
+        ),
+        docking=docking.with_scenario(parameters.docking, config.docking),
+        navigator=_navigator(parameters.navigator, config.navigator),
     )
 
 
 def _planner(parameters: PlannerParameters, *, mapping: bool) -> Any:
     if parameters.users is not None:
         return config_of_use(PLANNERS, parameters.users)
-    planner = config_of(PLANNERS.find(parameters.plugin))(tolerance=0.1, allow_unknown=mapping)
-    return overridden(planner, parameters.overrides())
+    return config_of(PLANNERS.find(parameters.plugin))(tolerance=0.1, allow_unknown=mapping)
 
 
 def _path_smoother(parameters: SmootherParameters) -> SmootherServerConfig:
@@ -134,7 +153,7 @@ def _path_smoother(parameters: SmootherParameters) -> SmootherServerConfig:
         name = parameters.users.reference.rpartition(":")[2]
     else:
         name = parameters.plugin
-        chosen = overridden(shipped[name], parameters.overrides())
+        chosen = shipped[name]
     shipped.pop(name, None)
     return SmootherServerConfig(smoothers={name: chosen, **shipped})
 
@@ -161,8 +180,8 @@ def _smoother(config: NavigationConfig, drive: DriveSpec) -> VelocitySmootherCon
     )
 
 
-def _navigator(group: NavigatorParameters) -> BtNavigatorConfig:
-    config, frequency = overridden(BtNavigatorConfig(), group.overrides()), group.bt_loop_frequency
+def _navigator(config: BtNavigatorConfig, group: NavigatorParameters) -> BtNavigatorConfig:
+    config, frequency = group.over(config), group.bt_loop_frequency
     return config if frequency is None else replace(config, bt_loop_duration=max(1, round(1e3 / frequency)))
 
 
@@ -174,9 +193,13 @@ def _limits(speed: float, acceleration: float, deceleration: float, drive: float
     )
 
 
+def _with_own(layers: CostmapConfig, group: CostmapParameters) -> CostmapConfig:
+    return replace(
+        layers, own_layers={name: config_of_use(LAYERS, used) for name, used in group.listed.items()}
+    )
+
+
 def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     if group.robot_radius is not None:
         config = replace(config, layers=replace(config.layers, footprint=()))
-    own = {name: config_of_use(LAYERS, used) for name, used in group.listed.items()}
-    config = replace(config, layers=replace(config.layers, own_layers=own))
-    return overridden(config, group.overrides())
+    return group.over(config)

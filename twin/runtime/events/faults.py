@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from twin.bridge.bus import Bus
 from twin.errors import ScenarioError, nearest
-from twin.geometry import Pose3
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.faults import Displacement, EncoderFault, FaultEntry, Kidnapping, LidarFault, OdometryJump
@@ -67,7 +66,7 @@ def _events(entry: FaultEntry, stacks: Mapping[str, RobotStack]) -> Iterator[_Ev
                 end_ns = round((fault.at + fault.duration) * 1e9)
                 yield _Event(end_ns, f"{what} works again", partial(setattr, lidar, "failure", None))
         case Kidnapping():
-            to = Pose3.from_pose2(fault.to.pose, stack.spawn_height)
+            to = stack.standing(fault.to.pose)
             text = f"{stack.name} is carried to ({fault.to.x:g}, {fault.to.y:g})"
             if not stack.handle.is_free:
                 raise ScenarioError(f"robot '{stack.name}' cannot be carried away: its base is not free")

@@ -12,7 +12,6 @@ from twin.nodes.navigation.localisation.ekf_config import SOURCE, EkfNodeConfig,
 from twin.parameters.declaration import names_of
 from twin.runtime.parameter_files.absent import Absent
 from twin.runtime.parameter_files.localisation import EKF, corrects_map, differing, file_for
-from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.scenario.robots import RobotConfig
 
 _OUTPUT = "odometry/filtered"
@@ -90,12 +89,9 @@ def ekf_with_file(
         sources[name] = replace(source, topic=topic, bias_stddev=bias_stddevs.get(topic, source.bias_stddev))
     idle = [name for name, source in sources.items() if not any(source.config)]
     told = [f"{file.path.name}: {node} takes nothing from {', '.join(idle)}: config is false"] if idle else []
-    return replace(config, sources=sources), [*_finished(file, robot), *frames, *told]
-
-
-def _finished(file: Nav2Parameters, robot: RobotConfig) -> list[str]:
-    """Return what was not understood; of navigation's file other nodes are told elsewhere."""
-    return file.finish() if getattr(robot.odometry, "params_file", None) else file.ignored()
+    # Of navigation's file other nodes are told elsewhere.
+    missed = file.finish() if getattr(robot.odometry, "params_file", None) else file.ignored()
+    return replace(config, sources=sources), [*missed, *frames, *told]
 
 
 def _renamed(name: str) -> str:

@@ -16,13 +16,11 @@ from twin.navigation.control.collision_monitor_config import (
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
-from twin.runtime.defaults.overrides import overridden
+from twin.runtime.defaults.from_description import SCAN, scan_lidar
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.sensors.lidar import LidarSpec
 
 _GUARDED = "cmd_vel_muxed"
-_SCAN = "scan"
 _REACTION_S = 0.2
 """Age of a scan, and a command's way to the wheels."""
 
@@ -44,11 +42,9 @@ def build_commands(
         brakes: What its drive can do.
     """
     bus, namespace = context.bus, context.namespace
-    sensors = context.handle.description.sensors
     scans = config.scan_topics
     if scans is None:
-        there = any(isinstance(sensor, LidarSpec) and sensor.topic == _SCAN for sensor in sensors)
-        scans = (_SCAN,) if there else ()
+        scans = () if scan_lidar(context.handle.description) is None else (SCAN,)
     if not config.enabled or not (scans or config.range_topics):
         TwistMuxNode(bus, namespace=namespace)
         return
@@ -60,7 +56,7 @@ def build_commands(
         bus,
         pose,
         footprint,
-        replace(overridden(CollisionMonitorConfig(), config.overrides()), polygons=polygons),
+        replace(config.over(CollisionMonitorConfig()), polygons=polygons),
         brakes=brakes,
         hardest=_hardest(brakes.linear, context.handle.description.drive),
         cmd_vel_in=_GUARDED,
@@ -72,9 +68,8 @@ def build_commands(
 
 def _hardest(limits: AxisLimits, drive: DriveSpec | None) -> float:
     """Return how many times harder than in `limits` a drive brakes when it must."""
-    usual = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
     most = None if drive is None else drive.max_linear_acceleration
-    return max(1.0, (most or usual) / usual)
+    return max(1.0, (most or limits.braking) / limits.braking)
 
 
 def _approach(limits: AxisLimits) -> MonitorPolygon:
@@ -82,9 +77,8 @@ def _approach(limits: AxisLimits) -> MonitorPolygon:
 
     It lets the robot drive at d / T, d before an obstacle, which takes a deceleration of v / T.
     """
-    braking = limits.max_acceleration if limits.max_deceleration is None else limits.max_deceleration
     return replace(
         FOOTPRINT_APPROACH,
-        time_before_collision=round(limits.max_velocity / braking + _REACTION_S, 2),
+        time_before_collision=round(limits.max_velocity / limits.braking + _REACTION_S, 2),
         simulation_time_step=0.05,
     )

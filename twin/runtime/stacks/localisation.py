@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 from twin.geometry import Pose2
-from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
 from twin.nodes.navigation.localisation.static import StaticLocalisationNode
 from twin.nodes.navigation.mapping.config import SlamNodeConfig
@@ -15,7 +14,6 @@ from twin.nodes.navigation.mapping.map_saver import MapSaverNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
 from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 from twin.nodes.navigation.robot_pose import RobotPose
-from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file
 from twin.runtime.parameter_files.slam import slam_with_file
 from twin.runtime.stacks.context import StackContext
@@ -45,12 +43,10 @@ def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNod
 
 
 def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, guess: Pose2) -> None:
-    overrides = config.parameters.overrides()
     navigation = context.config.navigation
     file = navigation.params_file if navigation is not None else None
-    amcl = overridden(AmclConfig(), overrides)
     error = (config.initial_pose_error.xy, config.initial_pose_error.yaw)
-    parameters, not_understood = amcl_with_file(amcl, frozenset(overrides), file, context.namespace)
+    parameters, not_understood = amcl_with_file(config.parameters, file, context.namespace)
     node = AmclNode(
         context.bus,
         pose,
@@ -71,7 +67,7 @@ def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> S
         map_file_name=config.pose_graph or "",
         map_update_interval_ns=_MAP_UPDATE_INTERVAL_NS,
     )
-    node_config = overridden(node_config, config.parameters.overrides())
+    node_config = config.parameters.over(node_config)
     node_config, in_map, told = slam_with_file(node_config, context.config, pose.frames, context.namespace)
     start = config.map_start_pose.pose if config.map_start_pose else in_map or context.start
     guess = _initial_guess(start, config.initial_pose_error, context.seed, context.handle.name)

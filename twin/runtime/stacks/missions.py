@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from twin.bridge.action_types import (
     BackUp,
@@ -20,7 +20,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Point, duration, new
 from twin.bridge.types import ActionType
 from twin.errors import ScenarioError
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2
 from twin.navigation.costmaps import footprint as footprints
 from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.nodes.messages import pose_stamped
@@ -33,7 +33,6 @@ from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.parameters.declaration import fields_of
-from twin.runtime.defaults.navigation import overridden
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario import missions
 from twin.scenario.missions import (
@@ -53,26 +52,6 @@ from twin.strict_yaml import StrictModel
 from twin.warehouse.arena import Arena
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
 from twin.warehouse.skills import Station
-
-
-class MissionHandle(Protocol):
-    """What the runtime asks of a mission node."""
-
-    @property
-    def state(self) -> str:
-        """What it is doing."""
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended; a run ends with it."""
-
-    @property
-    def succeeded(self) -> bool | None:
-        """None until it has ended."""
-
-    @property
-    def reason(self) -> str:
-        """Why it failed."""
 
 
 class IdleMission:
@@ -99,29 +78,23 @@ class MissionContext:
 
 
 def build_mission(
-    bus: Bus,
-    mission: Mission,
-    stacks: Mapping[str, RobotStack],
-    arena: Arena | None,
-    namespaces: Mapping[str, str],
-    seed: int,
-    control_period_ns: int,
-) -> MissionHandle:
+    mission: Mission, stacks: Mapping[str, RobotStack], arena: Arena | None
+) -> MissionNode | IdleMission:
     """Return the scenario's mission as a node on the bus."""
     if isinstance(mission, Idle):
         return IdleMission()
-    name = mission.robot or next(iter(stacks))
+    robot = stacks[mission.robot or next(iter(stacks))]
     context = MissionContext(
-        bus=bus,
-        robot=stacks[name],
-        namespace=namespaces[name],
+        bus=robot.context.bus,
+        robot=robot,
+        namespace=robot.context.namespace,
         arena=arena,
-        seed=seed,
-        control_period_ns=control_period_ns,
+        seed=robot.context.seed,
+        control_period_ns=robot.context.control_period_ns,
     )
-    if not isinstance(mission, UserMission):
-        return MISSIONS.find(mission.type).create(context, mission)
     plugin = MISSIONS.find(mission.type)
+    if not isinstance(mission, UserMission):
+        return plugin.create(context, mission)
     made = plugin.create(context, mission.use.config(plugin))
     if not hasattr(made, "done"):
         raise plugin.error("does not call super().__init__(context.bus, namespace=context.namespace)")
@@ -136,8 +109,7 @@ def behaviors(context: MissionContext, mission: Behaviors) -> MissionNode:
 
 def random_goals(context: MissionContext, mission: RandomGoals) -> MissionNode:
     """Return a drive to random places."""
-    own = {name: getattr(mission, name) for name in fields_of(RandomGoalsConfig)}
-    goals = RandomGoalsConfig(**own)
+    goals = RandomGoalsConfig(**{name: getattr(mission, name) for name in fields_of(RandomGoalsConfig)})
     pose = context.robot.robot_pose
     return RandomGoalsNode(context.bus, pose, goals, seed=context.seed, namespace=context.namespace)
 
@@ -161,7 +133,7 @@ def r2d2_state_publisher(context: MissionContext, mission: R2D2StatePublisher) -
         rate_hz=mission.rate,
         degrees_per_cycle=mission.degrees_per_cycle,
         joints=tuple(stack.handle.description.commands),
-        move_base=lambda pose: stack.handle.set_kinematic_pose(Pose3.from_pose2(pose, stack.spawn_height)),
+        move_base=lambda pose: stack.handle.set_kinematic_pose(stack.standing(pose)),
         frames=stack.frames,
         namespace=context.namespace,
     )
@@ -210,16 +182,14 @@ def explore(context: MissionContext, mission: Explore) -> MissionNode:
     inner, outer = footprints.radii(stack.footprint)
     frontiers = FrontierConfig(robot_radius=outer, inscribed_radius=inner)
     defaults = ExplorerNodeConfig(explorer=ExplorerConfig(frontiers=frontiers))
-    config = overridden(defaults, mission.overrides())
-    node = ExplorerNode(bus, stack.robot_pose, config, namespace=namespace)
+    node = ExplorerNode(bus, stack.robot_pose, mission.over(defaults), namespace=namespace)
     return ExploreMissionNode(bus, node, namespace=namespace)
 
 
 def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNode:
     """Return the drive from tote to tote."""
     stack, arena = context.robot, context.arena
-    if arena is None:
-        raise ScenarioError("the mission pick_and_place needs an arena with totes; set world.arena")
+    assert arena is not None  # as the scenario's checks say
     if stack.manipulator is None or stack.navigator is None:
         lacks = "arm with a grasp_frame" if stack.manipulator is None else "navigation"
         raise ScenarioError(

@@ -17,17 +17,17 @@ from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.docking.server import DockingServerNode
 from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 from twin.nodes.navigation.planning.smoother_server import SmootherServerNode
-from twin.nodes.navigation.robot_pose import Frames, RobotPose
+from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.velocity.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
-from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
+from twin.runtime.defaults.from_description import scan_lidar
+from twin.runtime.defaults.navigation import navigation_parameters
 from twin.runtime.parameter_files.localisation import localisation_nodes
 from twin.runtime.parameter_files.nav2.parameters import monitor_with_file, with_file, with_plugins
 from twin.runtime.stacks.commands import build_commands
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.zones import build_zones, with_filters
 from twin.scenario.navigation import NavigationConfig
-from twin.sensors.lidar import LidarSpec
 from twin.warehouse.docks import TOTE_POSES
 
 
@@ -45,7 +45,15 @@ def build_navigation(
     bus, namespace, drive = context.bus, context.namespace, context.handle.description.drive
     assert drive is not None
     config = with_plugins(config, namespace)
-    parameters = _defaults(context, config, drive, footprint, pose.frames)
+    localisation, lidar = context.config.localisation, scan_lidar(context.handle.description)
+    parameters = navigation_parameters(
+        config,
+        drive,
+        footprint,
+        pose.frames,
+        mapping=localisation is not None and localisation.type == "slam",
+        scan_rate=None if lidar is None else lidar.rate_hz,
+    )
     parameters, not_understood = with_file(
         parameters, config, namespace, localisation_nodes(context.config, namespace)
     )
@@ -80,7 +88,7 @@ def build_navigation(
     BehaviorServerNode(
         bus, pose, parameters.behaviors, costmap=local_costmap, period_ns=period_ns, namespace=namespace
     )
-    if _lidar(context) is not None:
+    if lidar is not None:
         DockingServerNode(
             bus,
             pose,
@@ -98,27 +106,6 @@ def build_navigation(
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
     return navigator
-
-
-def _defaults(
-    context: StackContext, config: NavigationConfig, drive: DriveSpec, footprint: Array, frames: Frames
-) -> NavigationParameters:
-    """Return the parameters without those of a file."""
-    localisation, lidar = context.config.localisation, _lidar(context)
-    return navigation_parameters(
-        config,
-        drive,
-        footprint,
-        frames,
-        mapping=localisation is not None and localisation.type == "slam",
-        scan_rate=None if lidar is None else lidar.rate_hz,
-    )
-
-
-def _lidar(context: StackContext) -> LidarSpec | None:
-    """Return the lidar that navigation looks at, if the robot has it."""
-    sensors = context.handle.description.sensors
-    return next((s for s in sensors if isinstance(s, LidarSpec) and s.topic == "scan"), None)
 
 
 def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:

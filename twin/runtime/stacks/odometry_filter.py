@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from twin.errors import ScenarioError
 from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource, for_robot
 from twin.nodes.navigation.localisation.ekf_sources import KINDS
 from twin.nodes.navigation.robot_pose import Frames
-from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.ekf import ekf_with_file
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished
 from twin.runtime.stacks.context import StackContext
-from twin.scenario.localisation_parameters import EkfParameters
+from twin.scenario.localisation import EkfParameters
 from twin.sensors.imu import ImuSpec
 
 
-@dataclass(frozen=True, kw_only=True)
-class OdometryFilter:
-    """What `/ekf_filter_node` of one robot is built from."""
+def odometry_filter(context: StackContext, frames: Frames) -> tuple[EkfNodeConfig | None, list[str]]:
+    """Return the filter that the scenario asks for, and what of its parameter file was not understood.
 
-    config: EkfNodeConfig
-    told: tuple[str, ...]
-    """What of its parameter file was not understood."""
-
-    def build(self, context: StackContext) -> EkfNode:
-        """Create the node."""
-        node = EkfNode(context.bus, self.config, namespace=context.namespace)
-        for sentence in self.told:
-            node.node.get_logger().warn(sentence)
-        return node
-
-
-def odometry_filter(context: StackContext, frames: Frames) -> OdometryFilter | None:
-    """Return the filter that the scenario asks for; None if the wheels alone tell odometry.
+    The filter is None if the wheels alone tell odometry.
 
     Raises:
         ScenarioError: the robot has no drive, or no IMU where no parameter file names other sources.
@@ -42,15 +27,11 @@ def odometry_filter(context: StackContext, frames: Frames) -> OdometryFilter | N
     """
     odometry = context.config.odometry
     if odometry.type == "wheels":
-        return None
+        return None, []
     description = context.handle.description
     imus = _imus(context)
-    default = for_robot(frames.odom, frames.base, context.control_period_ns, "imu", 1e-3)
-    if imus:
-        first = imus[0]
-        default = for_robot(
-            frames.odom, frames.base, context.control_period_ns, first.topic, first.gyro_bias_stddev
-        )
+    imu = (imus[0].topic, imus[0].gyro_bias_stddev) if imus else ("imu", 1e-3)
+    default = for_robot(frames.odom, frames.base, context.control_period_ns, *imu)
     stddevs = {spec.topic: spec.gyro_bias_stddev for spec in imus}
     config, told = ekf_with_file(default, context.config, context.namespace, stddevs)
     lacks = "drive" if description.drive is None else "IMU" if not imus and config is default else ""
@@ -59,7 +40,7 @@ def odometry_filter(context: StackContext, frames: Frames) -> OdometryFilter | N
             f"robot '{context.handle.name}' has no {lacks}; "
             "odometry of type ekf needs both, type wheels needs no IMU"
         )
-    return OdometryFilter(config=_with_overrides(config, odometry.parameters), told=tuple(told))
+    return _with_overrides(config, odometry.parameters), told
 
 
 def warn_of_unpublished_sources(context: StackContext, node: EkfNode) -> None:
@@ -88,4 +69,4 @@ def _with_overrides(config: EkfNodeConfig, parameters: EkfParameters) -> EkfNode
             sources[name] = replace(sources[name], **changes) if name in sources else EkfSource(**changes)
         except TypeError:
             raise ScenarioError(f"source {name} of odometry of type ekf needs a topic and a config") from None
-    return replace(overridden(config, parameters.overrides()), sources=sources)
+    return replace(parameters.over(config), sources=sources)

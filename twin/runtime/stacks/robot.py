@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.controllers.drive_config import drive_config, odometry_noise
+from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
@@ -13,6 +14,7 @@ from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
 from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.position_controller import PositionControllerNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
@@ -34,9 +36,7 @@ class RobotStack:
         description = handle.description
         self.name = handle.name
         self.handle = handle
-        self._context = context
-        self.spawn_height = context.spawn_height
-        self.start = context.start
+        self.context = context
         drive = description.drive
         base_frame = drive.base_frame if drive else description.root
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
@@ -44,10 +44,12 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        fusion = odometry_filter(context, self.frames)
-        wheels_tell = fusion is None or not fusion.config.publish_tf
-        self.drive = self._build_drive(description, enable_odom_tf=wheels_tell)
-        fused = None if fusion is None else fusion.build(context)
+        fusion, told = odometry_filter(context, self.frames)
+        self.drive = self._build_drive(description, enable_odom_tf=fusion is None or not fusion.publish_tf)
+        fused = None if fusion is None else EkfNode(bus, fusion, namespace=namespace)
+        if fused is not None:
+            for sentence in told:
+                fused.node.get_logger().warn(sentence)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
@@ -72,10 +74,14 @@ class RobotStack:
         if fused is not None:
             warn_of_unpublished_sources(context, fused)
 
+    def standing(self, pose: Pose2) -> Pose3:
+        """Return the pose of the base when it stands on the floor at `pose`."""
+        return Pose3.from_pose2(pose, self.context.spawn_height)
+
     def _build_drive(
         self, description: RobotDescription, *, enable_odom_tf: bool
     ) -> DiffDriveControllerNode | None:
-        drive, context = description.drive, self._context
+        drive, context = description.drive, self.context
         if drive is None:
             return None
         node = DiffDriveControllerNode(
@@ -101,7 +107,7 @@ class RobotStack:
         return node
 
     def _build_arm(self, description: RobotDescription) -> None:
-        bus, namespace, hardware = self._context.bus, self._context.namespace, self.handle.hardware
+        bus, namespace, hardware = self.context.bus, self.context.namespace, self.handle.hardware
         if self.manipulator is None:
             if description.commands:
                 PositionControllerNode(bus, hardware, tuple(description.commands), namespace=namespace)
@@ -111,8 +117,8 @@ class RobotStack:
             bus,
             hardware,
             self.manipulator.gripper_joint,
-            period_ns=self._context.control_period_ns,
+            period_ns=self.context.control_period_ns,
             namespace=namespace,
         )
-        detector = None if self._context.config.detector is None else self._context.config.detector.build()
+        detector = None if self.context.config.detector is None else self.context.config.detector.build()
         ToteDetectorNode(bus, self.robot_pose, detector, namespace=namespace)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from twin.plugins import Kind
 from twin.scenario.checks.check import Check as Check
 from twin.scenario.checks.check import CheckResult as CheckResult
 from twin.scenario.checks.guarded import GuardedCheck
 from twin.scenario.observation import CheckContext
-from twin.scenario.plugins import OneOfKind, PluginUse, model_of
+from twin.scenario.plugins import OneOfKind, PluginUse, with_shipped
 
 CHECKS: Kind[Check] = Kind("check", base="twin.scenario.checks:Check", group="twin.checks")
 
@@ -31,7 +29,8 @@ CHECKS.register("path_on_circle", "twin.scenario.checks.path:PathOnCircle")
 CHECKS.register("closed_loop", "twin.scenario.checks.path:ClosedLoop")
 
 
-class AnyCheck(OneOfKind):
+@with_shipped
+class CheckEntry(OneOfKind):
     """One check: exactly one of these keys, or the name of a check of a user."""
 
     of = CHECKS
@@ -48,9 +47,3 @@ class AnyCheck(OneOfKind):
         name = plugin.name if subject is None else f"{plugin.name}({subject})"
         check = plugin.create(name, config, context)
         return check if plugin.ships else GuardedCheck(plugin, check)
-
-
-if TYPE_CHECKING:
-    CheckEntry = AnyCheck
-else:
-    CheckEntry = model_of("CheckEntry", AnyCheck)

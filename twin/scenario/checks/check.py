@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from pydantic import model_validator
+
 from twin.geometry import Pose2, Pose3, wrap_angle
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import StrictModel
@@ -58,6 +60,19 @@ class Check(ABC):
     def result(self) -> CheckResult:
         """Return the outcome so far."""
 
+    def _judged(
+        self,
+        reason: str,
+        value: float | None = None,
+        limit: float | None = None,
+        unit: str = "",
+        at_s: float | None = None,
+    ) -> CheckResult:
+        """Return the outcome: passed unless there is a reason why not."""
+        return CheckResult(
+            name=self.name, passed=not reason, value=value, limit=limit, unit=unit, at_s=at_s, reason=reason
+        )
+
 
 class BaseMotion:
     """Whether a robot's base ever left the pose at which it was first seen."""
@@ -80,3 +95,30 @@ class RobotCheckConfig(CheckConfig):
 
     robot: str | None = None
     """Name of the robot; may be left out if there is only one."""
+
+
+class RobotCheck(Check):
+    """Knows its robot, whether that moved, and when the verdict was decided."""
+
+    _at_s: float | None = None
+
+    def __init__(self, name: str, config: RobotCheckConfig, context: CheckContext) -> None:
+        super().__init__(name, config, context)
+        self._robot = context.robot(config.robot)
+        self._motion = BaseMotion()
+
+    @property
+    def _stood(self) -> str:
+        """Why a check fails whose robot never moved; empty if it did."""
+        return "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
+
+
+def at_least_one(*keys: str) -> Any:
+    """Return the validator of a config that needs one of several keys."""
+
+    def given(config: Any) -> Any:
+        if all(getattr(config, key) is None for key in keys):
+            raise ValueError(f"must have at least one of the keys {', '.join(keys)}")
+        return config
+
+    return model_validator(mode="after")(given)

@@ -32,20 +32,19 @@ class Delivered(Check):
     """Judges each tick; the last one counts, and its time is the start of the last unbroken success."""
 
     Config = DeliveredConfig
+    config: DeliveredConfig
+    _previous: tuple[float, Pose3] | None = None
+    _outside: float | None = None
+    _at_s: float | None = None
 
     def __init__(self, name: str, config: DeliveredConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
-        self._config = config
         self._zone, self._bottom = context.zone(config.zone), context.good_bottom(config.tote)
-        self._previous: tuple[float, Pose3] | None = None
-        self._outside: float | None = None
         self._reason = f"{config.tote} was never seen"
-        self._at_s: float | None = None
-        self._passed = False
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        tote = self._config.tote
+        tote, had_passed = self.config.tote, not self._reason
         pose = observation.goods.get(tote)
         if pose is None:
             return
@@ -55,14 +54,12 @@ class Delivered(Check):
             self._reason = f"{tote} is still held by {held.robot}"
         else:
             self._reason = self._fault(observation.time_s, pose)
-        passed = not self._reason
-        if not passed or not self._passed:
+        if self._reason or not had_passed:
             self._at_s = observation.time_s
-        self._passed = passed
         self._previous = (observation.time_s, pose)
 
     def _fault(self, time_s: float, pose: Pose3) -> str:
-        config, zone = self._config, self._zone
+        config, zone = self.config, self._zone
         if self._outside is not None and self._outside > config.tolerance:
             return f"{config.tote} is {self._outside:.3f} m outside of {config.zone}"
         above = float(pose.xyz[2]) - self._bottom - zone.height
@@ -85,15 +82,7 @@ class Delivered(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the distance outside of the zone."""
-        return CheckResult(
-            name=self.name,
-            passed=self._passed,
-            value=self._outside,
-            limit=self._config.tolerance,
-            unit="m",
-            at_s=self._at_s,
-            reason=self._reason,
-        )
+        return self._judged(self._reason, self._outside, self.config.tolerance, "m", self._at_s)
 
 
 def outside_distance(zone: Zone, pose: Pose3) -> float:

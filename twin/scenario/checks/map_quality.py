@@ -8,13 +8,12 @@ from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
-from pydantic import model_validator
 from scipy.spatial import cKDTree
 
 from twin.geometry import Array
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.parameters import Fraction, Metres, Positive
-from twin.scenario.checks.check import Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import CheckResult, RobotCheck, RobotCheckConfig, at_least_one
 from twin.scenario.checks.map_truth import FREE_TO, MapTruth, wall_cells
 from twin.scenario.observation import CheckContext, Observation
 
@@ -30,12 +29,7 @@ class MapAccuracyConfig(RobotCheckConfig):
     """Largest mean distance [m]."""
     p95: Annotated[Metres, Positive] | None = None
     """Largest distance of 95 % of them [m]."""
-
-    @model_validator(mode="after")
-    def _has_a_limit(self) -> MapAccuracyConfig:
-        if self.mean is None and self.p95 is None:
-            raise ValueError("must have at least one of the keys mean, p95")
-        return self
+    _has_a_limit = at_least_one("mean", "p95")
 
 
 class MapCoverageConfig(RobotCheckConfig):
@@ -47,25 +41,18 @@ class MapCoverageConfig(RobotCheckConfig):
     """Least part of the surfaces beside that floor that have an occupied cell within `within`."""
     within: Annotated[Metres, Positive] = 0.1
     """Distance from a true surface to the nearest occupied cell [m]."""
-
-    @model_validator(mode="after")
-    def _has_a_limit(self) -> MapCoverageConfig:
-        if self.floor is None and self.walls is None:
-            raise ValueError("must have at least one of the keys floor, walls")
-        return self
+    _has_a_limit = at_least_one("floor", "walls")
 
 
-class _MapCheck(Check):
+class _MapCheck(RobotCheck):
     """Keeps the last map, and holds it against the truth at the end."""
 
     unit = ""
+    _map: OccupancyMap | None = None
 
     def __init__(self, name: str, config: RobotCheckConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
-        self._robot = context.robot(config.robot)
         self._surroundings = context.surroundings.get(self._robot)
-        self._map: OccupancyMap | None = None
-        self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
@@ -89,26 +76,15 @@ class _MapCheck(Check):
             failed = [measure for measure in measures if not measure[3]]
             text, value, limit, passed = (failed or measures)[0 if failed else -1]
             reason = "" if passed else text
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=value,
-            limit=limit,
-            unit=self.unit,
-            at_s=self._at_s,
-            reason=reason,
-        )
+        return self._judged(reason, value, limit, self.unit, self._at_s)
 
 
 class MapAccuracy(_MapCheck):
     """Measures distances between occupied cells and true surfaces, both ways."""
 
     Config = MapAccuracyConfig
+    config: MapAccuracyConfig
     unit = "m"
-
-    def __init__(self, name: str, config: MapAccuracyConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config = config
 
     def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
         both = truth.distances_of_cells(grid), truth.distances_of_walls(grid)
@@ -116,7 +92,7 @@ class MapAccuracy(_MapCheck):
         p95 = max(_p95(distances) for distances in both)
         cells, walls = (f"mean {_mean(part):.3f} m, 95 % within {_p95(part):.3f} m" for part in both)
         found = f"occupied cells are off the walls by: {cells}; walls off occupied cells by: {walls}"
-        for value, limit in ((mean, self._config.mean), (p95, self._config.p95)):
+        for value, limit in ((mean, self.config.mean), (p95, self.config.p95)):
             if limit is not None:
                 yield found, value, limit, value <= limit
 
@@ -125,13 +101,10 @@ class MapCoverage(_MapCheck):
     """Measures which part of the reachable floor and of its walls is on the map."""
 
     Config = MapCoverageConfig
-
-    def __init__(self, name: str, config: MapCoverageConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config = config
+    config: MapCoverageConfig
 
     def _measures(self, grid: OccupancyMap, truth: MapTruth) -> Iterator[tuple[str, float, float, bool]]:
-        config = self._config
+        config = self.config
         if config.walls is not None:
             cells, points = wall_cells(grid), truth.wall_points
             share = 0.0

@@ -44,16 +44,16 @@ class NoCollision(Check):
     """Keeps the first collision and the hardest one."""
 
     Config = NoCollisionConfig
+    config: NoCollisionConfig
+    _first: tuple[float, ContactObservation] | None = None
+    _hardest: tuple[float, ContactObservation] | None = None
+    _force = 0.0
+    _moved = False
+    _at_s: float | None = None
 
     def __init__(self, name: str, config: NoCollisionConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
-        self._config, self._robots = config, context.robots
-        self._first: tuple[float, ContactObservation] | None = None
-        self._hardest: tuple[float, ContactObservation] | None = None
-        self._force = 0.0
         self._allowed: dict[tuple[str, str, str], bool] = {}
-        self._moved = False
-        self._at_s: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
@@ -63,7 +63,7 @@ class NoCollision(Check):
             if self._is_allowed(contact):
                 continue
             self._force = max(self._force, contact.force_N)
-            if contact.force_N <= self._config.max_force:
+            if contact.force_N <= self.config.max_force:
                 continue
             if self._first is None:
                 self._first = (observation.time_s, contact)
@@ -72,16 +72,16 @@ class NoCollision(Check):
 
     def _of_interest(self, contact: ContactObservation) -> ContactObservation | None:
         """Return a contact as the check's robot sees it; None if it is not about that robot."""
-        if self._config.robot in (None, contact.robot):
+        if self.config.robot in (None, contact.robot):
             return contact
-        turned = contact.by_the_other(self._robots)
-        return turned if turned is not None and turned.robot == self._config.robot else None
+        turned = contact.by_the_other(self.context.robots)
+        return turned if turned is not None and turned.robot == self.config.robot else None
 
     def _is_allowed(self, contact: ContactObservation) -> bool:
         pair = (contact.robot, contact.body, contact.other)
         if pair not in self._allowed:
-            views = filter(None, (contact, contact.by_the_other(self._robots)))
-            self._allowed[pair] = any(rule.matches(view) for view in views for rule in self._config.allowed)
+            views = filter(None, (contact, contact.by_the_other(self.context.robots)))
+            self._allowed[pair] = any(rule.matches(view) for view in views for rule in self.config.allowed)
         return self._allowed[pair]
 
     def result(self) -> CheckResult:
@@ -93,15 +93,8 @@ class NoCollision(Check):
             reason = _sentence(*self._first)
             if self._hardest != self._first:
                 reason += f"; hardest: {_sentence(*self._hardest)}"
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=self._force,
-            limit=self._config.max_force,
-            unit="N",
-            at_s=self._at_s if self._first is None else self._first[0],
-            reason=reason,
-        )
+        at_s = self._at_s if self._first is None else self._first[0]
+        return self._judged(reason, self._force, self.config.max_force, "N", at_s)
 
 
 def _sentence(time_s: float, contact: ContactObservation) -> str:

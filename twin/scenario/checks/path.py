@@ -7,7 +7,7 @@ from typing import Annotated
 
 from twin.geometry import Pose2, wrap_angle
 from twin.parameters import Metres, Positive, Radians
-from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
+from twin.scenario.checks.check import CheckResult, RobotCheck, RobotCheckConfig
 from twin.scenario.observation import CheckContext, Observation
 
 
@@ -35,8 +35,11 @@ class ClosedLoopConfig(RobotCheckConfig):
     """Largest heading error [rad]; absent: any heading."""
 
 
-class _EndsAt(Check):
+class _EndsAt(RobotCheck):
     """Compares the last true pose with a goal, or with the first pose if `goal` is None."""
+
+    _farthest = 0.0
+    _end: Pose2 | None = None
 
     def __init__(
         self,
@@ -46,13 +49,8 @@ class _EndsAt(Check):
         goal: Pose2 | None = None,
     ) -> None:
         super().__init__(name, config, context)
-        self._robot, self._tolerance = context.robot(config.robot), config.tolerance
-        self._yaw_tolerance = config.yaw_tolerance
-        self._must_leave = goal is None
-        self._goal = goal
-        self._farthest = 0.0
-        self._end: Pose2 | None = None
-        self._at_s: float | None = None
+        self._tolerance, self._yaw_tolerance = config.tolerance, config.yaw_tolerance
+        self._goal, self._must_leave = goal, goal is None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
@@ -69,15 +67,7 @@ class _EndsAt(Check):
         if self._end is not None and self._goal is not None:
             distance = self._end.distance(self._goal)
             reason = self._fault(distance, abs(wrap_angle(self._end.yaw - self._goal.yaw)))
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=distance,
-            limit=self._tolerance,
-            unit="m",
-            at_s=self._at_s,
-            reason=reason,
-        )
+        return self._judged(reason, distance, self._tolerance, "m", self._at_s)
 
     def _fault(self, distance: float, turned: float) -> str:
         where = "its start" if self._must_leave else "the goal"
@@ -119,25 +109,20 @@ class PathOnCircleConfig(RobotCheckConfig):
     """Largest distance from the circle [m]."""
 
 
-class PathOnCircle(Check):
+class PathOnCircle(RobotCheck):
     """Keeps the largest distance from the circle."""
 
     Config = PathOnCircleConfig
-
-    def __init__(self, name: str, config: PathOnCircleConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config, self._robot = config, context.robot(config.robot)
-        self._motion = BaseMotion()
-        self._worst: float | None = None
-        self._at_s: float | None = None
+    config: PathOnCircleConfig
+    _worst: float | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
         pose = observation.robots[self._robot].pose
         self._motion.take(pose)
         x, y, _ = pose.xyz
-        centre = self._config.centre
-        off = abs(math.hypot(x - centre[0], y - centre[1]) - self._config.radius)
+        centre = self.config.centre
+        off = abs(math.hypot(x - centre[0], y - centre[1]) - self.config.radius)
         if self._worst is None or off > self._worst:
             self._worst, self._at_s = off, observation.time_s
 
@@ -145,16 +130,7 @@ class PathOnCircle(Check):
         """Return the outcome so far."""
         reason = "the run made no step"
         if self._worst is not None:
-            off = self._worst > self._config.tolerance
-            reason = "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
-            if off:
+            reason = self._stood
+            if self._worst > self.config.tolerance:
                 reason = f"{self._robot} was {self._worst:.3f} m off the circle"
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=self._worst,
-            limit=self._config.tolerance,
-            unit="m",
-            at_s=self._at_s,
-            reason=reason,
-        )
+        return self._judged(reason, self._worst, self.config.tolerance, "m", self._at_s)

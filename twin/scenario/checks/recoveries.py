@@ -8,8 +8,8 @@ from typing import Annotated
 from pydantic import model_validator
 
 from twin.parameters import NotNegative
-from twin.scenario.checks.check import NOTHING, Check, CheckResult, RobotCheckConfig
-from twin.scenario.observation import CheckContext, Observation
+from twin.scenario.checks.check import NOTHING, CheckResult, RobotCheck, RobotCheckConfig
+from twin.scenario.observation import Observation
 
 
 class RecoveriesConfig(RobotCheckConfig):
@@ -31,18 +31,14 @@ class RecoveriesConfig(RobotCheckConfig):
         return self
 
 
-class Recoveries(Check):
+class Recoveries(RobotCheck):
     """Keeps the last count, when it last changed, and how far the robot has driven."""
 
     Config = RecoveriesConfig
-
-    def __init__(self, name: str, config: RecoveriesConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config, self._robot = config, context.robot(config.robot)
-        self._count = self._goals = 0
-        self._driven = 0.0
-        self._last: tuple[float, float] | None = None
-        self._at_s: float | None = None
+    config: RecoveriesConfig
+    _count = _goals = 0
+    _driven = 0.0
+    _last: tuple[float, float] | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
@@ -56,7 +52,7 @@ class Recoveries(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the limit is the bound that is missed, or the lower one."""
-        low, high, per_km = self._config.min, self._config.max, self._config.max_per_km
+        low, high, per_km = self.config.min, self.config.max, self.config.max_per_km
         if per_km is not None:
             allowed = per_km * self._driven / 1000.0
             high = math.floor(allowed) if high is None else min(high, math.floor(allowed))
@@ -66,12 +62,5 @@ class Recoveries(Check):
             reason = f"{self._robot} recovered {self._count} times"
         if self._at_s is None:
             reason = "the run made no step"
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=float(self._count),
-            limit=float(high if too_many and high is not None else low),
-            unit="",
-            at_s=self._at_s,
-            reason=reason,
-        )
+        limit = float(high if too_many and high is not None else low)
+        return self._judged(reason, float(self._count), limit, at_s=self._at_s)

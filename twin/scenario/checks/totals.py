@@ -9,8 +9,8 @@ from pydantic import model_validator
 
 from twin.geometry import Array
 from twin.parameters import Joules, Metres, NotNegative, Positive
-from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
-from twin.scenario.observation import CheckContext, Observation
+from twin.scenario.checks.check import NOTHING, CheckResult, RobotCheck, RobotCheckConfig
+from twin.scenario.observation import Observation
 
 
 class DrivenDistanceConfig(RobotCheckConfig):
@@ -30,18 +30,13 @@ class DrivenDistanceConfig(RobotCheckConfig):
         return self
 
 
-class DrivenDistance(Check):
+class DrivenDistance(RobotCheck):
     """Adds up the steps of the base on the floor plane."""
 
     Config = DrivenDistanceConfig
-
-    def __init__(self, name: str, config: DrivenDistanceConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config, self._robot = config, context.robot(config.robot)
-        self._distance = 0.0
-        self._motion = BaseMotion()
-        self._previous: Array | None = None
-        self._at_s: float | None = None
+    config: DrivenDistanceConfig
+    _distance = 0.0
+    _previous: Array | None = None
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
@@ -54,25 +49,17 @@ class DrivenDistance(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far."""
-        low, high = self._config.min, self._config.max
+        low, high = self.config.min, self.config.max
         too_short = low is not None and self._distance < low
         too_long = high is not None and self._distance > high
-        reason = "" if self._at_s is not None else "the run made no step"
-        if self._at_s is not None and (too_short or too_long):
-            reason = (
-                f"{self._robot} drove {self._distance:.2f} m, {'less' if too_short else 'more'} than allowed"
-            )
-        elif self._at_s is not None and low is None and not self._motion.seen:
-            reason = f"{NOTHING}{self._robot} did not move"
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=self._distance,
-            limit=low if too_short or high is None else high,
-            unit="m",
-            at_s=self._at_s,
-            reason=reason,
-        )
+        reason = self._stood if low is None else ""
+        if self._at_s is None:
+            reason = "the run made no step"
+        elif too_short or too_long:
+            side = "less" if too_short else "more"
+            reason = f"{self._robot} drove {self._distance:.2f} m, {side} than allowed"
+        limit = low if too_short or high is None else high
+        return self._judged(reason, self._distance, limit, "m", self._at_s)
 
 
 class EnergyConfig(RobotCheckConfig):
@@ -86,26 +73,21 @@ class EnergyConfig(RobotCheckConfig):
     """Largest work [J]."""
 
 
-class Energy(Check):
+class Energy(RobotCheck):
     """Keeps the work done so far, and since when it is too much."""
 
-    measures_work = True
-
     Config = EnergyConfig
-
-    def __init__(self, name: str, config: EnergyConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._config, self._robot = config, context.robot(config.robot)
-        self._energy = 0.0
-        self._moved = self._seen = False
-        self._at_s: float | None = None
+    config: EnergyConfig
+    measures_work = True
+    _energy = 0.0
+    _moved = _seen = False
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
         self._seen = True
         self._energy = observation.robots[self._robot].work_J
         self._moved = self._robot in observation.moved
-        if self._energy <= self._config.max:
+        if self._energy <= self.config.max:
             self._at_s = observation.time_s
 
     def result(self) -> CheckResult:
@@ -113,14 +95,6 @@ class Energy(Check):
         reason = "" if self._moved else f"{NOTHING}{self._robot} did not move"
         if not self._seen:
             reason = "the run made no step"
-        if self._energy > self._config.max:
+        if self._energy > self.config.max:
             reason = f"{self._robot} used {self._energy:.0f} J"
-        return CheckResult(
-            name=self.name,
-            passed=not reason,
-            value=self._energy,
-            limit=self._config.max,
-            unit="J",
-            at_s=self._at_s,
-            reason=reason,
-        )
+        return self._judged(reason, self._energy, self.config.max, "J", self._at_s)

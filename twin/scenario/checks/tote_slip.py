@@ -39,13 +39,13 @@ class ToteSlip(Check):
     """Compares with the pose at the first tick of each grasp."""
 
     Config = ToteSlipConfig
+    config: ToteSlipConfig
+    _worst: float | None = None
+    _at_s: float | None = None
 
     def __init__(self, name: str, config: ToteSlipConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
-        self._config = config
         self._grasps: dict[str, _Grasp] = {}
-        self._worst: float | None = None
-        self._at_s: float | None = None
         self._reason = "no tote was carried" if config.tote is None else f"{config.tote} was never carried"
 
     def observe(self, observation: Observation) -> None:
@@ -53,7 +53,7 @@ class ToteSlip(Check):
         if self._worst is None:
             self._at_s = observation.time_s
         for tote, held in observation.held.items():
-            if self._config.tote not in (None, tote):
+            if self.config.tote not in (None, tote):
                 continue
             grasp = self._grasp(tote, held, observation.time_ns)
             if grasp.looks < 2:
@@ -61,10 +61,8 @@ class ToteSlip(Check):
             slip = math.dist(held.T_gripper_good.xyz, grasp.start)
             if self._worst is None or slip > self._worst:
                 self._worst, self._at_s = slip, observation.time_s
-                passed = slip <= self._config.max
-                self._reason = (
-                    "" if passed else f"{tote} slipped {slip * 1e3:.1f} mm in {held.robot}'s gripper"
-                )
+                slipped = f"{tote} slipped {slip * 1e3:.1f} mm in {held.robot}'s gripper"
+                self._reason = "" if slip <= self.config.max else slipped
 
     def _grasp(self, tote: str, held: Held, time_ns: int) -> _Grasp:
         """Return the grasp that is going on; a contact that is lost for a moment does not end it."""
@@ -78,12 +76,4 @@ class ToteSlip(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the largest slip."""
-        return CheckResult(
-            name=self.name,
-            passed=self._worst is not None and self._worst <= self._config.max,
-            value=self._worst,
-            limit=self._config.max,
-            unit="m",
-            at_s=self._at_s,
-            reason=self._reason,
-        )
+        return self._judged(self._reason, self._worst, self.config.max, "m", self._at_s)

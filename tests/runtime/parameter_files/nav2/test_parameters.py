@@ -15,14 +15,14 @@ from tests.runtime.parameter_files.nav2.robot import applied
 from twin.controllers.limiter import AxisLimits
 from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
+from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.navigation.docking.docks import Dock
-from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.runtime.defaults.navigation import NavigationParameters
-from twin.runtime.defaults.overrides import overridden
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file, monitor_with_file
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.navigation import NavigationConfig
+from twin.scenario.localisation import AmclParameters
+from twin.scenario.navigation import CostmapParameters, NavigationConfig
 from twin.scenario.schema import load
 
 ROOT = Path(__file__).parents[4]
@@ -266,9 +266,9 @@ def _file(tmp_path: Path, text: str) -> str:
 
 
 def test_localisation_of_the_file(tmp_path: Path) -> None:
-    given = frozenset({"max_particles"})
-    amcl, told = amcl_with_file(AmclConfig(), given, _file(tmp_path, MORE), "")
-    assert (amcl.filter.alpha1, amcl.filter.max_particles) == (0.2, AmclConfig().max_particles)
+    given = AmclParameters.model_validate({"max_particles": 1500})
+    amcl, told = amcl_with_file(given, _file(tmp_path, MORE), "")
+    assert (amcl.filter.alpha1, amcl.filter.max_particles) == (0.2, 1500)
     assert amcl.node.transform_tolerance_ns == 1_000_000_000
     assert told == ["nav2.yaml: amcl does not have base_frame_id"]
 
@@ -391,7 +391,7 @@ def test_any_failure_tolerance_is_one(tmp_path: Path, tolerance: float) -> None:
 )
 def test_motion_models_of_amcl_as_they_were_called_first(tmp_path: Path, name: str, model: str) -> None:
     file = _file(tmp_path, f"amcl: {{ros__parameters: {{robot_model_type: {name}}}}}")
-    got, told = amcl_with_file(AmclConfig(), frozenset(), file, "")
+    got, told = amcl_with_file(AmclParameters(), file, "")
     assert (got.filter.robot_model_type, told) == (model, [])
 
 
@@ -464,17 +464,18 @@ planner_server:
 
 def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
     file = _file(tmp_path, "amcl: {ros__parameters: {min_particles: 3000, max_particles: 5000}}")
-    amcl, _ = amcl_with_file(AmclConfig(), frozenset(), file, "")
+    amcl, _ = amcl_with_file(AmclParameters(), file, "")
     assert (amcl.filter.min_particles, amcl.filter.max_particles) == (3000, 5000)
     file = _file(tmp_path, "amcl: {ros__parameters: {min_particles: 5000}}")
     with pytest.raises(NavigationError, match=r"yaml:1: amcl: min_particles is 5000, more than"):
-        amcl_with_file(AmclConfig(), frozenset(), file, "")
+        amcl_with_file(AmclParameters(), file, "")
 
 
 def test_what_a_scenario_gives_must_fit_together() -> None:
-    assert overridden(AmclConfig(), {"min_particles": 900}).min_particles == 900
-    with pytest.raises(ScenarioError, match="min_particles is 5000, more than max_particles"):
-        overridden(AmclConfig(), {"min_particles": 5000})
+    given = CostmapParameters.model_validate({"raytrace_min_range": 2.0})
+    assert given.over(CostmapConfig()).raytrace_min_range == 2.0
+    with pytest.raises(ScenarioError, match="raytrace_min_range is 2, more than raytrace_max_range, 1"):
+        given.over(CostmapConfig(raytrace_max_range=1.0))
 
 
 def test_a_monitors_sources_and_what_it_lacks(tmp_path: Path) -> None:

@@ -117,3 +117,9 @@ def test_a_radius_goes_before_the_files_outline(tmp_path: Path) -> None:
     text = f"local_costmap: {{local_costmap: {{ros__parameters: {{{outline}}}}}}}\n"
     layers = applied(tmp_path, text, {"local_costmap": {"robot_radius": "0.3 m"}}).local_costmap.layers
     assert (layers.footprint, layers.robot_radius) == ((), 0.3)
+
+
+def test_the_smoother_of_paths(tmp_path: Path) -> None:
+    text = "smoother_server: {ros__parameters: {simple_smoother: {w_smooth: 0.4, w_data: 0.1}}}\n"
+    smoothers = applied(tmp_path, text, {"smoother": {"w_smooth": 0.25}}).path_smoother.smoothers
+    assert (smoothers["simple_smoother"].w_smooth, smoothers["simple_smoother"].w_data) == (0.25, 0.1)

@@ -104,9 +104,8 @@ class Nav2Parameters:
             if name in known and not keep & {name, *name.split(".")}
         }
         config, refused = overlay(config, taken)
-        refused = {name: why.removeprefix(f"{name} ") for name, why in refused.items()}
         for name, why in refused.items():
-            entry = values[prefix + name]
+            entry, why = values[prefix + name], why.removeprefix(f"{name} ")
             self._problems.append(Problem(_sentence(node, entry.said, why), self.path, entry.line))
         self._check_critics(node, values, known)
         self._tell(node, values, known)
@@ -212,8 +211,7 @@ class Nav2Parameters:
         known = tuple(prefix + name for name in parameters_of(config))
         if "costmap" in node or node == "behavior_server":
             values = flat(values, known)
-        foreign = [name.removesuffix("plugin") for name in values if name.endswith(".plugin")]
-        return self._without_foreign(node, values, config, prefix, foreign)
+        return self._without_foreign(node, values, dict(_plugins(config)) if not prefix else {prefix: config})
 
     def _said(self, node: str) -> dict[str, Value]:
         """Return what the file says of a node."""
@@ -227,18 +225,12 @@ class Nav2Parameters:
         return found
 
     def _without_foreign(
-        self,
-        node: str,
-        values: dict[str, Value],
-        config: Any,
-        prefix: str,
-        sections: list[str],
+        self, node: str, values: dict[str, Value], configs: Mapping[str, Any]
     ) -> dict[str, Value]:
         """Leave out sections of plugins that are others than those here, and the lists of plugins."""
-        classes = {prefix: config} if prefix else dict(_plugins(config))
         out = {name: entry for name, entry in values.items() if not name.endswith(LISTS)}
-        for section in sections:
-            own, plugin = classes.get(section), str(values[section + "plugin"].value)
+        for section in (name.removesuffix("plugin") for name in values if name.endswith(".plugin")):
+            own, plugin = configs.get(section), str(values[section + "plugin"].value)
             if own is not None and not is_same(plugin, own):
                 self._ignored.setdefault(node, []).append(f"{plugin} ({section}*)")
                 out = {name: entry for name, entry in out.items() if not name.startswith(section)}
@@ -250,10 +242,13 @@ class Nav2Parameters:
             if name not in known or section == name or not isinstance(entry.value, list):
                 continue
             there = {other.removeprefix(section).partition(".")[0] for other in known if "." in other}
-            mistakes, absent = _wrong_critics(entry.value, sorted({*there, "Oscillation"}))
-            self._problems += [Problem(f"{node} {said}", self.path, entry.line) for said in mistakes]
-            for critic in absent:
-                self._ignored.setdefault(node, []).append(f"the critic {critic}")
+            valid = sorted({*there, "Oscillation"})
+            for critic in (one for one in entry.value if one not in valid):
+                if close := _similar(critic, valid):
+                    said = f"{node} has no critic '{critic}'; did you mean '{close[0]}'?"
+                    self._problems.append(Problem(said, self.path, entry.line))
+                else:
+                    self._ignored.setdefault(node, []).append(f"the critic {critic}")
 
     def _tell(self, node: str, values: Mapping[str, Value], known: tuple[str, ...]) -> None:
         for name, entry in values.items():
@@ -269,7 +264,7 @@ class Nav2Parameters:
             unread.setdefault(node, []).append(entry.said)
             return
         beside = [other.rpartition(".")[2] for other in known if other.rpartition(".")[0] == section]
-        close = difflib.get_close_matches(last, beside, n=1, cutoff=_TYPO)
+        close = _similar(last, beside)
         sideways = bool(close) and last.replace("y", "x") == close[0].replace("y", "x")
         if close and not sideways and last not in _ONLY_NAV2S:
             whole = (
@@ -296,15 +291,5 @@ def _sentence(node: str, name: str, why: str) -> str:
     return f"{node}: {why[why.index(name) :]}" if name in why else f"{node}: {name} {why}"
 
 
-def _wrong_critics(names: Sequence[str], valid: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return which critics are likely mistakes, each with what was meant, and which are Nav2's alone."""
-    mistakes, absent = [], []
-    for name in names:
-        if name in valid:
-            continue
-        close = difflib.get_close_matches(name, valid, n=1, cutoff=_TYPO)
-        if close:
-            mistakes.append(f"has no critic '{name}'; did you mean '{close[0]}'?")
-        else:
-            absent.append(name)
-    return mistakes, absent
+def _similar(name: str, valid: Sequence[str]) -> list[str]:
+    return difflib.get_close_matches(name, valid, n=1, cutoff=_TYPO)

@@ -49,14 +49,14 @@ def _taken(
 ) -> dict[str, Any] | None:
     """Return what is said of a config's parameters; None, and noted in `file`, if one cannot be."""
     taken = {}
-    for name, one in ((one.name, one) for one in fields_of(config).values()):
+    for one in fields_of(config).values():
         try:
-            if one.domain is not None and name in said:
-                taken[name] = one.domain.checked(said[name])
+            if one.domain is not None and one.name in said:
+                taken[one.name] = one.domain.checked(said[one.name])
             elif one.is_required:
                 raise ValueError("is missing")
         except ValueError as error:
-            file.wrong(_NODE, section + name, str(error))
+            file.wrong(_NODE, section + one.name, str(error))
             return None
     return taken
 

@@ -168,10 +168,6 @@ def is_same(plugin: str, config: Any) -> bool:
 
 def _first(plugins: object) -> str:
     """Return the first of a list of plugins, or the only one."""
-    return (
-        str(plugins[0])
-        if isinstance(plugins, list) and plugins
-        else plugins
-        if isinstance(plugins, str)
-        else ""
-    )
+    if isinstance(plugins, list) and plugins:
+        return str(plugins[0])
+    return plugins if isinstance(plugins, str) else ""

@@ -7,34 +7,27 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+from twin.controllers.limiter import AxisLimits
 from twin.navigation import plugins
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.plugins import CONTROLLERS
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
+from twin.parameters.declaration import names_of
 from twin.plugins import Kind
-from twin.runtime.defaults.navigation import NavigationParameters
-from twin.runtime.parameter_files.nav2 import scenario_first
+from twin.runtime.defaults.navigation import NavigationParameters, with_scenario
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
+from twin.scenario.localisation import AmclParameters as AmclGroup
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 
-_CONTROLLERS = {
-    "RegulatedPurePursuitController": "regulated_pure_pursuit",
-    "DWBLocalPlanner": "dwb",
-    "MPPIController": "mppi",
-}
-_GOAL_CHECKERS = {
-    "SimpleGoalChecker": "simple",
-    "StoppedGoalChecker": "stopped",
-    "PositionGoalChecker": "position",
-}
-_PROGRESS_CHECKERS = {"SimpleProgressChecker": "simple", "PoseProgressChecker": "pose"}
+_DOCKS = frozenset({"docks", "pose", "type", "frame"})
+"""Of a dock: these are read together, by `database_of`."""
 
 
 def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
@@ -48,25 +41,23 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     file = Nav2Parameters(Path(config.params_file), namespace)
     controller, planner = config.controller, config.planner
     chosen = file.plugin("controller_server", "FollowPath")
-    if chosen == "RotationShimController":
-        primary = file.plugin("controller_server", "FollowPath", "primary_controller")
-        update = {
-            "rotation_shim": True,
-            "plugin": _CONTROLLERS.get(primary) or _brought(CONTROLLERS, primary),
-        }
-    else:
-        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen) or _brought(CONTROLLERS, chosen)}
+    if shim := _shipped(CONTROLLERS, chosen) == "rotation_shim":
+        chosen = file.plugin("controller_server", "FollowPath", "primary_controller")
+    update = {
+        "rotation_shim": shim,
+        "plugin": _brought(CONTROLLERS, chosen) or _shipped(CONTROLLERS, chosen),
+    }
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
     if update["plugin"] and may_be and "rotation_shim" not in given:
         controller = controller.model_copy(update=update)
-    for key, section, classes in (
-        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
-        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS),
+    for key, section, kind in (
+        ("goal_checker", "general_goal_checker", plugins.GOAL_CHECKERS),
+        ("progress_checker", "progress_checker", plugins.PROGRESS_CHECKERS),
     ):
-        chosen = classes.get(file.plugin("controller_server", section), "")
-        if chosen and key not in controller.model_fields_set:
-            controller = controller.model_copy(update={key: chosen})
+        checker = _shipped(kind, file.plugin("controller_server", section))
+        if checker and key not in controller.model_fields_set:
+            controller = controller.model_copy(update={key: checker})
     chosen = file.plugin("planner_server", "GridBased")
     found = PLANNERS.get(chosen) or _brought(plugins.PLANNERS, chosen)
     if found and "plugin" not in planner.model_fields_set:
@@ -74,8 +65,10 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
     return config.model_copy(update={"controller": controller, "planner": planner})
 
 
-def _controller(plugin: str) -> str | None:
-    return _CONTROLLERS.get(plugin) or _brought(CONTROLLERS, plugin)
+def _shipped(kind: Kind[Any], plugin: str) -> str | None:
+    """Return the name of what ships for a plugin of Nav2, whose class begins as the one here does."""
+    classes = ((name, target.rpartition(":")[2]) for name, target in kind.shipped.items())
+    return next((name for name, own in classes if plugin.startswith(own)), None)
 
 
 def _brought(kind: Kind[Any], plugin: str) -> str | None:
@@ -93,24 +86,23 @@ class AmclParameters:
 
 
 def amcl_with_file(
-    config: AmclConfig, given: frozenset[str], params_file: str | None, namespace: str
+    group: AmclGroup, params_file: str | None, namespace: str
 ) -> tuple[AmclParameters, list[str]]:
     """Return the parameters of `/amcl` with those of a file, and what of them was not understood.
 
     Args:
-        config: What holds without the file.
-        given: Parameters that the scenario gives: they stay.
+        group: What the scenario gives: it goes before the file.
         params_file: Absent: there is none.
         namespace: Of the robot.
 
     Raises:
         NavigationError: the file is wrong.
     """
-    parameters = AmclParameters(filter=config, node=AmclNodeConfig())
+    parameters = AmclParameters(filter=group.over(AmclConfig()), node=AmclNodeConfig())
     if params_file is None:
         return parameters, []
     file = Nav2Parameters(Path(params_file), namespace)
-    parameters = file.applied("amcl", parameters, keep=given)
+    parameters = group.over(file.applied("amcl", parameters))
     return parameters, file.ignored()
 
 
@@ -154,50 +146,47 @@ def with_file(
     docking = replace(docking, database=database_of(file, docking.database))
     changed = replace(
         parameters,
-        smoother=file.applied(
-            "velocity_smoother",
-            parameters.smoother,
-            keep=scenario_first.for_smoother(config),
-        ),
+        smoother=file.applied("velocity_smoother", parameters.smoother, keep=_limits(config)),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
-        planner=file.applied(
-            "planner_server",
-            parameters.planner,
-            prefix="GridBased.",
-            keep=scenario_first.for_planner(config.planner),
-        ),
-        controller_server=file.applied(
-            "controller_server",
-            parameters.controller_server,
-            keep=scenario_first.for_controllers(config),
-        ),
+        planner=file.applied("planner_server", parameters.planner, prefix="GridBased."),
+        controller_server=file.applied("controller_server", parameters.controller_server),
         behaviors=file.applied("behavior_server", parameters.behaviors),
-        docking=file.applied("docking_server", docking, keep=scenario_first.for_docking(config.docking)),
+        docking=file.applied("docking_server", docking, keep=_DOCKS),
         path_smoother=file.applied("smoother_server", parameters.path_smoother),
-        navigator=file.applied(
-            "bt_navigator",
-            parameters.navigator,
-            keep=scenario_first.for_navigator(config.navigator),
-        ),
+        navigator=file.applied("bt_navigator", parameters.navigator),
         waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
-    navigator, told = with_trees(file, changed.navigator, scenario_first.for_navigator(config.navigator))
-    changed = replace(changed, navigator=navigator)
+    navigator, told = with_trees(file, changed.navigator, frozenset(config.navigator.overrides()))
+    changed = with_scenario(replace(changed, navigator=navigator), config)
     if config.collision_monitor is None:
         monitor_of(file)
     return changed, [*told, *file.finish(elsewhere=("amcl", "collision_monitor", *elsewhere))]
 
 
+def _limits(config: NavigationConfig) -> frozenset[str]:
+    """Return the limits that the scenario gives, by axis as the smoother here has them."""
+    axis = names_of(AxisLimits)
+    names = {
+        f"linear.{axis.max_velocity}": config.max_linear_speed,
+        f"linear.{axis.max_acceleration}": config.max_linear_acceleration,
+        f"linear.{axis.max_deceleration}": config.max_linear_deceleration,
+        f"angular.{axis.max_velocity}": config.max_angular_speed,
+        f"angular.{axis.max_acceleration}": config.max_angular_acceleration,
+        f"angular.{axis.max_deceleration}": config.max_angular_acceleration,
+    }
+    return frozenset(name for name, limit in names.items() if limit is not None)
+
+
 def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
-    node, keep = f"{config.name}/{config.name}", scenario_first.for_costmap(group)
+    node = f"{config.name}/{config.name}"
     scans, ranges = sources_of(file, node)
     config = replace(
         config,
         scan_topics=config.scan_topics if group.scan_topics is not None else scans or config.scan_topics,
         range_topics=config.range_topics if group.range_topics is not None else ranges or config.range_topics,
     )
-    changed = file.applied(node, config, keep=keep)
+    changed = file.applied(node, config)
     if file.is_round(node) and group.robot_radius is None:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))
     return changed

@@ -12,6 +12,7 @@ from twin.models.options import DEFAULTS
 from twin.models.urdf.packages import PackagePath, Packages
 from twin.nodes.navigation.behavior_trees.navigator import tree_file
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
+from twin.parameters import NameOrPath
 from twin.parameters.declaration import fields_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 
@@ -35,7 +36,7 @@ def with_trees(
         keep: Parameters that the scenario gives.
     """
     told, trees, said = [], dict[str, Any](), file.effective("bt_navigator")
-    for name in (one.name for one in fields_of(config).values() if one.is_path):
+    for name in (one.name for one in fields_of(config).values() if NameOrPath in one.markers):
         if name in keep or not isinstance(said.get(name), str):
             continue
         tree = _located(said[name], file)
