@@ -50,28 +50,17 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
 
     for (a, b), distance in _distances(description, may_touch).items():
         neighbours = frozenset((heads[a], heads[b])) in joined
-        line = _line(description, b)
         if not neighbours and distance < -LEAST_DEPTH:
-            yield finding(
-                description,
-                "overlap",
-                f"link '{b}'",
-                line,
-                message=f"the collision shapes of '{a}' and '{b}' are {-distance:.3g} m inside of each other "
-                "at joint position zero",
-                fix="move or shrink one of them: they pass through each other, whatever <self_collide> says",
-            )
+            inside = f"{-distance:.3g} m inside of each other at joint position zero"
+            message = f"the collision shapes of '{a}' and '{b}' are {inside}"
+            fix = "move or shrink one of them: they pass through each other, whatever <self_collide> says"
+            yield finding(description, "overlap", f"link '{b}'", _line(description, b), message, fix)
         elif neighbours and distance < WHEEL_GAP and (a in wheels or b in wheels):
             wheel, other = (a, b) if a in wheels else (b, a)
             state = f"is {-distance:.3g} m inside of" if distance < -LEAST_DEPTH else "touches"
-            yield finding(
-                description,
-                "wheel-rubs",
-                f"link '{wheel}'",
-                _line(description, wheel),
-                message=f"wheel '{wheel}' {state} '{other}', in which it turns",
-                fix="leave a gap of some mm: move the wheel outwards, or make one of the shapes narrower",
-            )
+            line, message = _line(description, wheel), f"wheel '{wheel}' {state} '{other}', in which it turns"
+            fix = "leave a gap of some mm: move the wheel outwards, or make one of the shapes narrower"
+            yield finding(description, "wheel-rubs", f"link '{wheel}'", line, message, fix)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,8 @@ from twin.geometry import Array
 from twin.models import load
 from twin.models.checks import check
 from twin.models.mesh.hulls import hull_of
-from twin.models.mesh.meshes import TriangleMesh, mesh_faults, read_mesh
+from twin.models.mesh.mesh_formats import TriangleMesh
+from twin.models.mesh.meshes import mesh_faults, read_mesh
 from twin.models.options import ReadOptions
 from twin.models.shapes import Mesh
 
