@@ -31,8 +31,6 @@ class Transmission:
     """One `<transmission>` and what becomes of it."""
 
     element: Element
-    kind: str
-    """Without its package, such as `SimpleTransmission`."""
     joint: str | None
     """The joint that it commands; None if it has no effect."""
     interface: Interface | None
@@ -57,7 +55,6 @@ def transmissions(root: Element, joints: Mapping[str, Joint]) -> Iterator[Transm
         fault = _fault(kind, names, interface, interfaces, joints)
         yield Transmission(
             element=element,
-            kind=kind,
             joint=None if fault else names[0],
             interface=None if fault else interface,
             interfaces=interfaces,
