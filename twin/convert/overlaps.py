@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -43,10 +42,8 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
     def may_touch(a: _Solid, b: _Solid) -> bool:
         if frozenset((heads[a.link], heads[b.link])) not in joined:
             return True
-        return any(
-            wheel.link in wheels and not isinstance(beside.geometry, Mesh)
-            for wheel, beside in ((a, b), (b, a))
-        )
+        pairs = ((a.link, b.geometry), (b.link, a.geometry))
+        return any(wheel in wheels and not isinstance(beside, Mesh) for wheel, beside in pairs)
 
     for (a, b), distance in _distances(description, may_touch).items():
         neighbours = frozenset((heads[a], heads[b])) in joined
@@ -63,8 +60,7 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
             yield finding(description, "wheel-rubs", f"link '{wheel}'", line, message, fix)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Solid:
+class _Solid(NamedTuple):
     """A collision shape."""
 
     link: str
@@ -83,7 +79,7 @@ def _distances(
                 placed = pose @ collision.T_link_geometry
                 shape = _shape(spec, collision.geometry)
                 spec.worldbody.add_geom(**shape, pos=placed.xyz, quat=placed.quat_wxyz)
-                solids.append(_Solid(link=name, geometry=collision.geometry))
+                solids.append(_Solid(name, collision.geometry))
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -9,14 +9,13 @@ a say in that.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import os
 import pickle
 import re
 import sys
 from collections.abc import Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from types import TracebackType
 from typing import Any
 from xml.dom.minidom import Document, Element
@@ -45,19 +44,16 @@ FRAMES = 20_000
 """Of the interpreter; a macro takes up to ten."""
 
 
-class _Silence(io.TextIOBase):
-    """Takes what xacro prints."""
-
-    def write(self, text: str) -> int:
-        return len(text)
-
-
 def main() -> None:
     """Expand the requested file and answer with its text, or with what went wrong and where."""
     request = pickle.load(sys.stdin.buffer)
     limit_resources()
-    with contextlib.redirect_stdout(_Silence()), contextlib.redirect_stderr(_Silence()):
-        answer = _answer(request)
+    with (
+        open(os.devnull, "w", encoding="utf-8") as nowhere,
+        redirect_stdout(nowhere),
+        redirect_stderr(nowhere),
+    ):
+        answer = _answer(request)  # xacro prints
     json.dump(answer, sys.stdout)
 
 
