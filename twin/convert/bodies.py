@@ -107,19 +107,14 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 def _refuse_taken_names(description: RobotDescription) -> None:
     """Refuse joints that are called as one of those that stand for a planar or floating joint."""
-    joints = description.joints
-    problems = [
-        Problem(
-            f"joint '{name}{suffix}' has the name of a part of the {joint.type} joint '{name}'; rename it",
-            description.source,
-            joints[f"{name}{suffix}"].line or None,
-            code="duplicate-name",
-            element=f"joint '{name}{suffix}'",
-        )
-        for name, joint in joints.items()
-        for suffix in QPOS_NAMES.get(joint.type, ())
-        if f"{name}{suffix}" in joints
-    ]
+    problems = []
+    for name, joint in description.joints.items():
+        for part in (f"{name}{suffix}" for suffix in QPOS_NAMES.get(joint.type, ())):
+            if part in description.joints:
+                element, line = f"joint '{part}'", description.joints[part].line or None
+                message = f"{element} has the name of a part of the {joint.type} joint '{name}'; rename it"
+                problem = Problem(message, description.source, line, code="duplicate-name", element=element)
+                problems.append(problem)
     if problems:
         raise ConversionError(problems)
 
@@ -136,19 +131,13 @@ def _heavy_heads(description: RobotDescription) -> set[str]:
 
 
 def _refuse_massless(description: RobotDescription, base: Base) -> None:
-    heavy = _heavy_heads(description)
-    still = description.root if base != "free" else None
-    problems = [
-        Problem(
-            f"link '{head}' moves and has no mass, nor has anything fixed to it; give it an <inertial>"
-            + (", or fix the base" if head == description.root else ""),
-            description.source,
-            description.links[head].line or None,
-            code="massless",
-            element=f"link '{head}'",
-        )
-        for head in dict.fromkeys(rigid_groups(description).values())
-        if head not in heavy and head != still
-    ]
+    heavy, problems = _heavy_heads(description), []
+    for head in dict.fromkeys(rigid_groups(description).values()):
+        if head not in heavy and (base == "free" or head != description.root):
+            fix = "give it an <inertial>" + (", or fix the base" if head == description.root else "")
+            element, line = f"link '{head}'", description.links[head].line or None
+            message = f"{element} moves and has no mass, nor has anything fixed to it; {fix}"
+            problem = Problem(message, description.source, line, code="massless", element=element)
+            problems.append(problem)
     if problems:
         raise ConversionError(problems)

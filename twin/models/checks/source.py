@@ -35,6 +35,4 @@ def number(text: str | None) -> float:
 def is_repeated(element: Element) -> bool:
     """Tell whether an element stands a second time where URDF has it once."""
     parent = element.getparent()
-    if parent is None or parent.tag not in ONCE:
-        return False
-    return parent.find(element.tag) is not element
+    return parent is not None and parent.tag in ONCE and parent.find(element.tag) is not element

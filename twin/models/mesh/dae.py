@@ -103,10 +103,8 @@ def _parse(data: bytes) -> Element:
 
 def _refuse_doctype(data: bytes) -> None:
     """Entities could read files and exhaust memory. A DOCTYPE stands before the root element."""
-    found: list[str] = []
 
-    def stop(name: str, *_: object) -> None:
-        found.append(name)
+    def stop(*_: object) -> None:
         raise StopIteration
 
     def refuse(*_: object) -> None:

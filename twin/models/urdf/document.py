@@ -226,20 +226,16 @@ def _drop_default_namespace(root: Element) -> None:
 
 def _check_names(root: Element, report: Report) -> None:
     """Note links and joints whose names have spaces at their ends or what is not seen, and mend them."""
+    fault = "has spaces at its ends or line breaks, or characters that are not seen; remove them"
     for element in root.iter():
         for attribute in NAMES:
-            name = element.get(attribute)
-            plain = None if name is None else " ".join(part for part in _BREAKS.split(name) if part).strip()
+            name = element.get(attribute, "")
+            plain = " ".join(filter(None, _BREAKS.split(name))).strip()
             if plain == name:
                 continue
             element.set(attribute, plain)
             if plain and element.tag in NAMED:
-                report.add(
-                    element,
-                    f"{describe(element)}: {attribute}= has spaces at its ends or line breaks, "
-                    "or characters that are not seen; remove them",
-                    code="bad-name",
-                )
+                report.add(element, f"{describe(element)}: {attribute}= {fault}", code="bad-name")
 
 
 def _refuse_unexpanded(root: Element, report: Report) -> None:
