@@ -82,9 +82,7 @@ def _add_commanded(
     limit = joint.limit
     actuator = _add(spec, joint)
     # The file's limit is of each joint; a drive that others follow has to move them all.
-    _limit_force(
-        actuator, None if limit.effort is None else limit.effort * drive_ratio(description, joint.name)
-    )
+    _limit_force(actuator, limit.effort and limit.effort * drive_ratio(description, joint.name))
     if actuator.forcelimited == mujoco.mjtLimited.mjLIMITED_TRUE:
         spec.joint(joint.name).actfrcrange = actuator.forcerange
     if command.interface == "effort":
@@ -155,11 +153,10 @@ def _limit_force(actuator: mujoco.MjsActuator, effort: float | None) -> None:
 def _limit_command(
     actuator: mujoco.MjsActuator,
     command: CommandSpec | None,
-    lower: float | None = None,
-    upper: float | None = None,
+    low: float = -math.inf,
+    high: float = math.inf,
 ) -> None:
     """Limit commands to what both the joint and its command interface allow."""
-    low, high = (-math.inf if lower is None else lower), (math.inf if upper is None else upper)
     if command is not None:
         low = low if command.lower is None else max(low, command.lower)
         high = high if command.upper is None else min(high, command.upper)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Container
 from typing import Literal
 
@@ -15,7 +14,6 @@ from twin.errors import ConversionError, Problem
 from twin.geometry import Pose3
 from twin.models.description import Joint, RobotDescription
 from twin.models.kinematics import planar_axes, rigid_groups
-from twin.models.mass_properties import MassProperties
 
 Base = Literal["free", "fixed", "kinematic"]
 
@@ -44,7 +42,12 @@ def add_bodies(
     masses = description.settlement.bodies
 
     def add_link(parent: mujoco.MjsBody, name: str, T_parent_link: Pose3) -> mujoco.MjsBody:
-        body = _add_body(parent, name, T_parent_link, masses.get(name))
+        body = parent.add_body(name=name, pos=T_parent_link.xyz, quat=T_parent_link.quat_wxyz)
+        # Without an inertial a link weighs nothing; MuJoCo would else weigh its shapes.
+        body.explicitinertial = True
+        if (settled := masses.get(name)) is not None:
+            body.mass, body.ipos = settled.mass, settled.com
+            body.fullinertia = settled.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         if geoms is not None:
             geoms.add(body, description.links[name])
         return body
@@ -56,34 +59,21 @@ def add_bodies(
     elif base == "free":
         root_joint = free_name(f"{description.root}_free_joint", description.joints)
         root.add_freejoint(name=root_joint)
-    pending = deque([(description.root, root)])
-    while pending:
-        name, body = pending.popleft()
-        for joint in description.children(name):
-            child = add_link(body, joint.child, joint.T_parent_joint)
-            _add_joint(child, joint, is_wheel=joint.name in wheel_joints)
-            pending.append((joint.child, child))
+    bodies = {description.root: root}
+    for joint in description.outwards:
+        bodies[joint.child] = add_link(bodies[joint.parent], joint.child, joint.T_parent_joint)
+        _add_joint(bodies[joint.child], joint, is_wheel=joint.name in wheel_joints)
     return root_joint
-
-
-def _add_body(
-    parent: mujoco.MjsBody, name: str, T_parent_link: Pose3, mass: MassProperties | None
-) -> mujoco.MjsBody:
-    body = parent.add_body(name=name, pos=T_parent_link.xyz, quat=T_parent_link.quat_wxyz)
-    # Without an inertial a link weighs nothing; MuJoCo would else weigh its shapes.
-    body.explicitinertial = True
-    if mass is not None:
-        body.mass = mass.mass
-        body.ipos = mass.com
-        body.fullinertia = mass.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return body
 
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, is_wheel: bool) -> None:
     if joint.type == "fixed":
         return
-    if joint.type == "planar":
-        _add_planar(body, joint)
+    if joint.type == "planar":  # two slides in the plane, then a hinge about its normal
+        *across, normal = planar_axes(joint)
+        for suffix, axis in zip("xy", across, strict=True):
+            body.add_joint(name=f"{joint.name}_{suffix}", type=_TYPE.mjJNT_SLIDE, axis=axis)
+        body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
         return
     if joint.type == "floating":
         for name, axis in zip("xyz", np.eye(3), strict=True):
@@ -107,14 +97,6 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, is_wheel: bool) -> None:
         added.actfrcrange = [-limit.effort, limit.effort]
 
 
-def _add_planar(body: mujoco.MjsBody, joint: Joint) -> None:
-    """Add two slides in the plane, then a hinge about its normal."""
-    along, across, normal = planar_axes(joint)
-    for suffix, axis in (("x", along), ("y", across)):
-        body.add_joint(name=f"{joint.name}_{suffix}", type=_TYPE.mjJNT_SLIDE, axis=axis)
-    body.add_joint(name=f"{joint.name}_yaw", type=_TYPE.mjJNT_HINGE, axis=normal)
-
-
 def free_name(name: str, taken: Container[str]) -> str:
     """Return `name`, with a number if it is taken."""
     free, number = name, 2
@@ -125,19 +107,14 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 def _refuse_taken_names(description: RobotDescription) -> None:
     """Refuse joints that are called as one of those that stand for a planar or floating joint."""
-    joints = description.joints
-    problems = [
-        Problem(
-            f"joint '{name}{suffix}' has the name of a part of the {joint.type} joint '{name}'; rename it",
-            description.source,
-            joints[f"{name}{suffix}"].line or None,
-            code="duplicate-name",
-            element=f"joint '{name}{suffix}'",
-        )
-        for name, joint in joints.items()
-        for suffix in QPOS_NAMES.get(joint.type, ())
-        if f"{name}{suffix}" in joints
-    ]
+    problems = []
+    for name, joint in description.joints.items():
+        for part in (f"{name}{suffix}" for suffix in QPOS_NAMES.get(joint.type, ())):
+            if part in description.joints:
+                element, line = f"joint '{part}'", description.joints[part].line or None
+                message = f"{element} has the name of a part of the {joint.type} joint '{name}'; rename it"
+                problem = Problem(message, description.source, line, code="duplicate-name", element=element)
+                problems.append(problem)
     if problems:
         raise ConversionError(problems)
 
@@ -154,19 +131,13 @@ def _heavy_heads(description: RobotDescription) -> set[str]:
 
 
 def _refuse_massless(description: RobotDescription, base: Base) -> None:
-    heavy = _heavy_heads(description)
-    still = description.root if base != "free" else None
-    problems = [
-        Problem(
-            f"link '{head}' moves and has no mass, nor has anything fixed to it; give it an <inertial>"
-            + (", or fix the base" if head == description.root else ""),
-            description.source,
-            description.links[head].line or None,
-            code="massless",
-            element=f"link '{head}'",
-        )
-        for head in dict.fromkeys(rigid_groups(description).values())
-        if head not in heavy and head != still
-    ]
+    heavy, problems = _heavy_heads(description), []
+    for head in dict.fromkeys(rigid_groups(description).values()):
+        if head not in heavy and (base == "free" or head != description.root):
+            fix = "give it an <inertial>" + (", or fix the base" if head == description.root else "")
+            element, line = f"link '{head}'", description.links[head].line or None
+            message = f"{element} moves and has no mass, nor has anything fixed to it; {fix}"
+            problem = Problem(message, description.source, line, code="massless", element=element)
+            problems.append(problem)
     if problems:
         raise ConversionError(problems)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from twin.convert.conversion import Guess
 from twin.models.checks.ground import CASTER_NAME, LEVEL
 from twin.models.checks.wheels import Wheel, wheels_of
 from twin.models.description import RobotDescription
@@ -53,23 +55,15 @@ def commanded_wheels(description: RobotDescription) -> tuple[Wheel, ...]:
     drive = description.drive
     order = () if drive is None else (*drive.left_joints, *drive.right_joints)
     known = {wheel.joint.name: wheel for wheel in wheels_of(description)}
-    others = [
-        wheel
-        for name, wheel in known.items()
-        if name not in order
-        and name in description.commands
-        and description.commands[name].interface == "velocity"
-    ]
+    by_velocity = {name for name, spec in description.commands.items() if spec.interface == "velocity"}
+    others = [wheel for name, wheel in known.items() if name not in order and name in by_velocity]
     return (*(known[name] for name in order), *others)
 
 
 def _casters(description: RobotDescription, wheels: frozenset[str]) -> frozenset[str]:
     heads, poses = rigid_groups(description), link_poses(description)
     bottoms = {
-        name: min(
-            lowest(collision.geometry, poses[name] @ collision.T_link_geometry)
-            for collision in link.collisions
-        )
+        name: min(lowest(c.geometry, poses[name] @ c.T_link_geometry) for c in link.collisions)
         for name, link in description.links.items()
         if link.collisions and not any(isinstance(c.geometry, Mesh) for c in link.collisions)
     }
@@ -89,13 +83,25 @@ def _casters(description: RobotDescription, wheels: frozenset[str]) -> frozenset
 
 def _is_commanded(description: RobotDescription, link: str) -> bool:
     """Tell whether any joint between the root and `link` has a command, its own or its leader's."""
-    joint_above = {joint.child: joint for joint in description.joints.values()}
-    while link in joint_above:
-        joint = joint_above[link]
-        leader = joint
-        while leader.mimic is not None:
-            leader = description.joints[leader.mimic.joint]
-        if leader.name in description.commands:
+    for joint in description.above(link):
+        while joint.mimic is not None:
+            joint = description.joints[joint.mimic.joint]
+        if joint.name in description.commands:
             return True
-        link = joint.parent
     return False
+
+
+def contact_guesses(description: RobotDescription, roles: Roles) -> Iterator[Guess]:
+    """Yield what was chosen for the contacts of links, as the robot file does not say it, in file order."""
+    for link in description.links.values():
+        element = f"link '{link.name}'"
+        if link.name in roles.wheels:
+            yield Guess(element=f"contact of {element}", note="carries the robot without sinking in")
+        if link.surface.friction is None and link.name in roles.casters:
+            yield Guess(element=f"friction of {element}", note="none: it slides where a caster would roll")
+        elif link.surface.friction is None and link.collisions:
+            note = "the larger of 1 and that of what it touches"
+            yield Guess(element=f"friction of {element}", note=note)
+        if link.name in roles.gripping:
+            note = "stiff: a commanded joint presses it against things"
+            yield Guess(element=f"contact of {element}", note=note)

@@ -8,12 +8,10 @@ import mujoco
 
 from twin.convert.actuators import add_actuators, moved_inertia
 from twin.convert.bodies import Base, add_bodies, free_name
-from twin.convert.contact_roles import roles_of
+from twin.convert.contact_roles import contact_guesses, roles_of
 from twin.convert.contacts import add_excludes, exclude_overlaps, spawn_height
 from twin.convert.conversion import Conversion
-from twin.convert.extensions import add_extensions
 from twin.convert.geoms import GeomBuilder
-from twin.convert.guesses import contact_guesses
 from twin.convert.massless_links import refuse_singular
 from twin.convert.mujoco_log import without_warnings
 from twin.convert.tyres import carry_load
@@ -63,7 +61,7 @@ def convert(
     geoms = GeomBuilder(spec, roles, timestep=timestep, visuals=visuals)
     root_joint = add_bodies(spec, description, base=base, geoms=geoms, wheel_joints=roles.wheel_joints)
     add_excludes(spec, description)
-    add_extensions(spec, description)
+    _add_extensions(spec, description)
     carry_load(spec, moving, roles)
     moved = moved_inertia(description, moving)
     servos = add_actuators(spec, description, moved, timestep=timestep)
@@ -78,6 +76,16 @@ def convert(
     )
 
 
+def _add_extensions(spec: mujoco.MjSpec, description: RobotDescription) -> None:
+    """Hold up the links that gravity does not pull, and add springs to joints, as `<gazebo>` says."""
+    for link in description.links.values():
+        if not link.surface.gravity:
+            spec.body(link.name).gravcomp = 1.0
+    for name, spring in description.springs.items():
+        joint = spec.joint(name)
+        joint.stiffness[0], joint.springref = spring.stiffness, spring.reference
+
+
 def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjModel:
     try:
         mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), MOST_CACHED)
@@ -90,34 +98,30 @@ def _compile(spec: mujoco.MjSpec, description: RobotDescription) -> mujoco.MjMod
 
 def _refuse_deep(description: RobotDescription) -> None:
     """Refuse a chain of links that is too long for the XML reader that MuJoCo uses."""
-    level, depth = [description.root], 1
-    while level:
-        if depth > DEEPEST:
-            message = (
-                f"more than {DEEPEST} links hang on each other, down to '{level[0]}'; MuJoCo reads no more"
-            )
-            raise ConversionError(
-                Problem(message, description.source, code="mujoco", element=f"link '{level[0]}'")
-            )
-        level, depth = [joint.child for link in level for joint in description.children(link)], depth + 1
+    depth = {description.root: 1}
+    for joint in description.outwards:
+        link = joint.child
+        depth[link] = depth[joint.parent] + 1
+        if depth[link] > DEEPEST:
+            message = f"more than {DEEPEST} links hang on each other, down to '{link}'; MuJoCo reads no more"
+            problem = Problem(message, description.source, code="mujoco", element=f"link '{link}'")
+            raise ConversionError(problem)
 
 
 def _without_world(description: RobotDescription) -> RobotDescription:
     """Return the robot with a link `world` renamed, as MuJoCo has a body of this name."""
     if WORLD not in description.links:
         return description
-    name = free_name(f"{WORLD}_link", description.links)
-    links = {(name if key == WORLD else key): link for key, link in description.links.items()}
-    links[name] = replace(links[name], name=name)
-    joints = {
-        key: replace(
-            joint,
-            parent=name if joint.parent == WORLD else joint.parent,
-            child=name if joint.child == WORLD else joint.child,
-        )
-        for key, joint in description.joints.items()
-    }
-    sensors = tuple(replace(s, link=name) if s.link == WORLD else s for s in description.sensors)
-    cameras = tuple(replace(c, link=name) if c.link == WORLD else c for c in description.cameras)
-    root = name if description.root == WORLD else description.root
-    return replace(description, root=root, links=links, joints=joints, sensors=sensors, cameras=cameras)
+    names = {name: name for name in description.links}
+    names[WORLD] = free_name(f"{WORLD}_link", description.links)
+    return replace(
+        description,
+        root=names[description.root],
+        links={names[key]: replace(link, name=names[key]) for key, link in description.links.items()},
+        joints={
+            key: replace(joint, parent=names[joint.parent], child=names[joint.child])
+            for key, joint in description.joints.items()
+        },
+        sensors=tuple(replace(sensor, link=names[sensor.link]) for sensor in description.sensors),
+        cameras=tuple(replace(camera, link=names[camera.link]) for camera in description.cameras),
+    )

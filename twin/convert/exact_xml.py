@@ -13,29 +13,15 @@ SAME = 1e-5
 """Relative difference up to which a number is taken for the rounded form of another."""
 WRITTEN_AS_ZERO = 2e-12
 """MuJoCo writes smaller numbers as 0 [SI]."""
-BODY = {"pos": "pos", "quat": "quat"}
+POSE = {"pos": "pos", "quat": "quat"}
 INERTIAL = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
-GEOM = {"pos": "pos", "quat": "quat", "size": "size"}
-JOINT = {
-    "axis": "axis",
-    "range": "range",
-    "actuatorfrcrange": "actfrcrange",
-    "damping": "damping",
-    "frictionloss": "frictionloss",
-    "armature": "armature",
-    "stiffness": "stiffness",
-    "springref": "springref",
-}
-SITE = {"pos": "pos", "quat": "quat"}
-CAMERA = {"pos": "pos", "quat": "quat", "fovy": "fovy"}
+GEOM = {**POSE, "size": "size"}
+_ALIKE = ("axis", "range", "damping", "frictionloss", "armature", "stiffness", "springref")
+JOINT = {"actuatorfrcrange": "actfrcrange", **{name: name for name in _ALIKE}}
+CAMERA = {**POSE, "fovy": "fovy"}
 SENSOR = {"cutoff": "cutoff", "noise": "noise"}
 EQUALITY = {"polycoef": "data"}
-ACTUATOR = {
-    "ctrlrange": "ctrlrange",
-    "forcerange": "forcerange",
-    "gainprm": "gainprm",
-    "biasprm": "biasprm",
-}
+ACTUATOR = {name: name for name in ("ctrlrange", "forcerange", "gainprm", "biasprm")}
 
 
 def exact_xml(spec: mujoco.MjSpec) -> str:
@@ -61,23 +47,21 @@ def _sources(
     """Yield each element with the object that has its numbers, and what they are called there."""
     for element in root.iterfind("worldbody//body"):
         body = spec.body(element.get("name"))
-        yield element, body, BODY
+        yield element, body, POSE
         for inertial in element.iterfind("inertial"):
             yield inertial, model.body(element.get("name")), INERTIAL
         for geom, source in zip(element.findall("geom"), body.geoms, strict=True):
             yield geom, source, GEOM
-        for joint in element.iterfind("joint"):
-            yield joint, spec.joint(joint.get("name")), JOINT
-        for site in element.iterfind("site"):
-            yield site, spec.site(site.get("name")), SITE
-        for camera in element.iterfind("camera"):
-            yield camera, spec.camera(camera.get("name")), CAMERA
-    for element in root.iterfind("equality/joint"):
-        yield element, spec.equality(element.get("name")), EQUALITY
-    for element in root.iterfind("sensor/*"):
-        yield element, spec.sensor(element.get("name")), SENSOR
-    for element in root.iterfind("actuator/general"):
-        yield element, spec.actuator(element.get("name")), ACTUATOR
+    for path, named, names in (
+        ("worldbody//body/joint", spec.joint, JOINT),
+        ("worldbody//body/site", spec.site, POSE),
+        ("worldbody//body/camera", spec.camera, CAMERA),
+        ("equality/joint", spec.equality, EQUALITY),
+        ("sensor/*", spec.sensor, SENSOR),
+        ("actuator/general", spec.actuator, ACTUATOR),
+    ):
+        for element in root.iterfind(path):
+            yield element, named(element.get("name")), names
 
 
 def _exact(text: str, value: Any) -> str:
@@ -87,8 +71,4 @@ def _exact(text: str, value: Any) -> str:
     slack = max(WRITTEN_AS_ZERO, SAME * float(np.max(np.abs(rounded), initial=0.0)))
     if len(exact) != len(rounded) or not np.allclose(rounded, exact, rtol=SAME, atol=slack):
         return text
-    return " ".join(_shortest(number) for number in exact.tolist())
-
-
-def _shortest(number: float) -> str:
-    return repr(number).removesuffix(".0")
+    return " ".join(repr(number).removesuffix(".0") for number in exact.tolist())

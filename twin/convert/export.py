@@ -6,7 +6,8 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,7 @@ def export(
     conversion = convert(description, base=base or natural_base(description))
     said = description.static or description.root == WORLD
     if base is None and conversion.root_joint is None and not said:
-        note = "bolted down, as it weighs nothing"
-        guess = Guess(element=f"base '{description.root}'", note=note)
+        guess = Guess(element=f"base '{description.root}'", note="bolted down, as it weighs nothing")
         conversion = replace(conversion, guesses=(*conversion.guesses, guess))
     spec = conversion.spec.copy()
     if set_options is not None:
@@ -94,33 +94,34 @@ def export(
 
 def _checked(folder: Path) -> Path:
     """Return the folder to write, links followed, if it is new, empty, or an earlier conversion."""
-    try:
+    with _writing(folder):
         target = folder.resolve()
         found = sorted(item.name for item in target.iterdir()) if target.is_dir() else None
         if found is None and target.exists():
             raise ConversionError(f"{folder}: is a file; give a new or empty folder")
-    except (OSError, ValueError, RuntimeError) as error:
-        raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another folder") from None
     ours = {MODEL, REPORT, ASSETS} if REPORT in (found or ()) else set()
     others = [name for name in found or () if name not in ours]
     if others:
-        raise ConversionError(
-            f"{folder}: the folder holds other files ({', '.join(others[:3])}); give a new or empty one"
-        )
+        fault = f"the folder holds other files ({', '.join(others[:3])}); give a new or empty one"
+        raise ConversionError(f"{folder}: {fault}")
     return target
 
 
 def _stage(folder: Path) -> Path:
     """Return a new folder beside `folder`, to be renamed when everything is in it."""
-    try:
+    with _writing(folder):
         folder.parent.mkdir(parents=True, exist_ok=True)
         return Path(tempfile.mkdtemp(prefix=f".{folder.name[:100]}.", dir=folder.parent))
-    except OSError as error:
-        raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another folder") from None
 
 
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Turn what the system has against a folder into a sentence."""
+    try:
+        yield
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise ConversionError(f"{folder}: cannot be written: {reason}; give another folder") from None
 
 
 def _write_and_load(spec: mujoco.MjSpec, file: Path, description: RobotDescription) -> mujoco.MjModel:
@@ -145,10 +146,8 @@ def _write_assets(spec: mujoco.MjSpec, folder: Path) -> list[str]:
 
 def _replace(new: Path, folder: Path) -> None:
     if not folder.exists():
-        try:
+        with _writing(folder):
             new.rename(folder)
-        except OSError as error:
-            raise ConversionError(f"{folder}: cannot be written: {_reason(error)}; give another") from None
         return
     old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
     folder.rename(old / folder.name)

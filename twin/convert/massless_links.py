@@ -49,13 +49,7 @@ def _refuse(model: mujoco.MjModel, description: RobotDescription, motion: Array)
     bodies = {model.body(model.dof_bodyid[dof]).name for dof in np.flatnonzero(moving)}
     joints = [joint.name for joint in description.joints.values() if joint.child in bodies]
     links = sorted(massless_carriers & bodies) or sorted(massless_carriers)
-    raise ConversionError(
-        Problem(
-            f"link '{links[0]}' has no mass, and joints {', '.join(joints)} can turn together and move none; "
-            "give it an <inertial>",
-            description.source,
-            description.links[links[0]].line or None,
-            code="massless",
-            element=f"link '{links[0]}'",
-        )
-    )
+    element, line = f"link '{links[0]}'", description.links[links[0]].line or None
+    both = f"joints {', '.join(joints)} can turn together and move none"
+    message = f"{element} has no mass, and {both}; give it an <inertial>"
+    raise ConversionError(Problem(message, description.source, line, code="massless", element=element))

@@ -7,8 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from twin.files.reading import read_bytes
-from twin.models.mesh.mesh_formats import write_msh, write_stl
-from twin.models.mesh.meshes import TriangleMesh, read_mesh
+from twin.models.mesh.mesh_formats import TriangleMesh, write_msh, write_stl
+from twin.models.mesh.meshes import read_mesh
 from twin.models.shapes import Mesh
 
 MOST_STL_FACES = 200_000

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -43,39 +42,25 @@ def overlaps(description: RobotDescription) -> Iterator[Diagnostic]:
     def may_touch(a: _Solid, b: _Solid) -> bool:
         if frozenset((heads[a.link], heads[b.link])) not in joined:
             return True
-        return any(
-            wheel.link in wheels and not isinstance(beside.geometry, Mesh)
-            for wheel, beside in ((a, b), (b, a))
-        )
+        pairs = ((a.link, b.geometry), (b.link, a.geometry))
+        return any(wheel in wheels and not isinstance(beside, Mesh) for wheel, beside in pairs)
 
     for (a, b), distance in _distances(description, may_touch).items():
         neighbours = frozenset((heads[a], heads[b])) in joined
-        line = _line(description, b)
         if not neighbours and distance < -LEAST_DEPTH:
-            yield finding(
-                description,
-                "overlap",
-                f"link '{b}'",
-                line,
-                message=f"the collision shapes of '{a}' and '{b}' are {-distance:.3g} m inside of each other "
-                "at joint position zero",
-                fix="move or shrink one of them: they pass through each other, whatever <self_collide> says",
-            )
+            inside = f"{-distance:.3g} m inside of each other at joint position zero"
+            message = f"the collision shapes of '{a}' and '{b}' are {inside}"
+            fix = "move or shrink one of them: they pass through each other, whatever <self_collide> says"
+            yield finding(description, "overlap", f"link '{b}'", _line(description, b), message, fix)
         elif neighbours and distance < WHEEL_GAP and (a in wheels or b in wheels):
             wheel, other = (a, b) if a in wheels else (b, a)
             state = f"is {-distance:.3g} m inside of" if distance < -LEAST_DEPTH else "touches"
-            yield finding(
-                description,
-                "wheel-rubs",
-                f"link '{wheel}'",
-                _line(description, wheel),
-                message=f"wheel '{wheel}' {state} '{other}', in which it turns",
-                fix="leave a gap of some mm: move the wheel outwards, or make one of the shapes narrower",
-            )
+            line, message = _line(description, wheel), f"wheel '{wheel}' {state} '{other}', in which it turns"
+            fix = "leave a gap of some mm: move the wheel outwards, or make one of the shapes narrower"
+            yield finding(description, "wheel-rubs", f"link '{wheel}'", line, message, fix)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Solid:
+class _Solid(NamedTuple):
     """A collision shape."""
 
     link: str
@@ -94,7 +79,7 @@ def _distances(
                 placed = pose @ collision.T_link_geometry
                 shape = _shape(spec, collision.geometry)
                 spec.worldbody.add_geom(**shape, pos=placed.xyz, quat=placed.quat_wxyz)
-                solids.append(_Solid(link=name, geometry=collision.geometry))
+                solids.append(_Solid(name, collision.geometry))
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -12,6 +12,7 @@ from typing import Any
 
 import mujoco
 
+from twin.convert.bodies import free_name
 from twin.geometry import Array, multiply_wxyz
 from twin.models.description import RobotDescription
 from twin.models.sensors import plugin_of
@@ -101,9 +102,7 @@ class SensorBuilder:
 
     def _free(self, name: str) -> str:
         """Return a name that no sensor has yet."""
-        free, number = name, 2
-        while free in self._taken:
-            free, number = f"{name}_{number}", number + 1
+        free = free_name(name, self._taken)
         self._taken.add(free)
         return free
 

@@ -15,7 +15,8 @@ ROBOTS = Path(__file__).parent / "robots"
 
 def catalogue() -> Mapping[str, Path]:
     """Return the file of every robot that has a name, in alphabetical order."""
-    shipped = {path.parent.name: path for path in sorted(ROBOTS.glob("*/*.urdf.xacro")) if _is_robot(path)}
+    files = sorted(ROBOTS.glob("*/*.urdf.xacro"))
+    shipped = {path.parent.name: path for path in files if path.name == f"{path.parent.name}.urdf.xacro"}
     return Files("robot", shipped, group="twin.robots", endings=(".urdf.xacro", ".xacro", ".urdf"))
 
 
@@ -38,7 +39,3 @@ def resolve(name_or_path: str | Path) -> Path:
         raise ModelError(Problem(message, code="no-file"))
     message = f"unknown robot '{text}': {nearest(text, robots)}, or the path of a URDF or xacro file"
     raise ModelError(Problem(message, code="no-file"))
-
-
-def _is_robot(path: Path) -> bool:
-    return path.name == f"{path.parent.name}.urdf.xacro"

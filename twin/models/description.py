@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from twin.errors import ModelError, Problem, nearest
 from twin.geometry import Array, Pose3
-from twin.models.shapes import Collision, SkippedMesh, Visual
+from twin.models.shapes import Collision, Shape, SkippedMesh, Visual
 from twin.models.specs import CameraSpec, CommandSpec, DriveSpec, Interface, SensorSpec
 from twin.models.urdf.line_table import LineTable
 
@@ -41,13 +41,10 @@ class Surface:
 
     friction: float | None = None
     """Coulomb coefficient, from mu1."""
-    friction2: float | None = None
-    """In the second direction, from mu2; no effect, as MuJoCo's friction is the same in every direction."""
     gravity: bool = True
     """False for a link that gravity does not pull, from turnGravityOff or gravity."""
     self_collide: bool | None = None
     """Whether it touches the robot's other links; None means that the file does not say."""
-    line: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +67,11 @@ class Link:
     collisions: tuple[Collision, ...] = ()
     surface: Surface = field(default_factory=Surface)
     line: int = 0
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """What can be seen, then what can be touched."""
+        return (*self.visuals, *self.collisions)
 
 
 JointType = Literal["fixed", "continuous", "revolute", "prismatic", "floating", "planar"]
@@ -155,6 +157,15 @@ class RobotDescription:
     self_collide: bool | None = None
     """Whether links that do not say touch each other, from `<gazebo><self_collide>`; None: not said."""
 
+    @cached_property
+    def outwards(self) -> tuple[Joint, ...]:
+        """The joints that can be reached from the root, each after the one above it, breadth first."""
+        links, joints = [self.root], list[Joint]()
+        for link in links:
+            joints += self.children(link)
+            links += [joint.child for joint in self.children(link)]
+        return tuple(joints)
+
     def children(self, link: str) -> tuple[Joint, ...]:
         """Return the joints below `link`, in file order."""
         return self._children.get(link, ())
@@ -165,6 +176,16 @@ class RobotDescription:
         for joint in self.joints.values():
             below.setdefault(joint.parent, []).append(joint)
         return {link: tuple(joints) for link, joints in below.items()}
+
+    def above(self, link: str) -> Iterator[Joint]:
+        """Yield the joints between `link` and the root, from the link on."""
+        while link in self._parents:
+            yield self._parents[link]
+            link = self._parents[link].parent
+
+    @cached_property
+    def _parents(self) -> Mapping[str, Joint]:
+        return {joint.child: joint for joint in self.joints.values()}
 
     @property
     def mass(self) -> float:

@@ -75,12 +75,8 @@ class _Motions:
             own[joint.name] = [*range(len(rows), len(rows) + len(motions))]
             rows += [(slide, turn, poses[joint.child].xyz) for slide, turn in motions]
         columns: dict[str, list[int]] = {description.root: []}
-        pending = [description.root]
-        while pending:
-            link = pending.pop()
-            for joint in description.children(link):
-                columns[joint.child] = columns[link] + own[joint.name]
-                pending.append(joint.child)
+        for joint in description.outwards:
+            columns[joint.child] = columns[joint.parent] + own[joint.name]
         slides, turns, origins = np.array(rows).reshape(-1, 3, 3).transpose(1, 0, 2)
         return cls(slides=slides, turns=turns, origins=origins, columns=columns)
 

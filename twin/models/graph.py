@@ -99,25 +99,17 @@ def _layout(description: RobotDescription) -> dict[tuple[str, str], _Box]:
 
 
 def _rows(description: RobotDescription, joints: list[Joint]) -> dict[tuple[str, str], float]:
-    rows: dict[tuple[str, str], float] = {}
-    leaves = 0
-    for link in (description.root, *(joint.child for joint in joints)):
-        if not description.children(link):
-            rows["link", link] = float(leaves)
-            leaves += 1
+    links = [description.root, *(joint.child for joint in joints)]
+    leaves = [link for link in links if not description.children(link)]
+    rows = {("link", link): float(row) for row, link in enumerate(leaves)}
+    above = {joint.child: joint.name for joint in joints}
     # Depth first backwards: children are placed before their parents.
-    for joint in reversed(joints):
-        if ("link", joint.child) not in rows:
-            rows["link", joint.child] = _middle(description, joint.child, rows)
-        rows["joint", joint.name] = rows["link", joint.child]
-    if ("link", description.root) not in rows:
-        rows["link", description.root] = _middle(description, description.root, rows)
+    for link in reversed(links):
+        if below := [rows["joint", joint.name] for joint in description.children(link)]:
+            rows["link", link] = (min(below) + max(below)) / 2.0
+        if link in above:
+            rows["joint", above[link]] = rows["link", link]
     return rows
-
-
-def _middle(description: RobotDescription, link: str, rows: dict[tuple[str, str], float]) -> float:
-    below = [rows["joint", joint.name] for joint in description.children(link)]
-    return (min(below) + max(below)) / 2.0
 
 
 def _arrow(start: _Box, end: _Box) -> str:
@@ -147,9 +139,7 @@ def _draw(box: _Box) -> str:
 def _origin(joint: Joint) -> tuple[str, str]:
     pose = joint.T_parent_joint
     xyz, rpy = pose.xyz.tolist(), _urdfdom_rpy(pose.quat_wxyz)
-    return "xyz: " + " ".join(f"{value:g}" for value in xyz), "rpy: " + " ".join(
-        f"{value:g}" for value in rpy
-    )
+    return f"xyz: {xyz[0]:g} {xyz[1]:g} {xyz[2]:g}", f"rpy: {rpy[0]:g} {rpy[1]:g} {rpy[2]:g}"
 
 
 def _urdfdom_rpy(quat_wxyz: Array) -> tuple[float, float, float]:

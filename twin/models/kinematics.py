@@ -80,25 +80,17 @@ def link_poses(description: RobotDescription, positions: Positions | None = None
     """
     every = joint_positions(description, positions or {})
     poses = {description.root: Pose3.from_xyz_rpy()}
-    pending = [description.root]
-    while pending:
-        link = pending.pop(0)
-        for joint in description.children(link):
-            motion = joint_motion(joint, every[joint.name])
-            poses[joint.child] = poses[link] @ joint.T_parent_joint @ motion
-            pending.append(joint.child)
+    for joint in description.outwards:
+        motion = joint_motion(joint, every[joint.name])
+        poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint @ motion
     return poses
 
 
 def rigid_groups(description: RobotDescription) -> dict[str, str]:
     """Return, for every link, the first link of its rigid group (fixed joints do not separate)."""
     head = {description.root: description.root}
-    pending = [description.root]
-    while pending:
-        link = pending.pop(0)
-        for joint in description.children(link):
-            head[joint.child] = head[link] if joint.type == "fixed" else joint.child
-            pending.append(joint.child)
+    for joint in description.outwards:
+        head[joint.child] = head[joint.parent] if joint.type == "fixed" else joint.child
     return head
 
 

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from twin.errors import Problem
 from twin.models.catalogue import resolve
 from twin.models.description import WORLD, Joint, Link, RobotDescription, Surface
 from twin.models.expansion.expand import expand
@@ -116,7 +115,9 @@ def parse_urdf(
     )
     if is_tree and not options.repair and len(rigid_groups(description)) == len(links):
         _refuse_impossible(description, root, report)
-    _sort(report)
+    # In the order of the files, each once: a material may be used by many visuals.
+    distinct = dict.fromkeys(report.problems)
+    report.problems = sorted(distinct, key=lambda problem: (str(problem.file), problem.line or 0))
     report.raise_if_any()
     return description
 
@@ -159,18 +160,15 @@ def _read_links(
         materials=read_materials(root, report),
         surfaces=surfaces,
     )
-    items = [(element, read_link(element, context)) for element in root.findall("link")]
-    links = unique("link", items, report)
-    return {name: link for name, link in links.items() if isinstance(link, Link)}
+    return unique(
+        "link", [(element, read_link(element, context)) for element in root.iterfind("link")], report
+    )
 
 
 def _read_joints(root: Element, report: Report) -> tuple[dict[str, Joint], dict[str, Element]]:
     items = [(element, read_joint(element, report)) for element in root.findall("joint")]
-    joints = unique("joint", items, report)
-    elements: dict[str, Element] = {}
-    for element, joint in items:
-        elements.setdefault(joint.name, element)
-    return {name: joint for name, joint in joints.items() if isinstance(joint, Joint)}, elements
+    elements: dict[str, Element] = {joint.name: element for element, joint in reversed(items)}
+    return unique("joint", items, report), elements
 
 
 def _refuse_impossible(description: RobotDescription, root: Element, report: Report) -> None:
@@ -183,9 +181,3 @@ def _refuse_impossible(description: RobotDescription, root: Element, report: Rep
             element = elements.get(head, elements.get(repair.parts[0] if repair.parts else head))
             inertia = None if element is None else element.find("inertial/inertia")
             report.add(inertia, f"{message}; {nearest}: give --repair to take it", code="impossible-inertia")
-
-
-def _sort(report: Report) -> None:
-    """Put problems in the order of the files, each once (a material may be used by many visuals)."""
-    distinct: dict[Problem, None] = dict.fromkeys(report.problems)
-    report.problems = sorted(distinct, key=lambda problem: (str(problem.file), problem.line or 0))

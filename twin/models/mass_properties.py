@@ -144,14 +144,11 @@ def settle(description: RobotDescription) -> Settlement:
 def _carriers(description: RobotDescription, bodies: Mapping[str, MassProperties]) -> list[str]:
     """Return the heads of moving rigid bodies without mass that have mass further out."""
     heads = rigid_groups(description)
-    below = {joint.child: joint.parent for joint in description.joints.values()}
     heavy = {heads[name] for name in bodies}
     carrying: set[str] = set()
-    for name in bodies:
-        link = heads[name]
-        while link in below and heads[below[link]] not in carrying:
-            link = heads[below[link]]
-            carrying.add(link)
+    for joint in reversed(description.outwards):
+        if joint.type != "fixed" and (joint.child in heavy or joint.child in carrying):
+            carrying.add(heads[joint.parent])
     return [name for name in description.links if name in carrying - heavy - {description.root}]
 
 

@@ -60,27 +60,28 @@ Geometry = Box | Cylinder | Sphere | Capsule | Mesh
 
 
 @dataclass(frozen=True, kw_only=True)
-class Visual:
-    """A shape to look at."""
+class Shape:
+    """A shape of a link."""
 
     T_link_geometry: Pose3
     geometry: Geometry
-    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
-    """Resolved from the file's materials."""
-    has_material: bool = True
-    """Without one, a mesh may have a colour of its own."""
     name: str = ""
     line: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Collision:
-    """A shape to touch."""
+class Visual(Shape):
+    """A shape to look at."""
 
-    T_link_geometry: Pose3
-    geometry: Geometry
-    name: str = ""
-    line: int = 0
+    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
+    """Resolved from the file's materials."""
+    has_material: bool = True
+    """Without one, a mesh may have a colour of its own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collision(Shape):
+    """A shape to touch."""
 
 
 @dataclass(frozen=True, kw_only=True)

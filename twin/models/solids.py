@@ -10,9 +10,9 @@ import numpy as np
 from twin.errors import ModelError
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.models.mesh.hulls import Hull, hull_of
-from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
+from twin.models.shapes import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
+from twin.models.shapes import Shape as Shape
 
-Shape = Visual | Collision
 Primitive = Box | Cylinder | Sphere | Capsule
 
 
@@ -70,11 +70,11 @@ def volume(geometry: Geometry) -> float:
     if isinstance(geometry, Box):
         return math.prod(geometry.size)
     assert isinstance(geometry, Primitive)
-    r = geometry.radius
-    ball = 4.0 / 3.0 * math.pi * r**3
-    if isinstance(geometry, Sphere):
-        return ball
-    return math.pi * r * r * geometry.length + (ball if isinstance(geometry, Capsule) else 0.0)
+    disc = math.pi * geometry.radius**2
+    if isinstance(geometry, Cylinder):
+        return disc * geometry.length
+    ball = disc * geometry.radius * 4.0 / 3.0
+    return disc * geometry.length + ball if isinstance(geometry, Capsule) else ball
 
 
 def centre(geometry: Geometry) -> Array:

@@ -14,7 +14,6 @@ from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report
 from twin.models.urdf.sensors import Common
 from twin.sensors.sensor import Sensor
-from twin.sim.sensors import Mount
 
 CONTACT_FOUND_AND_FORCE, NET_FORCE, ONE_SLOT = 0b11, 3, 1
 """mjCONDATA_FOUND and mjCONDATA_FORCE as bits, `reduce="netforce"`, `num="1"`."""
@@ -52,20 +51,13 @@ class ContactSensor(Sensor):
         """Read nothing but what all sensors have."""
         return ContactSpec(**common)
 
-    def __init__(self, spec: ContactSpec, mount: Mount) -> None:
-        super().__init__(spec, mount)
-        self._world = mount.world
-        self._body = mount.body
-
     def sample(self, time_ns: int) -> ContactReading:
         """Feel."""
-        touched: list[str] = []
-        force = 0.0
-        for contact in self._world.contacts():
-            if self._body in (contact.body1, contact.body2):
-                touched.append(contact.body2 if contact.body1 == self._body else contact.body1)
-                force += contact.force_N
-        return ContactReading(time_ns=time_ns, touched=tuple(touched), force_N=force)
+        body, every = self.mount.body, self.mount.world.contacts()
+        mine = [contact for contact in every if body in (contact.body1, contact.body2)]
+        touched = tuple(other.body2 if other.body1 == body else other.body1 for other in mine)
+        force = sum((contact.force_N for contact in mine), 0.0)
+        return ContactReading(time_ns=time_ns, touched=touched, force_N=force)
 
     @classmethod
     def to_message(cls, spec: ContactSpec, header: Header, reading: ContactReading) -> Bool:

@@ -91,7 +91,6 @@ class Imu(Sensor):
         super().__init__(spec, mount)
         self._world = mount.world
         self._body = mount.body_id
-        self._noise = mount.noise(spec.name)
         self._bias = spec.gyro_bias_stddev * mount.noise(spec.name, "gyro_bias").normal(0, 3)
         self._sigma = np.repeat([spec.gyro_noise_stddev, spec.accel_noise_stddev], 3)
         self._twist, self._acceleration = np.zeros(6), np.zeros(6)
@@ -102,7 +101,7 @@ class Imu(Sensor):
         world.refresh_motion()
         mujoco.mj_objectVelocity(world.model, world.data, _BODY, self._body, self._twist, 1)
         mujoco.mj_objectAcceleration(world.model, world.data, _BODY, self._body, self._acceleration, 1)
-        noise = self._sigma * self._noise.normal(time_ns // world.timestep_ns, 6)
+        noise = self._sigma * self._normal(time_ns, 6)
         return ImuReading(
             time_ns=time_ns,
             angular_velocity=self._twist[:3] + self._bias + noise[:3],

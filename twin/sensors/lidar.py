@@ -14,16 +14,9 @@ from twin.geometry import Array, quat_wxyz_from_yaw
 from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report, text_of
 from twin.models.urdf.gazebo import number_in
-from twin.models.urdf.sensors import Common, required_number
+from twin.models.urdf.sensors import Common, add_fault, required_number
 from twin.sensors.range import Range
-from twin.sensors.ray_elements import (
-    FATES,
-    MAX_RAYS,
-    add_rangefinders,
-    ray_child,
-    read_noise,
-    read_reach,
-)
+from twin.sensors.ray_elements import FATES, MAX_RAYS, add_rangefinders, ray_child, read_noise, read_reach
 from twin.sensors.sensor import Sensor
 from twin.sim.sensors import Mount
 from twin.sim.sensors.rays import RayCaster
@@ -88,20 +81,12 @@ class Lidar(Sensor):
         samples = required_number(element, scan, "samples", report)
         if samples != int(samples) or not 1 <= samples <= MAX_SAMPLES:
             valid = f"a whole number from 1 to {MAX_SAMPLES}"
-            report.add(
-                element,
-                f"sensor '{element.get('name', '')}' has {samples:g} samples; {valid}",
-                code="bad-sensor",
-            )
+            add_fault(report, element, f" has {samples:g} samples; {valid}")
             samples = 1.0
         low = required_number(element, scan, "min_angle", report)
         high = required_number(element, scan, "max_angle", report)
         if low > high:
-            report.add(
-                element,
-                f"sensor '{element.get('name', '')}': min_angle is above max_angle",
-                code="bad-sensor",
-            )
+            add_fault(report, element, ": min_angle is above max_angle")
         range_min, range_max = read_reach(element, report)
         return LidarSpec(
             **common,
@@ -125,8 +110,6 @@ class Lidar(Sensor):
         angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
         directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(spec.samples)))
         self._rays = RayCaster(mount, directions, cutoff=spec.range_max)
-        self._noise = mount.noise(spec.name)
-        self._world = mount.world
 
     def sample(self, time_ns: int) -> LidarReading:
         """Scan; all rays are cast at the same time."""
@@ -134,8 +117,7 @@ class Lidar(Sensor):
         distance = self._rays.cast()
         ranges = distance
         if spec.noise_stddev > 0.0:
-            noise = self._noise.normal(time_ns // self._world.timestep_ns, spec.samples)
-            ranges = distance + spec.noise_stddev * noise
+            ranges = distance + spec.noise_stddev * self._normal(time_ns, spec.samples)
         ranges = np.where(distance > spec.range_max, np.inf, ranges)
         return LidarReading(time_ns=time_ns, ranges=np.where(distance < spec.range_min, -np.inf, ranges))
 

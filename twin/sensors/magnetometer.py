@@ -19,7 +19,6 @@ from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report
 from twin.models.urdf.sensors import Common, deviation
 from twin.sensors.sensor import Sensor
-from twin.sim.sensors import Mount
 
 MagneticField = types.get("sensor_msgs/msg/MagneticField")
 FIELD = (5.5645e-6, 22.8758e-6, -42.3884e-6)
@@ -44,10 +43,6 @@ class Magnetometer(Sensor):
     in_mujoco = "site with a magnetometer"
     fates: ClassVar = MappingProxyType[str, Fate]({"magnetometer/x/noise/stddev": NOISE})
 
-    def __init__(self, spec: MagnetometerSpec, mount: Mount) -> None:
-        super().__init__(spec, mount)
-        self._noise = mount.noise(spec.name)
-
     @classmethod
     def read(cls, element: Element, common: Common, report: Report) -> MagnetometerSpec:
         """Read the noise of the x axis, which holds for all."""
@@ -58,8 +53,7 @@ class Magnetometer(Sensor):
         """Return the flux density, shape (3,) [T]."""
         w, *xyz = self.mount.world.pose(self.mount.body).quat_wxyz
         field = rotate_wxyz(np.array([w, *(-part for part in xyz)]), np.array(FIELD))
-        step = time_ns // self.mount.world.timestep_ns
-        return field + self.spec.noise_stddev * self._noise.normal(step, 3)
+        return field + self.spec.noise_stddev * self._normal(time_ns, 3)
 
     @classmethod
     def to_message(cls, spec: MagnetometerSpec, header: Header, reading: Array) -> object:

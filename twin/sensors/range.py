@@ -15,7 +15,7 @@ from twin.convert.sensors import SensorBuilder
 from twin.geometry import Array, multiply_wxyz, quat_wxyz_from_rpy, quat_wxyz_from_yaw
 from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report
-from twin.models.urdf.sensors import Common, required_number
+from twin.models.urdf.sensors import Common, add_fault, required_number
 from twin.sensors.ray_elements import FATES, add_rangefinders, ray_child, read_noise, read_reach
 from twin.sensors.sensor import Sensor
 from twin.sim.sensors import Mount
@@ -88,11 +88,7 @@ class Range(Sensor):
             largest = required_number(element, scan, "max_angle", report)
             field_of_view = largest - required_number(element, scan, "min_angle", report)
         if not 0.0 < field_of_view < math.pi:
-            report.add(
-                element,
-                f"sensor '{element.get('name', '')}' has a cone of {field_of_view:g} rad; 0 to pi is valid",
-                code="bad-sensor",
-            )
+            add_fault(report, element, f" has a cone of {field_of_view:g} rad; 0 to pi is valid")
         return RangeSpec(
             **common,
             field_of_view=field_of_view,
@@ -104,8 +100,6 @@ class Range(Sensor):
     def __init__(self, spec: RangeSpec, mount: Mount) -> None:
         super().__init__(spec, mount)
         self._rays = RayCaster(mount, cone(spec.field_of_view), cutoff=spec.range_max)
-        self._noise = mount.noise(spec.name)
-        self._world = mount.world
 
     def sample(self, time_ns: int) -> RangeReading:
         """Listen."""
@@ -117,8 +111,8 @@ class Range(Sensor):
             return RangeReading(time_ns=time_ns, range=-math.inf)
         if nearest > spec.range_max:
             return RangeReading(time_ns=time_ns, range=math.inf)
-        noise = float(self._noise.normal(time_ns // self._world.timestep_ns, 1)[0])
-        return RangeReading(time_ns=time_ns, range=nearest + spec.noise_stddev * noise)
+        noise = spec.noise_stddev * float(self._normal(time_ns, 1)[0])
+        return RangeReading(time_ns=time_ns, range=nearest + noise)
 
     @classmethod
     def to_message(cls, spec: RangeSpec, header: Header, reading: RangeReading) -> RangeMessage:

@@ -12,7 +12,7 @@ from twin.convert.sensors import SensorBuilder
 from twin.geometry import Array, multiply_wxyz
 from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report, first
-from twin.models.urdf.sensors import deviation, required_number
+from twin.models.urdf.sensors import add_fault, deviation, required_number
 
 RAY = ("lidar", "ray")
 """The element with <scan> and <range>: new and classic name."""
@@ -55,11 +55,7 @@ def read_reach(element: Element, report: Report) -> tuple[float, float]:
     low = required_number(element, reach, "min", report)
     high = required_number(element, reach, "max", report)
     if not 0.0 <= low < high:
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}': range {low:g} to {high:g} m is not a range",
-            code="bad-sensor",
-        )
+        add_fault(report, element, f": range {low:g} to {high:g} m is not a range")
     return low, high
 
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from twin.bridge.msgs import Header
 from twin.convert.ledger.fates import Fate
 from twin.convert.sensors import SensorBuilder
+from twin.geometry import Array
 from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report
 from twin.models.urdf.sensors import Common
@@ -37,6 +38,11 @@ class Sensor(ABC):
     def __init__(self, spec: Any, mount: Mount) -> None:
         """Take what the file says of it, and where it is in a compiled world."""
         self.spec, self.mount = spec, mount
+        self._stream = mount.noise(spec.name)
+
+    def _normal(self, time_ns: int, n: int) -> Array:
+        """Return `n` standard normal numbers, shape (n,), the same at the same time, seed and name."""
+        return self._stream.normal(time_ns // self.mount.world.timestep_ns, n)
 
     @classmethod
     @abstractmethod

@@ -6,8 +6,8 @@ import numpy as np
 
 from twin.geometry import Array, Pose3
 from twin.models.description import RobotDescription
-from twin.models.kinematics import link_poses
-from twin.models.shapes import Box, Geometry, Sphere
+from twin.models.kinematics import link_poses, rigid_groups
+from twin.models.shapes import Box, Sphere
 
 
 def casters_under_chassis(description: RobotDescription) -> tuple[str, ...]:
@@ -18,7 +18,7 @@ def casters_under_chassis(description: RobotDescription) -> tuple[str, ...]:
     narrower than the robot, is missed by the casters, not by the wheels.)
     """
     poses = link_poses(description)
-    rigid = _fixed_to_root(description)
+    rigid = [link for link, head in rigid_groups(description).items() if head == description.root]
     roofs = [
         (poses[name] @ collision.T_link_geometry, np.array(collision.geometry.size) / 2.0)
         for name in rigid
@@ -28,27 +28,19 @@ def casters_under_chassis(description: RobotDescription) -> tuple[str, ...]:
     casters = []
     for name in rigid:
         link = description.links[name]
-        balls = [c for c in link.collisions if isinstance(c.geometry, Sphere)]
-        if link.surface.friction != 0.0 or not balls or len(balls) != len(link.collisions):
-            continue
-        if all(
-            any(_covers(*roof, (poses[name] @ ball.T_link_geometry).xyz, ball.geometry) for roof in roofs)
-            for ball in balls
-        ):
+        balls = [
+            ((poses[name] @ collision.T_link_geometry).xyz, collision.geometry)
+            for collision in link.collisions
+            if isinstance(collision.geometry, Sphere)
+        ]
+        slippery = link.surface.friction == 0.0 and 0 < len(balls) == len(link.collisions)
+        if slippery and all(any(_covers(*roof, *ball) for roof in roofs) for ball in balls):
             casters.append(name)
     return tuple(casters)
 
 
-def _covers(T_root_box: Pose3, half: Array, centre: Array, ball: Geometry) -> bool:
+def _covers(T_root_box: Pose3, half: Array, centre: Array, ball: Sphere) -> bool:
     """Whether an upright box covers a ball below its top, seen from above."""
-    assert isinstance(ball, Sphere)
     local = T_root_box.inverse().apply(centre)
     beside = np.abs(local[:2]) + ball.radius > half[:2] + 1e-9
     return bool(not beside.any() and local[2] < half[2])
-
-
-def _fixed_to_root(description: RobotDescription) -> list[str]:
-    links = [description.root]
-    for link in links:
-        links += [joint.child for joint in description.children(link) if joint.type == "fixed"]
-    return links

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
 import mujoco
 
 from twin.convert.actuators import driven_joints
-from twin.convert.geoms import OWN_CONTACT
+from twin.convert.geoms import OWN_CONTACT, primitive
 from twin.errors import Problem, ScenarioError
-from twin.models.shapes import Box, Capsule, Cylinder
+from twin.models.solids import volume
 from twin.sim.casters import casters_under_chassis
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
+from twin.sim.scene import Body, FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.servos import keep_velocity_limit
 
 FLOOR = "floor"
@@ -77,15 +76,8 @@ def static_geom(name: str, index: int) -> str:
 
 
 def _check_names(scene: Scene, robots: Sequence[RobotPlacement]) -> None:
-    names = Counter(
-        [
-            FLOOR,
-            *(s.name for s in scene.statics),
-            *(g.name for g in scene.goods),
-            *(p.name for p in scene.placed),
-            *(r.name for r in robots),
-        ]
-    )
+    named: tuple[Body | RobotPlacement, ...] = (*scene.statics, *scene.goods, *scene.placed, *robots)
+    names = Counter([FLOOR, *(thing.name for thing in named)])
     problems = [
         Problem(f"{count} things in scene '{scene.name}' have the name '{name}'; give each its own")
         for name, count in sorted(names.items())
@@ -164,29 +156,32 @@ def _add_static(
 
 
 def _add_goods(spec: mujoco.MjSpec, goods: FreeBody, solref: list[float]) -> None:
-    body = spec.worldbody.add_body(
-        name=goods.name, pos=goods.T_world_body.xyz, quat=goods.T_world_body.quat_wxyz
-    )
+    pose = goods.T_world_body
+    body = spec.worldbody.add_body(name=goods.name, pos=pose.xyz, quat=pose.quat_wxyz)
     body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED
     body.add_freejoint(name=goods.name)
-    volumes = [volume(shape) * shape.solid for shape in goods.shapes]
-    for index, (shape, part) in enumerate(zip(goods.shapes, volumes, strict=True)):
-        geom = _add_geom(body, shape, goods.friction, solref)
-        geom.name = static_geom(goods.name, index)
+    volumes = [volume(shape.geometry) * shape.solid for shape in goods.shapes]
+    for geom, part in zip(_add_geoms(body, goods, solref), volumes, strict=True):
         geom.mass = goods.mass * part / sum(volumes)
 
 
 def _add_placed(spec: mujoco.MjSpec, placed: PlacedBody, solref: list[float]) -> None:
-    body = spec.worldbody.add_body(
-        name=placed.name, pos=placed.T_world_body.xyz, quat=placed.T_world_body.quat_wxyz, mocap=True
-    )
-    for index, shape in enumerate(placed.shapes):
-        geom = _add_geom(body, shape, placed.friction, solref)
-        geom.name = static_geom(placed.name, index)
+    pose = placed.T_world_body
+    body = spec.worldbody.add_body(name=placed.name, pos=pose.xyz, quat=pose.quat_wxyz, mocap=True)
+    _add_geoms(body, placed, solref)
+
+
+def _add_geoms(
+    body: mujoco.MjsBody, thing: FreeBody | PlacedBody, solref: list[float]
+) -> list[mujoco.MjsGeom]:
+    geoms = [_add_geom(body, shape, thing.friction, solref) for shape in thing.shapes]
+    for index, geom in enumerate(geoms):
+        geom.name = static_geom(thing.name, index)
+    return geoms
 
 
 def _add_geom(body: mujoco.MjsBody, shape: Shape, friction: float, solref: list[float]) -> mujoco.MjsGeom:
-    kind, size = _primitive(shape)
+    kind, size = primitive(shape.geometry)
     touch = _SOLID if shape.solid else 0
     return body.add_geom(
         type=kind,
@@ -217,30 +212,6 @@ def _let_lower_friction_act(spec: mujoco.MjSpec, goods: Sequence[FreeBody]) -> N
             geom.priority = len(grades) + 1
     for geom in ranked:
         geom.priority = grades.index(geom.friction[0]) + 1
-
-
-def _primitive(shape: Shape) -> tuple[mujoco.mjtGeom, list[float]]:
-    """Return MuJoCo's type and half sizes."""
-    geometry = shape.geometry
-    if isinstance(geometry, Box):
-        return mujoco.mjtGeom.mjGEOM_BOX, [edge / 2.0 for edge in geometry.size]
-    if isinstance(geometry, Cylinder):
-        return mujoco.mjtGeom.mjGEOM_CYLINDER, [geometry.radius, geometry.length / 2.0, 0.0]
-    if isinstance(geometry, Capsule):
-        return mujoco.mjtGeom.mjGEOM_CAPSULE, [geometry.radius, geometry.length / 2.0, 0.0]
-    return mujoco.mjtGeom.mjGEOM_SPHERE, [geometry.radius, 0.0, 0.0]
-
-
-def volume(shape: Shape) -> float:
-    """Return the volume of a shape [m³]."""
-    geometry = shape.geometry
-    if isinstance(geometry, Box):
-        return math.prod(geometry.size)
-    disc = math.pi * geometry.radius**2
-    if isinstance(geometry, Cylinder):
-        return disc * geometry.length
-    ball = disc * geometry.radius * 4.0 / 3.0
-    return disc * geometry.length + ball if isinstance(geometry, Capsule) else ball
 
 
 def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:

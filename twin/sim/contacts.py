@@ -91,10 +91,8 @@ class ContactReader:
         if body not in self._geoms_of:
             self._geoms_of[body] = np.array([owner == body for owner in self._owners])
         contact = data.contact
-        geoms, normals = (
-            contact.geom,
-            contact.frame[:, :3],
-        )  # read once: each look makes arrays of all contacts
+        # Read once: each look makes arrays of all contacts.
+        geoms, normals = contact.geom, contact.frame[:, :3]
         mine = self._geoms_of[body][geoms]
         touches = []
         for index in np.flatnonzero((mine[:, 0] != mine[:, 1]) & (contact.efc_address >= 0)).tolist():

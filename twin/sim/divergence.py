@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from pathlib import Path
 
 import mujoco
@@ -28,19 +29,14 @@ class DivergenceGuard:
         self._model = model
         self._data = data
         self._warnings = [data.warning[kind] for kind in _BAD]
-        self._ring = np.zeros((capacity, mujoco.mj_stateSize(model, _STATE)))
-        self._count = 0
+        self._states = deque[Array](maxlen=capacity)
+        """The states kept, oldest first."""
 
     def remember(self) -> None:
         """Keep the present state."""
-        mujoco.mj_getState(self._model, self._data, self._ring[self._count % len(self._ring)], _STATE)
-        self._count += 1
-
-    @property
-    def _states(self) -> Array:
-        """The states kept, oldest first, shape (n, state size)."""
-        kept, oldest = min(self._count, len(self._ring)), self._count % len(self._ring)
-        return np.roll(self._ring, -oldest, axis=0)[-kept:]
+        state = np.empty(mujoco.mj_stateSize(self._model, _STATE))
+        mujoco.mj_getState(self._model, self._data, state, _STATE)
+        self._states.append(state)
 
     def check(self, folder: Path | None) -> None:
         """Do nothing if the state is finite.
@@ -59,7 +55,7 @@ class DivergenceGuard:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
             file = folder / "diverged.npz"
-            states = self._states
+            states = np.array(self._states)
             np.savez(file, states=states, times=states[:, 0], state_spec=int(_STATE))
             message += f"; the last {len(states)} states are in {file}"
         hint = "check masses, inertias and commands there, or take a smaller physics step"
@@ -68,7 +64,7 @@ class DivergenceGuard:
     def _replay(self) -> tuple[str, str]:
         """Step singly from the last good state to find the first bad number; remembers each step's state."""
         model, data = self._model, self._data
-        mujoco.mj_setState(model, data, np.array(self._states[-1]), _STATE)
+        mujoco.mj_setState(model, data, self._states[-1], _STATE)
         for warning in self._warnings:
             warning.number = 0
         for _ in range(10_000):

@@ -264,10 +264,11 @@ def _judged(
     bar: float | None,
     unit: str,
 ) -> Manoeuvre:
+    error: float | None
     try:
         error, words = judge(drive())
     except SimulationError as fault:
-        return Manoeuvre(name=name, error=None, bar=bar, unit=unit, words=str(fault))
+        error, words = None, str(fault)
     return Manoeuvre(name=name, error=error, bar=bar, unit=unit, words=words)
 
 

@@ -19,24 +19,15 @@ from twin.sim.world import World
 
 LONGEST_S = 300.0
 """Of a manoeuvre; a robot that takes longer is not driven."""
+LINEAR, ANGULAR = 0.5, 1.0
+"""Cruising [m/s] and turning speed [rad/s], if the drive allows as much."""
+CONTROL_PERIOD_S = 0.02
+WHEEL_SHARE = 0.9
+"""Of the wheels' own speed limit, at most; a motor at its limit has nothing left to correct with."""
+SETTLE_S = 1.0
+"""To come to rest before and after each manoeuvre."""
 _STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_ACT
 _ROBOT = "robot"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProvingGroundConfig:
-    """How the robot is driven."""
-
-    linear: float = 0.5
-    """Cruising speed, if the drive allows as much [m/s]."""
-    angular: float = 1.0
-    """Turning speed, if the drive allows as much [rad/s]."""
-    control_period: float = 0.02
-    """[s]"""
-    wheel_share: float = 0.9
-    """Of the wheels' own speed limit, at most; a motor at its limit has nothing left to correct with."""
-    settle: float = 1.0
-    """Time to come to rest before and after each manoeuvre [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,12 +60,7 @@ class ProvingGround:
     """A flat floor, alone with one robot; every manoeuvre starts from the same state of rest."""
 
     def __init__(
-        self,
-        conversion: Conversion,
-        drive: DiffDriveConfig,
-        *,
-        physics: Physics | None = None,
-        config: ProvingGroundConfig | None = None,
+        self, conversion: Conversion, drive: DiffDriveConfig, *, physics: Physics | None = None
     ) -> None:
         """Put the robot on the floor and let it come to rest.
 
@@ -82,7 +68,6 @@ class ProvingGround:
             conversion: The robot, with a free base.
             drive: Kinematics by which velocities become wheel commands.
             physics: None takes the defaults.
-            config: None takes the defaults.
 
         Raises:
             ValueError: The robot has no drive.
@@ -91,20 +76,16 @@ class ProvingGround:
         spec = conversion.description.drive
         if spec is None:
             raise ValueError(f"robot '{conversion.description.name}' has no drive")
-        self.config = config or ProvingGroundConfig()
         self.drive = drive
-        self._sides = ((spec.left_joints, 0), (spec.right_joints, 1))
+        self._sides = (spec.left_joints, spec.right_joints)
         without_sensors = replace(conversion.description, sensors=())  # their rates are nothing to a drive
-        placement = RobotPlacement(
-            name=_ROBOT,
-            conversion=replace(conversion, description=without_sensors),
-            pose=Pose2(0.0, 0.0, 0.0),
-        )
+        alone = replace(conversion, description=without_sensors)
+        placement = RobotPlacement(name=_ROBOT, conversion=alone, pose=Pose2(0.0, 0.0, 0.0))
         self._world = World.compose(Scene(name="proving_ground"), [placement], physics)
         self._robot = self._world.robots[_ROBOT]
         self._base = self._robot.body(_base_frame(conversion))
-        self._steps = round(self.config.control_period * 1e9) // self._world.timestep_ns
-        self._wait(self.config.settle)
+        self._steps = round(CONTROL_PERIOD_S * 1e9) // self._world.timestep_ns
+        self._wait(SETTLE_S)
         model, data = self._world.model, self._world.data
         self._rest = np.zeros(mujoco.mj_stateSize(model, int(_STATE)))
         mujoco.mj_getState(model, data, self._rest, int(_STATE))
@@ -116,12 +97,12 @@ class ProvingGround:
 
     def straight(self, distance: float) -> Driven:
         """Drive `distance` [m], backwards if it is negative."""
-        speed = min(self.config.linear, self.drive.linear.max_velocity)
+        speed = min(LINEAR, self.drive.linear.max_velocity)
         return self._drive(math.copysign(speed, distance), 0.0, abs(distance) / speed)
 
     def spin(self, angle: float) -> Driven:
         """Turn by `angle` [rad] on the spot."""
-        speed = min(self.config.angular, self.drive.angular.max_velocity)
+        speed = min(ANGULAR, self.drive.angular.max_velocity)
         return self._drive(0.0, math.copysign(speed, angle), abs(angle) / speed)
 
     def circle(self, radius: float, *, lateral: float = math.inf) -> Driven:
@@ -130,8 +111,8 @@ class ProvingGround:
         `lateral`: acceleration towards the centre that is not exceeded [m/s²].
         """
         gentle = math.sqrt(lateral * abs(radius))
-        linear = min(self.config.linear, self.drive.linear.max_velocity, gentle)
-        angular = min(linear / abs(radius), self.drive.angular.max_velocity, self.config.angular)
+        linear = min(LINEAR, self.drive.linear.max_velocity, gentle)
+        angular = min(linear / abs(radius), self.drive.angular.max_velocity, ANGULAR)
         w = math.copysign(angular, radius)
         return self._drive(w * radius, w, 2.0 * math.pi / angular)
 
@@ -164,22 +145,21 @@ class ProvingGround:
         Where the wheels cannot turn so fast, the same way is driven more slowly.
         """
         fastest = (abs(v) + abs(w) * self.track / 2.0) / self.drive.wheel_radius
-        share = min(1.0, self.config.wheel_share * self.drive.max_wheel_velocity / fastest)
+        share = min(1.0, WHEEL_SHARE * self.drive.max_wheel_velocity / fastest)
         v, w, seconds = v * share, w * share, seconds / share
         if seconds > LONGEST_S:
-            raise SimulationError(
-                f"it is too slow: it would take {seconds:.0f} s, at {v:.3g} m/s, {w:.3g} rad/s"
-            )
+            pace = f"at {v:.3g} m/s, {w:.3g} rad/s"
+            raise SimulationError(f"it is too slow: it would take {seconds:.0f} s, {pace}")
         self._restore()
         controller = DiffDriveController(self.drive)
-        period = self.config.control_period
+        period = CONTROL_PERIOD_S
         ticks = max(1, round(seconds / period))
         v, w = v * seconds / (ticks * period), w * seconds / (ticks * period)
         start = last = self._pose()
         ideal, ideal_angle, true_angle = Pose2(0.0, 0.0, 0.0), 0.0, 0.0
         path = []
         tail = ticks + math.ceil(self._stopping_time(v, w) / period)
-        for tick in range(tail + round(self.config.settle / period)):
+        for tick in range(tail + round(SETTLE_S / period)):
             controller.set_command(*((v, w) if tick < ticks else (0.0, 0.0)))
             wheels = controller.update(period)
             self._command(wheels.left, wheels.right)
@@ -205,13 +185,13 @@ class ProvingGround:
         return max(abs(v) / limits.linear.max_acceleration, abs(w) / limits.angular.max_acceleration)
 
     def _command(self, left: float, right: float) -> None:
-        for joints, side in self._sides:
+        for joints, speed in zip(self._sides, (left, right), strict=True):
             for joint in joints:
-                self._robot.hardware.command(joint, (left, right)[side])
+                self._robot.hardware.command(joint, speed)
         self._robot.hardware.apply()
 
     def _wait(self, seconds: float) -> None:
-        for _ in range(round(seconds / self.config.control_period)):
+        for _ in range(round(seconds / CONTROL_PERIOD_S)):
             self._command(0.0, 0.0)
             self._world.step(self._steps)
 

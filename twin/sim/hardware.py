@@ -16,6 +16,7 @@ from twin.convert.contact_roles import commanded_wheels
 from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription
+from twin.models.kinematics import ONE_DOF
 from twin.sim.noise import NoiseStream
 from twin.sim.servos import EffortServos, PositionServos
 
@@ -69,14 +70,12 @@ class Hardware:
         self.config = config or HardwareConfig()
         self._model, self._data = model, data
         self._timestep = float(model.opt.timestep)
-        moving = ("continuous", "revolute", "prismatic")
-        self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in moving)
+        self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in ONE_DOF)
         joints = [model.joint(f"{robot}/{name}") for name in self.joint_names]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
         self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
-        self._encoder = np.array(
-            [description.joints[n].type == "continuous" for n in self.joint_names], dtype=bool
-        )
+        kinds = [description.joints[name].type for name in self.joint_names]
+        self._encoder = np.array([kind == "continuous" for kind in kinds], dtype=bool)
         self._tick = 2.0 * math.pi / self.config.encoder_ticks
         self._noise = NoiseStream(seed, f"{robot}/joints")
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
@@ -100,10 +99,8 @@ class Hardware:
         self._latency_steps = round(command_latency / self._timestep)
         self._under_way: deque[tuple[int, Array]] = deque()
         self._last_arrived = self._commands.copy()
-        driven = [i for i, name in zip(self._actuators, names, strict=True) if name in wheels]
-        self._wheels = _WheelServos(
-            model, data, np.array(driven, dtype=np.intp), self.config.wheel_integral_gain
-        )
+        turning = self._actuators[np.isin(names, list(wheels))]
+        self._wheels = _WheelServos(model, data, turning, self.config.wheel_integral_gain)
         self._positions = PositionServos(model, data, self._actuators)
         by_effort = [
             command
@@ -180,10 +177,7 @@ class Hardware:
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
-        if self._latency_steps:
-            self._data.ctrl[self._actuators] = self._arrived()
-        else:
-            self._data.ctrl[self._actuators] = self._commands
+        self._data.ctrl[self._actuators] = self._arrived() if self._latency_steps else self._commands
         self._wheels.apply()
         self._positions.apply()
         self._efforts.apply()
@@ -235,11 +229,8 @@ class Hardware:
     ) -> tuple[NDArray[np.intp], Array]:
         """Return for each joint the velocity address of the joint whose drive moves it, and its share."""
         found = [leader_of(description, name) for name in self.joint_names]
-        ratios = dict.fromkeys((leader for leader, _ in found), 0.0)
-        for leader, share in found:
-            ratios[leader] += abs(share)
         dofs = [model.joint(f"{robot}/{leader}").dofadr[0] for leader, _ in found]
-        shares = [np.sign(share) / ratios[leader] for leader, share in found]
+        shares = [np.sign(share) / drive_ratio(description, leader) for leader, share in found]
         return np.array(dofs, dtype=np.intp), np.array(shares)
 
     def _arrived(self) -> Array:

@@ -36,29 +36,24 @@ class RobotPlacement:
         return self.pose
 
 
+@dataclass(kw_only=True, eq=False)
 class RobotHandle:
     """One robot of a compiled world."""
 
-    def __init__(
-        self,
-        *,
-        name: str,
-        description: RobotDescription,
-        hardware: Hardware,
-        sensors: tuple[SampledSensor, ...],
-        data: mujoco.MjData,
-        mocap_id: int,
-        free_joint: tuple[int, int] | None,
-    ) -> None:
-        self.name = name
-        self.description = description
-        self.hardware = hardware
-        self.sensors = sensors
-        self.base = f"{name}/{description.root}"
+    name: str
+    description: RobotDescription
+    hardware: Hardware
+    sensors: tuple[SampledSensor, ...]
+    data: mujoco.MjData
+    mocap_id: int
+    """Of the root link in `data`; negative without a kinematic base."""
+    free_joint: tuple[int, int] | None
+    """Where that of the root link is in `qpos` and in `qvel`; None: it has none."""
+
+    @property
+    def base(self) -> str:
         """Name of the root link's body."""
-        self._data = data
-        self._mocap_id = mocap_id
-        self._free_joint = free_joint
+        return self.body(self.description.root)
 
     def body(self, link: str) -> str:
         """Return the name of a link's body."""
@@ -67,7 +62,7 @@ class RobotHandle:
     @property
     def is_free(self) -> bool:
         """Whether the base moves as physics has it: neither fixed nor kinematic."""
-        return self._free_joint is not None
+        return self.free_joint is not None
 
     def carry(self, T_world_root: Pose3) -> None:
         """Lift the robot and put it down at rest elsewhere, its joints as they are, with the next step.
@@ -75,11 +70,11 @@ class RobotHandle:
         Raises:
             ValueError: Its base is not free.
         """
-        if self._free_joint is None:
+        if self.free_joint is None:
             raise ValueError(f"robot '{self.name}' has no free base")
-        qpos, dof = self._free_joint
-        self._data.qpos[qpos : qpos + 7] = [*T_world_root.xyz, *T_world_root.quat_wxyz]
-        self._data.qvel[dof : dof + 6] = 0.0
+        qpos, dof = self.free_joint
+        self.data.qpos[qpos : qpos + 7] = [*T_world_root.xyz, *T_world_root.quat_wxyz]
+        self.data.qvel[dof : dof + 6] = 0.0
         self.hardware.reset()
 
     def set_kinematic_pose(self, T_world_root: Pose3) -> None:
@@ -88,7 +83,7 @@ class RobotHandle:
         Raises:
             ValueError: The robot was not converted with `base="kinematic"`.
         """
-        if self._mocap_id < 0:
+        if self.mocap_id < 0:
             raise ValueError(f"robot '{self.name}' has no kinematic base; convert it with base='kinematic'")
-        self._data.mocap_pos[self._mocap_id] = T_world_root.xyz
-        self._data.mocap_quat[self._mocap_id] = T_world_root.quat_wxyz
+        self.data.mocap_pos[self.mocap_id] = T_world_root.xyz
+        self.data.mocap_quat[self.mocap_id] = T_world_root.quat_wxyz

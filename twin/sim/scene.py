@@ -22,38 +22,32 @@ class Shape:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StaticBody:
+class Body:
+    """A thing of the scene."""
+
+    name: str
+    T_world_body: Pose3
+    shapes: tuple[Shape, ...]
+    friction: float = 0.8
+    """Coulomb coefficient."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticBody(Body):
     """Something that never moves: a wall, a shelf, stock that no run touches."""
 
-    name: str
-    T_world_body: Pose3
-    shapes: tuple[Shape, ...]
-    friction: float = 0.8
-    """Coulomb coefficient."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class FreeBody:
+class FreeBody(Body):
     """Something to push, grasp and drop; its inertia is that of its shapes at uniform density."""
 
-    name: str
-    T_world_body: Pose3
-    shapes: tuple[Shape, ...]
     mass: float
     """[kg]"""
-    friction: float = 0.8
-    """Coulomb coefficient."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedBody:
+class PlacedBody(Body):
     """Something that `World.place` puts somewhere while the run goes on; contacts do not move it."""
-
-    name: str
-    T_world_body: Pose3
-    shapes: tuple[Shape, ...]
-    friction: float = 0.8
-    """Coulomb coefficient."""
 
 
 @dataclass(frozen=True, kw_only=True)

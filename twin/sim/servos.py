@@ -6,8 +6,6 @@ at the joint's limit, and a joint that loses what it pressed against does not sh
 
 from __future__ import annotations
 
-import math
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -127,12 +125,9 @@ class EffortServos:
         self._actuators = actuators[made]
         self._velocity = model.actuator_ctrlrange[self._actuators, 1]
         effort = model.actuator_forcerange[self._actuators, 1]
-        given = np.array(
-            [(-math.inf if low is None else low, math.inf if high is None else high) for low, high in bounds]
-        )
-        given = given.reshape(-1, 2)[made]
-        self._least: Array = np.maximum(given[:, 0], -effort)
-        self._most: Array = np.minimum(given[:, 1], effort)
+        given = np.array(bounds, dtype=np.float64).reshape(-1, 2)[made]  # None is NaN, which fmax passes over
+        self._least: Array = np.fmax(given[:, 0], -effort)
+        self._most: Array = np.fmin(given[:, 1], effort)
 
     def apply(self) -> None:
         """Turn the efforts in `ctrl` into velocities; called once a tick."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from twin.geometry import Pose3
 from twin.models.shapes import Geometry
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import Rgba, Scene
+from twin.sim.scene import Rgba, Scene, StaticBody
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,16 +26,15 @@ class BodyShape:
 
 def shapes(scene: Scene, robots: Sequence[RobotPlacement]) -> Iterator[BodyShape]:
     """Yield scenery, goods, placed bodies and the robots' visuals, in this order."""
-    for bodies, static in ((scene.statics, True), (scene.goods, False), (scene.placed, False)):
-        for body in bodies:
-            for shape in body.shapes:
-                yield BodyShape(
-                    body=body.name,
-                    geometry=shape.geometry,
-                    T_body_geometry=shape.T_body_geometry,
-                    rgba=shape.rgba,
-                    static=static,
-                )
+    for body in (*scene.statics, *scene.goods, *scene.placed):
+        for shape in body.shapes:
+            yield BodyShape(
+                body=body.name,
+                geometry=shape.geometry,
+                T_body_geometry=shape.T_body_geometry,
+                rgba=shape.rgba,
+                static=isinstance(body, StaticBody),
+            )
     for robot in robots:
         for link in robot.conversion.description.links.values():
             for visual in link.visuals:

@@ -35,22 +35,18 @@ class World:
 
     def __init__(
         self,
-        *,
-        spec: mujoco.MjSpec,
         scene: Scene,
         robots: Sequence[RobotPlacement],
         physics: Physics,
         seed: int,
+        *,
         crash_folder: Path | None,
         visuals: bool,
     ) -> None:
-        self._spec = spec
+        self._spec = build_spec(scene, robots, physics)
         self._placements = tuple(robots)
-        self.scene = scene
-        self.physics = physics
-        self.seed = seed
-        self.crash_folder = crash_folder
-        self.model = (spec if visuals else without_visuals(spec)).compile()
+        self.scene, self.physics, self.seed, self.crash_folder = scene, physics, seed, crash_folder
+        self.model = (self._spec if visuals else without_visuals(self._spec)).compile()
         self.data = mujoco.MjData(self.model)
         self.timestep_ns = physics.timestep_ns
         self.step_count = 0
@@ -95,16 +91,7 @@ class World:
             ModelError: A sensor is faster than the physics.
         """
         physics = physics or Physics()
-        spec = build_spec(scene, robots, physics)
-        return cls(
-            spec=spec,
-            scene=scene,
-            robots=robots,
-            physics=physics,
-            seed=seed,
-            crash_folder=crash_folder,
-            visuals=visuals,
-        )
+        return cls(scene, robots, physics, seed, crash_folder=crash_folder, visuals=visuals)
 
     # -- time ------------------------------------------------------------------------------------------------
 
@@ -123,17 +110,14 @@ class World:
         if self._work_meter is None:
             mujoco.mj_step(self.model, self.data, n)
         else:
-            self._step_measured(n, self._work_meter)
+            self._work_meter.begin()
+            for _ in range(n):
+                mujoco.mj_step(self.model, self.data)
+                self._work_meter.note()
+            self._work_meter.end()
         self.step_count += n
         self._guard.check(self.crash_folder)
         mujoco.mj_kinematics(self.model, self.data)
-
-    def _step_measured(self, n: int, meter: WorkMeter) -> None:
-        meter.begin()
-        for _ in range(n):
-            mujoco.mj_step(self.model, self.data)
-            meter.note()
-        meter.end()
 
     def refresh_motion(self) -> None:
         """Bring MuJoCo's body velocities and accelerations (cvel, cacc) to the present time, once a step."""
@@ -145,11 +129,6 @@ class World:
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
     # -- truth -----------------------------------------------------------------------------------------------
-
-    @property
-    def body_names(self) -> tuple[str, ...]:
-        """The bodies that can move, in the order of `body_poses`: links as `<robot>/<link>`, and goods."""
-        return self._body_names
 
     def body_poses(self) -> tuple[Array, Array]:
         """Return xyz, shape (n, 3) [m], and quat_wxyz, shape (n, 4), of `body_names` in the world frame."""
@@ -239,7 +218,8 @@ class World:
         names = [self.model.body(i).name for i in range(self.model.nbody)]
         ids = [i for i in range(1, self.model.nbody) if names[i]]
         self._index = {names[i]: i for i in ids}
-        self._body_names = tuple(self._index)
+        self.body_names = tuple(self._index)
+        """The bodies that can move, in the order of `body_poses`: links as `<robot>/<link>`, and goods."""
         self._body_ids = np.array(ids, dtype=np.intp)
         self._placed = {body.name: int(self.model.body(body.name).mocapid[0]) for body in self.scene.placed}
 

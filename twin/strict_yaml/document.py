@@ -53,10 +53,10 @@ class Document:
 
     def alias(self, loc: Loc, original: Loc) -> None:
         """Let everything below `loc` come from where everything below `original` came from."""
-        for place in [place for place in self.lines if place[: len(original)] == original]:
-            self.lines[(*loc, *place[len(original) :])] = self.lines[place]
-        for place in [place for place in self.overrides if place[: len(original)] == original]:
-            self.overrides[(*loc, *place[len(original) :])] = self.overrides[place]
+        origins: tuple[dict[Loc, Any], ...] = (self.lines, self.overrides)
+        for origin in origins:
+            for place in [place for place in origin if place[: len(original)] == original]:
+                origin[(*loc, *place[len(original) :])] = origin[place]
 
     def problem(self, loc: Loc, message: str) -> Problem:
         """Place a message: at the override that set the value, else at the innermost known line."""
@@ -95,9 +95,8 @@ def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, 
     """Turn a composed node into plain data, noting lines, duplicate keys and endless aliases."""
     document.lines.setdefault(loc, node.start_mark.line + 1)
     if id(node) in above or len(document.lines) > _MAX_NODES:
-        document.problems.append(
-            document.problem(loc, "alias contains itself or grows without end; write the value out")
-        )
+        message = "alias contains itself or grows without end; write the value out"
+        document.problems.append(document.problem(loc, message))
         return None
     if isinstance(node, yaml.ScalarNode):
         return _scalar(document, node, loc)
@@ -145,9 +144,8 @@ def read(path: Path, error: type[TwinError]) -> Document:
     except RecursionError:
         raise error(Problem("nested too deeply; no file of ours has a hundred levels", path)) from None
     except UnicodeDecodeError as fault:
-        raise error(
-            Problem(f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}", path)
-        ) from None
+        message = f"not UTF-8 text: byte {fault.start} is {fault.object[fault.start]:#x}"
+        raise error(Problem(message, path)) from None
     except yaml.YAMLError as fault:
         mark = getattr(fault, "problem_mark", None)
         raise error(Problem(_yaml_message(fault), path, None if mark is None else mark.line + 1)) from None
@@ -187,9 +185,8 @@ def apply_override(document: Document, dotted: str, text: str) -> None:
         if isinstance(target, list):
             if not part.isdecimal() or int(part) >= len(target):
                 valid = f"indices 0 to {len(target) - 1}" if target else "none, the list is empty"
-                document.problems.append(
-                    Problem(f"override {name}: no item '{part}'{within(tuple(keys))}; valid: {valid}")
-                )
+                message = f"override {name}: no item '{part}'{within(tuple(keys))}; valid: {valid}"
+                document.problems.append(Problem(message))
                 return
             keys.append(int(part))
         elif isinstance(target, dict):

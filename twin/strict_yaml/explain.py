@@ -71,12 +71,8 @@ def _data_loc(data: Any, loc: Loc) -> Loc:
     """Drop the union tags that pydantic puts into a location; keep a last key that the data lacks."""
     kept: list[str | int] = []
     for part in loc:
-        inside = (
-            part in data
-            if isinstance(data, dict)
-            else isinstance(data, list) and isinstance(part, int) and part < len(data)
-        )
-        if inside:
+        in_list = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if in_list or (isinstance(data, dict) and part in data):
             kept.append(part)
             data = data[part]
     return tuple(kept)

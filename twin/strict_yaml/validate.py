@@ -46,9 +46,8 @@ def findings(schema: type[M], data: Any, context: Mapping[str, Any]) -> tuple[M 
         faults = [dict(fault) for fault in invalid.errors()]
     findings = [finding for fault in faults for finding in explain(schema, data, fault)]
     # A list is also called too short when its items are wrong: what contains a fault says nothing of its own.
-    return None, [
-        one for one in findings if not any(_above(one.loc, o.loc) and o.loc != one.loc for o in findings)
-    ]
+    inner = {finding.loc for finding in findings}
+    return None, [one for one in findings if not any(_above(one.loc, loc) for loc in inner - {one.loc})]
 
 
 def _above(loc: Loc, other: Loc) -> bool:

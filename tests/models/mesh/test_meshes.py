@@ -15,7 +15,8 @@ from twin.geometry import Array
 from twin.models import load
 from twin.models.checks import check
 from twin.models.mesh.hulls import hull_of
-from twin.models.mesh.meshes import TriangleMesh, mesh_faults, read_mesh
+from twin.models.mesh.mesh_formats import TriangleMesh
+from twin.models.mesh.meshes import mesh_faults, read_mesh
 from twin.models.options import ReadOptions
 from twin.models.shapes import Mesh
 
@@ -123,8 +124,9 @@ def test_every_format_gives_the_same_tetrahedron(tmp_path: Path, name: str, cont
         "<tristrips count='1'><input semantic='VERTEX' source='#v' offset='0'/><p>0 2 1 3 0 2</p>"
         "</tristrips>",
         "<lines count='1'><input semantic='VERTEX' source='#v' offset='0'/><p>0 1</p></lines>" + TRIANGLES,
+        "<polygons count='0'><input semantic='VERTEX' source='#v' offset='0'/></polygons>" + TRIANGLES,
     ],
-    ids=["polylist", "polygons", "trifans", "tristrips", "lines beside"],
+    ids=["polylist", "polygons", "trifans", "tristrips", "lines beside", "polygons without any"],
 )
 def test_all_polygons_of_collada_become_triangles(tmp_path: Path, primitives: str) -> None:
     mesh = read(tmp_path, dae(primitives=primitives))

@@ -7,7 +7,7 @@ from twin.models.description import RobotDescription
 from twin.models.urdf.commands import command_interface
 from twin.models.urdf.document import Element
 from twin.models.urdf.gazebo import number_in
-from twin.models.urdf.transmissions import HARDWARE, Transmission, transmissions
+from twin.models.urdf.transmissions import HARDWARE, Transmission, hardware_interface, transmissions
 
 HARDWARE_ONLY: Fate = ("dropped", "a matter of the hardware")
 
@@ -83,20 +83,15 @@ class CommandFates:
         if element.tag == "mechanicalReduction":
             if number_in(element) == 1.0:
                 return "kept", "motor and joint turn alike"
-            return (
-                "dropped",
-                f"commands and efforts are the joint's, as in ros_control ({item.reduction:g}:1)",
-            )
+            ratio = f"{item.reduction:g}:1"
+            return "dropped", f"commands and efforts are the joint's, as in ros_control ({ratio})"
         if element.tag == "actuator":
             return container_fate(element, lambda child: self._transmission(child, item))
         return HARDWARE_ONLY
 
     def _hardware_interface(self, element: Element, item: Transmission) -> Fate:
-        found = [
-            interface
-            for interface in item.element.iter("hardwareInterface")
-            if (interface.text or "").strip().rpartition("/")[2] in HARDWARE
-        ]
+        every = item.element.iter("hardwareInterface")
+        found = [interface for interface in every if hardware_interface(interface) in HARDWARE]
         if found and found[0] is element:
             return "translated", f"{item.interface} actuator"
         again = bool(found) and (found[0].text or "").strip() == (element.text or "").strip()

@@ -16,24 +16,19 @@ from twin.models.urdf.gazebo_materials import colour_of
 from twin.models.urdf.sensors import PLUGIN_IMU
 
 ONE_FRICTION = "friction is the same in every direction"
-SOLVER = "a matter of Gazebo's solver"
+SOLVERS = (
+    *("maxVel", "minDepth", "maxContacts", "stopCfm", "stopErp", "stopKp", "stopKd"),
+    *("fudgeFactor", "cfmDamping"),
+)
 DROPPED: Mapping[str, str] = MappingProxyType(
     {
         "kp": "MuJoCo's contacts are as stiff as the masses ask for, not in N/m",
         "kd": "MuJoCo's contacts are damped as the masses ask for, not in N s/m",
         "fdir1": ONE_FRICTION,
-        "maxVel": SOLVER,
-        "minDepth": SOLVER,
-        "maxContacts": SOLVER,
         "laserRetro": "rays measure no intensity",
         "dampingFactor": "nothing slows down a link as such",
         "kinematic": "bodies move by their joints",
-        "stopCfm": SOLVER,
-        "stopErp": SOLVER,
-        "stopKp": SOLVER,
-        "stopKd": SOLVER,
-        "fudgeFactor": SOLVER,
-        "cfmDamping": SOLVER,
+        **dict.fromkeys(SOLVERS, "a matter of Gazebo's solver"),
         "provideFeedback": "MuJoCo computes joint forces anyway; no sensor reads them",
         "initial_joint_position": "joints start at zero",
         "enable_wind": "there is no wind",

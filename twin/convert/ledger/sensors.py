@@ -15,7 +15,6 @@ from twin.models.urdf.gazebo import value_of
 from twin.models.urdf.sensors import kind_of
 
 ELSEWHERE = "not in robot.xml; report.json has it"
-OUTPUT: Fate = ("dropped", "the plugin is not simulated")
 TAGS: Mapping[str, Fate] = MappingProxyType(
     {
         "bodyName": ("translated", "body of the site"),
@@ -58,9 +57,9 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
         return container_fate(element, lambda child: sensor_fate(child, sensor, link, description))
     if camera and path.startswith("noise"):
         return "dropped", f"MuJoCo's images are free of noise; {ELSEWHERE}"
-    if (found := own or TAGS.get(path)) is not None:
-        return found
-    return OUTPUT if path.startswith("plugin") else ("dropped", "no counterpart in MuJoCo")
+    plugin = path.startswith("plugin")
+    why = "the plugin is not simulated" if plugin else "no counterpart in MuJoCo"
+    return own or TAGS.get(path) or ("dropped", why)
 
 
 def _spec_of(sensor: Element, link: str, description: RobotDescription) -> SensorSpec | None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import get_args
 
 import numpy as np
 
@@ -18,9 +20,11 @@ from twin.models.description import WORLD, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.shapes import Cylinder, Mesh
 from twin.models.urdf.document import Element, place
+from twin.models.urdf.links import GEOMETRIES
 
 POSE: Fate = ("kept", "pose")
 SHAPE: Fate = ("kept", "geom")
+KEPT_MESH: Fate = ("kept", "mesh in assets/")
 
 FATES: Mapping[str, Fate] = MappingProxyType(
     {
@@ -50,7 +54,15 @@ FATES: Mapping[str, Fate] = MappingProxyType(
     }
 )
 """By path of tags; what is not listed is dropped, unless a function below knows better."""
-SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
+KINDS: Mapping[str, Fate] = MappingProxyType(
+    {
+        "fixed": ("kept", "nested body"),
+        "prismatic": ("kept", "slide"),
+        "planar": ("translated", "two slides and a hinge"),
+        "floating": ("translated", "three slides and a ball"),
+    }
+)
+"""Of joints, by type; all others are hinges."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +145,7 @@ class _Fates:
         if "material" in path.split("/"):
             return self._material(element, path)
         parent, _, tag = path.rpartition("/")
-        if tag in SHAPES and parent in ("link/visual/geometry", "link/collision/geometry"):
+        if tag in GEOMETRIES and parent in ("link/visual/geometry", "link/collision/geometry"):
             return _shape(element, parent, self._description, self._roles)
         return FATES.get(path, ("dropped", "no counterpart in MuJoCo"))
 
@@ -157,21 +169,14 @@ def _joint(element: Element, path: str, description: RobotDescription) -> Fate:
     name = (element if path == "joint" else element.getparent()).get("name")
     joint = description.joints[name]
     if path == "joint":
-        kinds = {"fixed": "nested body", "prismatic": "slide"}
-        several = {"planar": "two slides and a hinge", "floating": "three slides and a ball"}
-        if joint.type in several:
-            return "translated", several[joint.type]
-        return "kept", kinds.get(joint.type, "hinge")
+        return KINDS.get(joint.type, ("kept", "hinge"))
     if joint.type in ("fixed", "floating"):
         return "dropped", f"a {joint.type} joint has none"
     if path == "joint/mimic":
         if joint.type not in ONE_DOF or joint.mimic is None:
             return "dropped", f"not for {joint.type} joints"
         leads = description.joints[joint.mimic.joint].type in ONE_DOF
-        return (
-            "translated",
-            "joint equality" if leads else "joint equality with its offset: its leader is fixed",
-        )
+        return "translated", f"joint equality{'' if leads else ' with its offset: its leader is fixed'}"
     if path == "joint/axis":
         given = np.array([float(word) for word in element.get("xyz").split()])
         if np.allclose(given, joint.axis, rtol=0.0, atol=1e-12):
@@ -234,16 +239,10 @@ def _mesh(element: Element, link: str, touched: bool, description: RobotDescript
         same = skipped.link == link and skipped.role == ("collision" if touched else "visual")
         if same and skipped.reference == element.get("filename", "").strip():
             return "dropped", f"the mesh {skipped.reason}"
-    return (
-        ("translated", "mesh in assets/; its convex hull is touched")
-        if touched
-        else ("kept", "mesh in assets/")
-    )
+    return ("translated", "mesh in assets/; its convex hull is touched") if touched else KEPT_MESH
 
 
 def counts(entries: Iterable[TagEntry]) -> dict[str, int]:
     """Return how many tags had each outcome."""
-    result = {"kept": 0, "translated": 0, "guessed": 0, "dropped": 0}
-    for entry in entries:
-        result[entry.outcome] += 1
-    return result
+    found = Counter(entry.outcome for entry in entries)
+    return {outcome: found[outcome] for outcome in get_args(Outcome)}

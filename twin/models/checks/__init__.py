@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from twin.models.checks.angles import rounded_angle
-from twin.models.checks.axes import axis_length
 from twin.models.checks.codes import ERRORS, WARNINGS
 from twin.models.checks.diagnostic import Diagnostic, from_problems, in_file_order
 from twin.models.checks.drive import drive_mismatch, missing_drive
@@ -15,10 +13,10 @@ from twin.models.checks.ignored import ignored
 from twin.models.checks.inertia import impossible_inertia, inertia
 from twin.models.checks.limits import limits
 from twin.models.checks.masses import masses
-from twin.models.checks.materials import material_elsewhere
 from twin.models.checks.meshes import meshes
 from twin.models.checks.motors import weak_motor
 from twin.models.checks.poses import visual_collision
+from twin.models.checks.spelling import axis_length, material_elsewhere, rounded_angle
 from twin.models.checks.wheels import wheel_axis, wheel_fixed
 from twin.models.description import RobotDescription
 

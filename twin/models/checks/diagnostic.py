@@ -9,6 +9,7 @@ from pathlib import Path
 from twin.errors import Problem, SourceLine
 from twin.models.checks.codes import ERRORS, Severity, severity_of
 from twin.models.description import RobotDescription
+from twin.models.urdf.document import Report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,14 +31,14 @@ class Diagnostic:
 
 
 def finding(
-    description: RobotDescription, code: str, element: str, line: int, *, message: str, fix: str
+    source: RobotDescription | Report, code: str, element: str, line: int, message: str, fix: str
 ) -> Diagnostic:
-    """Return a diagnostic of an element of `description`; line 0 means unknown."""
+    """Return a diagnostic of an element of a robot; line 0 means unknown."""
     return Diagnostic(
         code=code,
         severity=severity_of(code),
         element=element,
-        file=line.file if isinstance(line, SourceLine) else description.source,
+        file=line.file if isinstance(line, SourceLine) else source.source,
         line=int(line) or None,
         message=message,
         fix=fix,
@@ -66,9 +67,5 @@ def _from_problem(problem: Problem, source: Path) -> Diagnostic:
 
 def in_file_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by file and line, those without a line last, each once; else as they were found."""
-    return tuple(
-        sorted(
-            dict.fromkeys(diagnostics),
-            key=lambda found: (found.line is None, str(found.file), found.line or 0),
-        )
-    )
+    distinct = dict.fromkeys(diagnostics)
+    return tuple(sorted(distinct, key=lambda found: (found.line is None, str(found.file), found.line or 0)))

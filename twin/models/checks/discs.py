@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.mesh.hulls import Hull, hull_of
+from twin.models.mesh.hulls import hull_of
 from twin.models.shapes import Cylinder, Mesh
 from twin.models.solids import Shape, is_solid
 
@@ -51,15 +51,7 @@ def _disc(shape: Shape) -> Disc | None:
     if not isinstance(geometry, Mesh) or not is_solid(shape):
         return None
     hull = hull_of(geometry)
-    found = None if hull is None else _round(hull)
-    if hull is None or found is None:
-        return None
-    centre, axis, radius, width = found
-    return Disc(shape=shape, centre=pose.apply(centre), axis=R @ axis, radius=radius, width=width)
-
-
-def _round(hull: Hull) -> tuple[Array, Array, float, float] | None:
-    """Return centre, axis, radius and width of a hull that is a disc, in the mesh's frame."""
+    assert hull is not None, "as it is solid"
     moments, axes = np.linalg.eigh(hull.gyration)
     axis = axes[:, 2]
     points = hull.points - hull.centroid
@@ -70,4 +62,5 @@ def _round(hull: Hull) -> tuple[Array, Array, float, float] | None:
     width, radius = far - near, float(reaches.max())
     if width >= 2.0 * radius or moments[1] > ALIKE * moments[0] or reaches.min() < ROUND * radius:
         return None
-    return hull.centroid + axis * (near + far) / 2.0, axis, radius, width
+    centre = hull.centroid + axis * (near + far) / 2.0
+    return Disc(shape=shape, centre=pose.apply(centre), axis=R @ axis, radius=radius, width=width)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.geometry import Array, rotate_wxyz
+from twin.geometry import rotate_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.checks.wheels import wheels_of
@@ -28,9 +28,7 @@ def missing_drive(description: RobotDescription) -> Iterator[Diagnostic]:
     why, line = lack_of_drive(description)
     if drive is not None:
         why = f"the file has no drive plugin; by its wheels twin takes it for {drive.words}"
-    yield finding(
-        description, "missing-drive", "robot", line or wheels[0].joint.line, message=why, fix=VALID_DRIVES
-    )
+    yield finding(description, "missing-drive", "robot", line or wheels[0].joint.line, why, VALID_DRIVES)
 
 
 def drive_mismatch(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -38,51 +36,47 @@ def drive_mismatch(description: RobotDescription) -> Iterator[Diagnostic]:
     drive = description.drive
     if drive is None:
         return
-    yield from _radii(description, drive)
-    yield from _separation(description, drive)
-    yield from _senses(description, drive)
+    for faults in (_radii, _separation, _senses):
+        for message, fix in faults(description, drive):
+            yield finding(description, "drive-mismatch", "drive plugin", drive.line, message, fix)
 
 
-def _radii(description: RobotDescription, drive: DriveSpec) -> Iterator[Diagnostic]:
+def _radii(description: RobotDescription, drive: DriveSpec) -> Iterator[tuple[str, str]]:
     for name in (*drive.left_joints, *drive.right_joints):
         link = description.links[description.joints[name].child]
         found = _radius(link)
         if found is not None and abs(found / drive.wheel_radius - 1.0) > TOLERANCE:
-            yield _finding(
-                description,
-                f"the drive plugin says wheel_radius {drive.wheel_radius:g} m, the collision shape of "
-                f"'{link.name}' has {found:g} m",
+            said = f"the drive plugin says wheel_radius {drive.wheel_radius:g} m"
+            yield (
+                f"{said}, the collision shape of '{link.name}' has {found:g} m",
                 f"write <wheel_radius>{found:g}</wheel_radius>, or correct the shape",
             )
 
 
-def _separation(description: RobotDescription, drive: DriveSpec) -> Iterator[Diagnostic]:
+def _separation(description: RobotDescription, drive: DriveSpec) -> Iterator[tuple[str, str]]:
     left, right = (_side(description, names) for names in (drive.left_joints, drive.right_joints))
     if left is None or right is None:
         return
     found = left - right
     if found < 0.0:
-        yield _finding(
-            description,
+        yield (
             f"the drive plugin's left wheels are {-found:g} m to the right of its right wheels",
             "exchange the left and the right joints in the plugin",
         )
     elif abs(found / drive.wheel_separation - 1.0) > TOLERANCE:
-        yield _finding(
-            description,
-            f"the drive plugin says wheel_separation {drive.wheel_separation:g} m, the wheels are "
-            f"{found:g} m apart",
+        said = f"the drive plugin says wheel_separation {drive.wheel_separation:g} m"
+        yield (
+            f"{said}, the wheels are {found:g} m apart",
             f"write <wheel_separation>{found:g}</wheel_separation>, or move the wheels",
         )
 
 
-def _senses(description: RobotDescription, drive: DriveSpec) -> Iterator[Diagnostic]:
+def _senses(description: RobotDescription, drive: DriveSpec) -> Iterator[tuple[str, str]]:
     poses = link_poses(description)
     for name in (*drive.left_joints, *drive.right_joints):
         joint = description.joints[name]
         if rotate_wxyz(poses[joint.child].quat_wxyz, joint.axis)[1] < -0.5:
-            yield _finding(
-                description,
+            yield (
                 f"the axis of wheel joint '{name}' points to the right, so that the wheel runs backwards "
                 "when the plugin drives forwards",
                 "turn its <axis> around, so that it points to the robot's left (+y)",
@@ -91,25 +85,18 @@ def _senses(description: RobotDescription, drive: DriveSpec) -> Iterator[Diagnos
 
 def _radius(link: Link) -> float | None:
     """Return the radius of a wheel with one round shape [m]."""
-    radii = [
-        c.geometry.radius for c in link.collisions if isinstance(c.geometry, Cylinder | Sphere | Capsule)
-    ]
-    return radii[0] if len(radii) == len(link.collisions) == 1 else None
+    shapes = [collision.geometry for collision in link.collisions]
+    round_ones = [shape for shape in shapes if isinstance(shape, Cylinder | Sphere | Capsule)]
+    return round_ones[0].radius if len(round_ones) == len(shapes) == 1 else None
 
 
 def _side(description: RobotDescription, names: tuple[str, ...]) -> float | None:
     """Return the mean y of the wheels' contact points in the root frame [m]; None if a shape is not round."""
     poses = link_poses(description)
-    centres: list[Array] = []
+    across: list[float] = []
     for name in names:
         link = description.links[description.joints[name].child]
         if _radius(link) is None:
             return None
-        centres.append(poses[link.name].apply(link.collisions[0].T_link_geometry.xyz))
-    return float(np.mean([centre[1] for centre in centres]))
-
-
-def _finding(description: RobotDescription, message: str, fix: str) -> Diagnostic:
-    assert description.drive is not None
-    line = description.drive.line
-    return finding(description, "drive-mismatch", "drive plugin", line, message=message, fix=fix)
+        across.append(poses[link.name].apply(link.collisions[0].T_link_geometry.xyz)[1])
+    return float(np.mean(across))

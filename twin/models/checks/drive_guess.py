@@ -74,11 +74,8 @@ def _other_drive(description: RobotDescription) -> tuple[str, int] | None:
 
 def _swivels(description: RobotDescription, link: str, poses: Mapping[str, Pose3]) -> bool:
     """Tell whether a joint above the link, or its own, turns about an axis that is nearly upright."""
-    parents = {joint.child: joint for joint in description.joints.values()}
-    while link in parents:
-        joint = parents[link]
-        upright = abs(rotate_wxyz(poses[link].quat_wxyz, joint.axis)[2]) >= LEVEL
-        if joint.type in ("revolute", "continuous") and upright:
-            return True
-        link = joint.parent
-    return False
+    return any(
+        joint.type in ("revolute", "continuous")
+        and abs(rotate_wxyz(poses[joint.child].quat_wxyz, joint.axis)[2]) >= LEVEL
+        for joint in description.above(link)
+    )

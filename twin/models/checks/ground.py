@@ -20,6 +20,9 @@ LEVEL = 3e-3
 SLIPPERY = 0.1
 CASTER_NAME = re.compile(r"caster|castor|ball|roller|skid", re.IGNORECASE)
 
+Found = tuple[str, str, int, str, str]
+"""Code, element, line, message and fix."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Foot:
@@ -37,15 +40,24 @@ def ground(description: RobotDescription) -> Iterator[Diagnostic]:
     wheels = wheels_of(description)
     if not wheels:
         return
-    floor = min(_bottom(wheel) for wheel in wheels)
+    floor = min(wheel.bottom for wheel in wheels)
     feet = _feet(description, wheels)
-    yield from _high_wheels(description, wheels, floor, feet)
-    yield from _resting(description, floor, feet)
-    yield from _few_supports(description, wheels, floor, feet)
-
-
-def _bottom(wheel: Wheel) -> float:
-    return float(wheel.centre[2]) - wheel.radius
+    for code, element, line, message, fix in (
+        *_high_wheels(wheels, floor),
+        *_low_feet(feet, floor),
+        *_resting(feet, floor),
+    ):
+        yield finding(description, code, element, line, message, fix)
+    supports = [wheel.link for wheel in wheels if wheel.bottom - floor <= LEVEL]
+    supports += [foot.link for foot in feet if foot.is_caster and abs(foot.z - floor) <= LEVEL]
+    if len(supports) < 3:
+        line = description.links[description.root].line
+        message = (
+            f"of wheels and casters only {len(supports)} on the ground ({', '.join(supports)}); "
+            "on fewer than 3 the robot tips over or drags its body"
+        )
+        fix = f"add a caster: a sphere that ends at z = {floor:.4g} m, with <mu1>0</mu1> for its link"
+        yield finding(description, "few-supports", "robot", line, message, fix)
 
 
 def _feet(description: RobotDescription, wheels: tuple[Wheel, ...]) -> list[_Foot]:
@@ -55,14 +67,11 @@ def _feet(description: RobotDescription, wheels: tuple[Wheel, ...]) -> list[_Foo
     feet = []
     for link in description.links.values():
         shapes: tuple[Shape, ...] = link.collisions if solid else link.visuals
-        known = [shape for shape in shapes if is_solid(shape)]
-        if not known or link.name in turning:
-            continue
-        heights = [
-            (lowest(shape.geometry, poses[link.name] @ shape.T_link_geometry), shape) for shape in known
-        ]
-        z, shape = min(heights, key=lambda pair: pair[0])
-        feet.append(_Foot(link=link.name, line=shape.line, z=z, is_caster=_is_caster(link, shape)))
+        pose = poses[link.name]
+        heights = [(lowest(s.geometry, pose @ s.T_link_geometry), s) for s in shapes if is_solid(s)]
+        if heights and link.name not in turning:
+            z, shape = min(heights, key=lambda pair: pair[0])
+            feet.append(_Foot(link=link.name, line=shape.line, z=z, is_caster=_is_caster(link, shape)))
     return feet
 
 
@@ -73,59 +82,30 @@ def _is_caster(link: Link, shape: Shape) -> bool:
     return isinstance(shape.geometry, Sphere | Capsule) or bool(CASTER_NAME.search(link.name))
 
 
-def _high_wheels(
-    description: RobotDescription, wheels: tuple[Wheel, ...], floor: float, feet: list[_Foot]
-) -> Iterator[Diagnostic]:
+def _high_wheels(wheels: tuple[Wheel, ...], floor: float) -> Iterator[Found]:
     for wheel in wheels:
-        above = _bottom(wheel) - floor
+        above = wheel.bottom - floor
         if above > LEVEL:
-            yield finding(
-                description,
-                "wheels-off-ground",
-                f"link '{wheel.link}'",
-                wheel.joint.line,
-                message=f"wheel '{wheel.link}' ends {1e3 * above:.3g} mm above the lowest wheel",
-                fix="put all wheels on one height: radius and <origin> z of the joint",
-            )
+            message = f"wheel '{wheel.link}' ends {1e3 * above:.3g} mm above the lowest wheel"
+            fix = "put all wheels on one height: radius and <origin> z of the joint"
+            yield "wheels-off-ground", f"link '{wheel.link}'", wheel.joint.line, message, fix
+
+
+def _low_feet(feet: list[_Foot], floor: float) -> Iterator[Found]:
     for foot in feet:
         below = floor - foot.z
         if below > (LEVEL if foot.is_caster else CLEARANCE):
-            yield finding(
-                description,
-                "wheels-off-ground",
-                f"link '{foot.link}'",
-                foot.line,
-                message=f"link '{foot.link}' reaches {1e3 * below:.3g} mm lower than the wheels "
-                f"(z = {foot.z:.4g} m against {floor:.4g} m), which hang in the air",
-                fix=f"raise it by {1e3 * below:.3g} mm or more, or lower the wheels",
+            message = (
+                f"link '{foot.link}' reaches {1e3 * below:.3g} mm lower than the wheels "
+                f"(z = {foot.z:.4g} m against {floor:.4g} m), which hang in the air"
             )
+            fix = f"raise it by {1e3 * below:.3g} mm or more, or lower the wheels"
+            yield "wheels-off-ground", f"link '{foot.link}'", foot.line, message, fix
 
 
-def _resting(description: RobotDescription, floor: float, feet: list[_Foot]) -> Iterator[Diagnostic]:
+def _resting(feet: list[_Foot], floor: float) -> Iterator[Found]:
     for foot in feet:
         if not foot.is_caster and abs(foot.z - floor) <= CLEARANCE:
-            yield finding(
-                description,
-                "base-on-ground",
-                f"link '{foot.link}'",
-                foot.line,
-                message=f"rests on the ground: it ends at z = {foot.z:.4g} m, the wheels at {floor:.4g} m",
-                fix="raise it by 10 mm or more, or lower the wheels' joints; a caster has <mu1>0</mu1>",
-            )
-
-
-def _few_supports(
-    description: RobotDescription, wheels: tuple[Wheel, ...], floor: float, feet: list[_Foot]
-) -> Iterator[Diagnostic]:
-    supports = [wheel.link for wheel in wheels if _bottom(wheel) - floor <= LEVEL]
-    supports += [foot.link for foot in feet if foot.is_caster and abs(foot.z - floor) <= LEVEL]
-    if len(supports) < 3:
-        yield finding(
-            description,
-            "few-supports",
-            "robot",
-            description.links[description.root].line,
-            message=f"of wheels and casters only {len(supports)} on the ground ({', '.join(supports)}); "
-            "on fewer than 3 the robot tips over or drags its body",
-            fix=f"add a caster: a sphere that ends at z = {floor:.4g} m, with <mu1>0</mu1> for its link",
-        )
+            message = f"rests on the ground: it ends at z = {foot.z:.4g} m, the wheels at {floor:.4g} m"
+            fix = "raise it by 10 mm or more, or lower the wheels' joints; a caster has <mu1>0</mu1>"
+            yield "base-on-ground", f"link '{foot.link}'", foot.line, message, fix

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
-from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.checks.source import is_repeated, number, read_source
+from twin.models.checks.diagnostic import Diagnostic
+from twin.models.checks.source import finding_in, is_repeated, number, read_source
 from twin.models.description import RobotDescription
-from twin.models.urdf.document import Element, place
+from twin.models.urdf.document import Element
 
 CHILDREN: Mapping[str, str] = MappingProxyType(
     {
@@ -73,23 +73,15 @@ def ignored(description: RobotDescription) -> Iterator[Diagnostic]:
     for (code, parent, name), elements in seen.items():
         more = f" and {len(elements) - 1} more" if len(elements) > 1 else ""
         valid = (ATTRIBUTES if code == "ignored-attribute" else CHILDREN)[parent].replace(" ", ", ")
-        nothing = "is not URDF and has no effect"
-        messages = {
-            "ignored-attribute": f"<{parent} {name}='…'>{more} {nothing}",
-            "ignored-tag": f"<{name}> in <{parent}>{more} is not URDF and has no effect"
-            + _would_be(elements[0]),
-            "repeated-tag": f"<{name}> stands here twice{more}; the first one counts",
-        }
-        yield finding(
-            description,
-            code,
-            place(elements[0]),
-            report.line(elements[0]),
-            message=messages[code],
-            fix="remove one of them"
-            if code == "repeated-tag"
-            else f"remove or correct it; here URDF has {valid}",
-        )
+        nothing, fix = "is not URDF and has no effect", f"remove or correct it; here URDF has {valid}"
+        if code == "ignored-attribute":
+            message = f"<{parent} {name}='…'>{more} {nothing}"
+        elif code == "ignored-tag":
+            message = f"<{name}> in <{parent}>{more} {nothing}{_would_be(elements[0])}"
+        else:
+            message = f"<{name}> stands here twice{more}; the first one counts"
+            fix = "remove one of them"
+        yield finding_in(report, code, elements[0], message, fix)
 
 
 def _would_be(element: Element) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Inertial, Link, RobotDescription
+from twin.models.description import Inertial, RobotDescription
 from twin.models.mass_properties import LEAST, describe_repair, inertia_as_urdf, inertia_fault
 from twin.models.shapes import Mesh
 from twin.models.solids import Shape, all_solid, bounds, homogeneous_inertia
@@ -43,26 +43,15 @@ def impossible_inertia(description: RobotDescription) -> Iterator[Diagnostic]:
         inertial = description.links[name].inertial
         fault = None if inertial is None else inertia_fault(inertial.inertia)
         if inertial is not None and fault is not None and name not in settlement.repaired:
-            yield finding(
-                description,
-                "lumped-inertia",
-                f"link '{name}'",
-                inertial.line,
-                message=f"no body has this inertia: {fault}; it counts as part of '{head}'",
-                fix="take it from CAD, or give it that of its shape",
-            )
+            message = f"no body has this inertia: {fault}; it counts as part of '{head}'"
+            fix = "take it from CAD, or give it that of its shape"
+            yield finding(description, "lumped-inertia", f"link '{name}'", inertial.line, message, fix)
     for head, repair in settlement.repaired.items():
         inertials = [description.links[name].inertial for name in (head, *repair.parts)]
         line = next(inertial.line for inertial in inertials if inertial is not None)
         message, nearest = describe_repair(head, repair, settlement.bodies[head])
-        yield finding(
-            description,
-            "repaired-inertia",
-            f"link '{head}'",
-            line,
-            message=message,
-            fix=f"{nearest}, and is taken",
-        )
+        fix = f"{nearest}, and is taken"
+        yield finding(description, "repaired-inertia", f"link '{head}'", line, message, fix)
 
 
 def inertia(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -80,8 +69,11 @@ def inertia(description: RobotDescription) -> Iterator[Diagnostic]:
         if fits:
             # Of visual and collision, the one that speaks for the file.
             best = min(fits, key=lambda fit: max(fit.high, 1 / fit.low))
-            best = replace(best, share=min(fit.share for fit in fits))
-            yield from _compare(description, link, link.inertial, actual, best)
+            found = _compare(link.inertial, actual, replace(best, share=min(fit.share for fit in fits)))
+            if found is not None:
+                fix = f"a homogeneous body has {inertia_as_urdf(R.T @ best.expected @ R)}"
+                code, message = found
+                yield finding(description, code, f"link '{link.name}'", link.inertial.line, message, fix)
 
 
 def _fit(actual: Array, shapes: Sequence[Shape], inertial: Inertial) -> _Fit:
@@ -97,38 +89,23 @@ def _fit(actual: Array, shapes: Sequence[Shape], inertial: Inertial) -> _Fit:
     return _Fit(expected=expected, low=low, high=high, share=share)
 
 
-def _compare(
-    description: RobotDescription, link: Link, inertial: Inertial, actual: Array, fit: _Fit
-) -> Iterator[Diagnostic]:
-    R = matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz)
-    low, high = fit.low, fit.high
+def _compare(inertial: Inertial, actual: Array, fit: _Fit) -> tuple[str, str] | None:
+    """Return code and message of what is wrong with the `actual` inertia."""
     largest = float(np.linalg.eigvalsh(actual)[2])
     if fit.share > 1.0:
         radius = np.sqrt(largest / inertial.mass)
-        code = "inertia-too-large"
-        message = (
+        return "inertia-too-large", (
             f"moment {largest:.4g} kg m² at {inertial.mass:g} kg needs mass {radius:.3g} m from the axis: "
             f"{fit.share:.3g} times the most that mass inside the shapes can have"
         )
-    elif low < TINY:
-        code = "inertia-too-small"
-        message = f"a moment of the inertia is {low:.2g} times what the shapes give"
-    elif _is_placeholder(actual, fit.expected):
-        code = "inertia-placeholder"
-        message = (
+    if fit.low < TINY:
+        return "inertia-too-small", f"a moment of the inertia is {fit.low:.2g} times what the shapes give"
+    if _is_placeholder(actual, fit.expected):
+        return "inertia-placeholder", (
             f"the same moment {largest:.4g} kg m² about every axis is a placeholder: "
-            f"it is {low:.2f} to {high:.2f} times what the shapes give"
+            f"it is {fit.low:.2f} to {fit.high:.2f} times what the shapes give"
         )
-    else:
-        return
-    yield finding(
-        description,
-        code,
-        f"link '{link.name}'",
-        inertial.line,
-        message=message,
-        fix=f"a homogeneous body has {inertia_as_urdf(R.T @ fit.expected @ R)}",
-    )
+    return None
 
 
 def _ratios(actual: Array, expected: Array) -> tuple[float, float]:

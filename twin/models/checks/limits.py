@@ -9,6 +9,8 @@ from twin.models.checks.wheels import wheels_of
 from twin.models.description import Joint, RobotDescription
 
 UNITS = {"prismatic": ("N", "m/s", "m")}
+Found = tuple[str, str, str]
+"""Code, message and fix."""
 
 
 def limits(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -16,10 +18,11 @@ def limits(description: RobotDescription) -> Iterator[Diagnostic]:
     driven = _driven(description)
     for joint in description.joints.values():
         bounded = joint.type in ("revolute", "prismatic")
-        if bounded:
-            yield from _range(description, joint)
+        found = list(_range(joint)) if bounded else []
         if joint.mimic is None and (bounded or joint.name in driven):
-            yield from _motor(description, joint)
+            found += _motor(joint)
+        for code, message, fix in found:
+            yield finding(description, code, f"joint '{joint.name}'", joint.line, message, fix)
 
 
 def _driven(description: RobotDescription) -> set[str]:
@@ -30,43 +33,30 @@ def _driven(description: RobotDescription) -> set[str]:
     return set() if drive.max_wheel_torque else {*drive.left_joints, *drive.right_joints}
 
 
-def _range(description: RobotDescription, joint: Joint) -> Iterator[Diagnostic]:
+def _range(joint: Joint) -> Iterator[Found]:
     lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
     unit = UNITS.get(joint.type, ("Nm", "rad/s", "rad"))[2]
     if lower == upper:
-        yield _finding(
-            description,
+        yield (
             "no-range",
-            joint,
             f"lower and upper limit are both {lower:g} {unit}, so that it cannot move",
             "give a range, or make the joint fixed (left out limits are 0)",
         )
     elif not lower <= 0.0 <= upper:
         nearest = lower if lower > 0.0 else upper
-        yield _finding(
-            description,
+        yield (
             "limits-exclude-zero",
-            joint,
             f"its range {lower:g} … {upper:g} {unit} leaves out 0, where it starts",
             f"shift the joint's <origin> by {nearest:g} {unit} along its axis, and the limits with it",
         )
 
 
-def _motor(description: RobotDescription, joint: Joint) -> Iterator[Diagnostic]:
+def _motor(joint: Joint) -> Iterator[Found]:
     units = UNITS.get(joint.type, ("Nm", "rad/s", "rad"))
     limit = joint.limit
     for what, value, unit in (("effort", limit.effort, units[0]), ("velocity", limit.velocity, units[1])):
         if value:
             continue
         state = "is 0: it would never move" if value == 0.0 else "is missing: nothing bounds its motor"
-        yield _finding(
-            description,
-            f"no-{what}",
-            joint,
-            f"its {what} limit {state}",
-            f"write <limit {what}='…'/> with the motor's value [{unit}]",
-        )
-
-
-def _finding(description: RobotDescription, code: str, joint: Joint, message: str, fix: str) -> Diagnostic:
-    return finding(description, code, f"joint '{joint.name}'", joint.line, message=message, fix=fix)
+        fix = f"write <limit {what}='…'/> with the motor's value [{unit}]"
+        yield f"no-{what}", f"its {what} limit {state}", fix

@@ -19,25 +19,16 @@ def masses(description: RobotDescription) -> Iterator[Diagnostic]:
         others = f" (nor do the links fixed to it: {fixed})" if fixed else ""
         line = description.links[head].line
         if not any(link.name in heavy for link in links) and head != WORLD:
-            moving = head != description.root
-            yield finding(
-                description,
-                "massless" if moving else "massless-base",
-                f"link '{head}'",
-                line,
-                message=f"moves and weighs nothing{others}"
-                if moving
-                else f"the base '{head}' weighs nothing{others}; it can only be fixed to the ground",
-                fix="give it <inertial> with <mass value='…'/> and <inertia ixx='…' iyy='…' izz='…'/>",
-            )
+            code, message = "massless", f"moves and weighs nothing{others}"
+            if head == description.root:
+                code = "massless-base"
+                message = f"the base '{head}' weighs nothing{others}; it can only be fixed to the ground"
+            fix = "give it <inertial> with <mass value='…'/> and <inertia ixx='…' iyy='…' izz='…'/>"
+            yield finding(description, code, f"link '{head}'", line, message, fix)
         visible = [link.name for link in links if link.visuals]
         also = f" (also of {', '.join(visible[1:])})" if visible[1:] else ""
         if visible and not any(link.collisions for link in links):
-            yield finding(
-                description,
-                "no-collision",
-                f"link '{visible[0]}'",
-                description.links[visible[0]].line,
-                message="seen, not touched: there is no collision shape" + also,
-                fix="add <collision> with the same <origin> and a simple <geometry>",
-            )
+            first, line = f"link '{visible[0]}'", description.links[visible[0]].line
+            message = f"seen, not touched: there is no collision shape{also}"
+            fix = "add <collision> with the same <origin> and a simple <geometry>"
+            yield finding(description, "no-collision", first, line, message, fix)

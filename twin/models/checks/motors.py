@@ -33,15 +33,10 @@ def weak_motor(description: RobotDescription) -> Iterator[Diagnostic]:
         )
         if load > effort:
             unit = "N" if joint.type == "prismatic" else "Nm"
-            yield finding(
-                description,
-                "weak-motor",
-                f"joint '{joint.name}'",
-                joint.line,
-                message=f"its motor holds at most {effort:g} {unit}, gravity pulls with {load:.3g} {unit} "
-                f"({mass:.3g} kg hang on it)",
-                fix=f"raise effort above {load:.3g} {unit}, better to twice of it, or take off weight",
-            )
+            pull = f"gravity pulls with {load:.3g} {unit} ({mass:.3g} kg hang on it)"
+            message = f"its motor holds at most {effort:g} {unit}, {pull}"
+            fix = f"raise effort above {load:.3g} {unit}, better to twice of it, or take off weight"
+            yield finding(description, "weak-motor", f"joint '{joint.name}'", joint.line, message, fix)
 
 
 def static_load(

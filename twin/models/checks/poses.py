@@ -10,7 +10,7 @@ from twin.geometry import matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import Link, RobotDescription
 from twin.models.shapes import Cylinder, Mesh
-from twin.models.solids import Shape, all_solid, bounds
+from twin.models.solids import all_solid, bounds
 
 SHARE = 0.1
 """Of the visual's diagonal by which the centres may differ."""
@@ -24,22 +24,14 @@ SIZES = 20.0
 def visual_collision(description: RobotDescription) -> Iterator[Diagnostic]:
     """Yield links that are seen and touched in different places."""
     for link in description.links.values():
-        if not link.visuals or not link.collisions or not all_solid((*link.visuals, *link.collisions)):
+        if not link.visuals or not link.collisions or not all_solid(link.shapes):
             continue
-        shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)
-        if any(isinstance(shape.geometry, Mesh) for shape in shapes):
-            message = _differs(link)
-        else:
-            message = _moved(link) or _turned(link)
+        meshes = any(isinstance(shape.geometry, Mesh) for shape in link.shapes)
+        message = _differs(link) if meshes else _moved(link) or _turned(link)
         if message:
-            yield finding(
-                description,
-                "visual-collision",
-                f"link '{link.name}'",
-                link.collisions[0].line,
-                message=message,
-                fix="give both the same <origin>",
-            )
+            element, line = f"link '{link.name}'", link.collisions[0].line
+            fix = "give both the same <origin>"
+            yield finding(description, "visual-collision", element, line, message, fix)
 
 
 def _moved(link: Link) -> str | None:
@@ -60,18 +52,14 @@ def _differs(link: Link) -> str | None:
     ratio = float(np.linalg.norm(high - low) / np.linalg.norm(touch_high - touch_low))
     if max(ratio, 1.0 / ratio) > SIZES:
         return f"its visual is {ratio:.3g} times as large as its collision: does one of them lack a scale?"
-    outside = np.maximum(np.maximum(low - touch_high, touch_low - high), 0.0)
-    distance = float(np.linalg.norm(outside))
-    if distance <= LEAST:
-        return None
-    return f"its visual and its collision are {distance:.3g} m apart"
+    distance = float(np.linalg.norm(np.maximum(np.maximum(low - touch_high, touch_low - high), 0.0)))
+    return f"its visual and its collision are {distance:.3g} m apart" if distance > LEAST else None
 
 
 def _turned(link: Link) -> str | None:
-    shapes: tuple[Shape, ...] = (*link.visuals, *link.collisions)
-    if len(shapes) != 2 or not all(isinstance(shape.geometry, Cylinder) for shape in shapes):
+    if len(link.shapes) != 2 or not all(isinstance(shape.geometry, Cylinder) for shape in link.shapes):
         return None
-    axes = [matrix_from_quat_wxyz(shape.T_link_geometry.quat_wxyz)[:, 2] for shape in shapes]
+    axes = [matrix_from_quat_wxyz(shape.T_link_geometry.quat_wxyz)[:, 2] for shape in link.shapes]
     angle = float(np.degrees(np.arccos(min(1.0, abs(float(axes[0] @ axes[1]))))))
     if angle <= AXIS_DEG:
         return None

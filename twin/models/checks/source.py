@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from twin.models.checks.diagnostic import Diagnostic, finding
 from twin.models.description import RobotDescription
-from twin.models.urdf.document import Element, Report, parse
+from twin.models.urdf.document import Element, Report, parse, place
 from twin.models.urdf.plain_numbers import plain_number
 
 ONCE = ("inertial", "visual", "collision", "joint")
@@ -16,6 +17,11 @@ def read_source(description: RobotDescription) -> tuple[Element, Report]:
     """Return the root element of the robot's text, and a report that knows its lines."""
     report = Report(description.source, description.lines)
     return parse(description.urdf.encode(), report), report
+
+
+def finding_in(report: Report, code: str, element: Element, message: str, fix: str) -> Diagnostic:
+    """Return a diagnostic of an element of the text that `report` is of."""
+    return finding(report, code, place(element), report.line(element), message, fix)
 
 
 def number(text: str | None) -> float:
@@ -29,6 +35,4 @@ def number(text: str | None) -> float:
 def is_repeated(element: Element) -> bool:
     """Tell whether an element stands a second time where URDF has it once."""
     parent = element.getparent()
-    if parent is None or parent.tag not in ONCE:
-        return False
-    return parent.find(element.tag) is not element
+    return parent is not None and parent.tag in ONCE and parent.find(element.tag) is not element

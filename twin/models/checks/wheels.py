@@ -34,6 +34,11 @@ class Wheel:
     radius: float
     """[m]"""
 
+    @property
+    def bottom(self) -> float:
+        """Its lowest z [m]."""
+        return float(self.centre[2]) - self.radius
+
 
 def wheels_of(description: RobotDescription) -> tuple[Wheel, ...]:
     """Return the wheels of the drive, and discs that turn freely about an axis that is nearly level."""
@@ -64,19 +69,16 @@ def wheel_axis(description: RobotDescription) -> Iterator[Diagnostic]:
         worst = max(discs, key=lambda disc: _angle_deg(disc.axis, axis), default=None)
         if worst is None or _angle_deg(worst.axis, axis) <= TOLERANCE_DEG:
             continue
-        is_cylinder = isinstance(worst.shape.geometry, Cylinder)
-        yield finding(
-            description,
-            "wheel-axis",
-            f"link '{link.name}'",
-            worst.shape.line,
-            message=f"the wheel's {'cylinder' if is_cylinder else 'round mesh'} stands "
-            f"{_angle_deg(worst.axis, axis):.1f} degrees off the axis of joint '{wheel.joint.name}', so that "
-            "the wheel tumbles instead of rolling",
-            fix=f"lay it along the axis: <origin rpy='{_origin_rpy(axis)}'/> in its visual and collision"
-            if is_cylinder
-            else "turn it by the <origin rpy=''/> of its visual and collision, or correct the joint's <axis>",
+        what = "round mesh"
+        fix = "turn it by the <origin rpy=''/> of its visual and collision, or correct the joint's <axis>"
+        if isinstance(worst.shape.geometry, Cylinder):
+            what = "cylinder"
+            fix = f"lay it along the axis: <origin rpy='{_origin_rpy(axis)}'/> in its visual and collision"
+        message = (
+            f"the wheel's {what} stands {_angle_deg(worst.axis, axis):.1f} degrees off the axis of joint "
+            f"'{wheel.joint.name}', so that the wheel tumbles instead of rolling"
         )
+        yield finding(description, "wheel-axis", f"link '{link.name}'", worst.shape.line, message, fix)
 
 
 def wheel_fixed(description: RobotDescription) -> Iterator[Diagnostic]:
@@ -87,25 +89,20 @@ def wheel_fixed(description: RobotDescription) -> Iterator[Diagnostic]:
             continue
         x, y, z = joint.T_parent_joint.xyz
         where = "at its centre" if not np.any(joint.T_parent_joint.xyz) else f"at {x:g} {y:g} {z:g} m"
-        yield finding(
-            description,
-            "wheel-fixed",
-            f"joint '{joint.name}'",
-            joint.line,
-            message=f"wheel '{link.name}' is fixed to '{joint.parent}' {where}",
-            fix="make the joint continuous, and give it the wheel's <origin> and <axis xyz='0 1 0'/>",
-        )
+        message = f"wheel '{link.name}' is fixed to '{joint.parent}' {where}"
+        fix = "make the joint continuous, and give it the wheel's <origin> and <axis xyz='0 1 0'/>"
+        yield finding(description, "wheel-fixed", f"joint '{joint.name}'", joint.line, message, fix)
 
 
 def _is_low(wheel: Wheel, description: RobotDescription, poses: Mapping[str, Pose3]) -> bool:
     """Tell whether a wheel reaches down to where the robot ends: arms have round parts on roll joints too."""
-    ends = [
+    end = min(
         lowest(shape.geometry, poses[name] @ shape.T_link_geometry)
         for name, link in description.links.items()
         for shape in link.collisions or link.visuals
         if is_solid(shape)
-    ]
-    return float(wheel.centre[2]) - wheel.radius < min(ends) + wheel.radius
+    )
+    return wheel.bottom < end + wheel.radius
 
 
 def _disc(link: Link) -> Disc | None:

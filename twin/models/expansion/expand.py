@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -49,18 +50,11 @@ def expand(source: Path, options: ReadOptions = DEFAULTS, *, time_limit_s: float
     Raises:
         ModelError: xacro refuses the file, it tries what a model file may not do, or it takes too long.
     """
-    path = PackagePath.of(source, options)
     request = {
         "file": str(source.absolute()),
         "args": dict(options.args),
         "environment": {name: os.environ[name] for name in options.allow_env if name in os.environ},
-        "packages": {
-            "starts": list(map(str, path.starts)),
-            "given": {name: str(folder) for name, folder in path.given.items()},
-            "ament_prefixes": list(map(str, path.ament_prefixes)),
-            "search": list(map(str, path.search)),
-            "allowed": list(map(str, path.allowed)),
-        },
+        "packages": PackagePath.of(source, options),
     }
     answer = _run_worker(request, source, time_limit_s)
     if "error" in answer:
@@ -79,7 +73,7 @@ def _run_worker(request: Mapping[str, object], source: Path, time_limit_s: float
         try:
             done = subprocess.run(
                 command,
-                input=json.dumps(request).encode(),
+                input=pickle.dumps(request),
                 stdout=output,
                 stderr=subprocess.PIPE,
                 timeout=time_limit_s,

@@ -197,24 +197,23 @@ class _Guards(ast.NodeTransformer):
         return ast.Call(_name(_CALL), [node.func, *node.args], node.keywords)
 
     def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
-        self.generic_visit(node)
-        node.body = _apply(_STEP, node.body)
-        return node
+        return self._guard(node, "body", _STEP)
 
     def visit_comprehension(self, node: ast.comprehension) -> ast.AST:
-        self.generic_visit(node)
-        node.iter = _apply(_LOOP, node.iter)
-        return node
+        return self._guard(node, "iter", _LOOP)
 
     def visit_FormattedValue(self, node: ast.FormattedValue) -> ast.AST:
-        self.generic_visit(node)
-        node.value = _apply(_WEIGH, node.value)
-        return node
+        return self._guard(node, "value", _WEIGH)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         guard = _OPERATORS.get(type(node.op))
         return node if guard is None else _apply(guard, node.left, node.right)
+
+    def _guard(self, node: ast.AST, field: str, guard: str) -> ast.AST:
+        self.generic_visit(node)
+        setattr(node, field, _apply(guard, getattr(node, field)))
+        return node
 
 
 def _apply(function: str, *values: ast.expr) -> ast.Call:

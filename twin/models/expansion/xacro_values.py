@@ -103,19 +103,12 @@ def _type(value: Any) -> type:
     raise Refused(f"type() of a {type(value).__name__} is not for model files")
 
 
-def _factorial(n: int) -> int:
-    _limit(n, MAX_FACTORIAL, "for a factorial")
-    return math.factorial(n)
+def _up_to_factorial(function: Callable[..., int], what: str) -> Callable[..., int]:
+    def limited(n: int, *k: int) -> int:
+        _limit(n, MAX_FACTORIAL, what)
+        return function(n, *k)
 
-
-def _comb(n: int, k: int) -> int:
-    _limit(n, MAX_FACTORIAL, "for a number of combinations")
-    return math.comb(n, k)
-
-
-def _perm(n: int, k: int | None = None) -> int:
-    _limit(n, MAX_FACTORIAL, "for a number of permutations")
-    return math.perm(n, k)
+    return limited
 
 
 def _limit(number: int, most: int, what: str) -> None:
@@ -125,7 +118,13 @@ def _limit(number: int, most: int, what: str) -> None:
 
 def guarded_symbols(symbols: dict[str, Any]) -> None:
     """Replace functions in a table of xacro's by ones that take no time and show no insides."""
-    names = {"range": _range, "type": _type, "factorial": _factorial, "comb": _comb, "perm": _perm}
+    names = {
+        "range": _range,
+        "type": _type,
+        "factorial": _up_to_factorial(math.factorial, "for a factorial"),
+        "comb": _up_to_factorial(math.comb, "for a number of combinations"),
+        "perm": _up_to_factorial(math.perm, "for a number of permutations"),
+    }
     for table in (symbols, *(value for value in symbols.values() if isinstance(value, dict))):
         dict.pop(table, "vars", None)
         for name in [name for name in names if dict.__contains__(table, name)]:

@@ -3,19 +3,19 @@
 xacro evaluates Python expressions of the file behind a guard that can be escaped. So only listed forms of
 them are evaluated (`xacro_expressions`), and the process gives up what a model file has no business with
 (`sandbox`).
-It reads a JSON request on stdin and writes a JSON answer on stdout.
+It reads twin's own request on stdin, pickled, and writes its answer on stdout as JSON, since a model file has
+a say in that.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import os
+import pickle
 import re
 import sys
 from collections.abc import Mapping
-from pathlib import Path
+from contextlib import redirect_stderr, redirect_stdout
 from types import TracebackType
 from typing import Any
 from xml.dom.minidom import Document, Element
@@ -28,7 +28,7 @@ from twin.models.expansion.sandbox import Refused, close_the_door, limit_resourc
 from twin.models.expansion.xacro_document import Sources, elements, place
 from twin.models.expansion.xacro_expressions import Expressions
 from twin.models.expansion.xacro_values import checked, guarded_symbols
-from twin.models.urdf.packages import PackagePath, Packages, unknown_package
+from twin.models.urdf.packages import Packages, unknown_package
 from twin.models.urdf.xml_text import MAX_BYTES
 
 MAX_MACROS = 300
@@ -44,33 +44,21 @@ FRAMES = 20_000
 """Of the interpreter; a macro takes up to ten."""
 
 
-class _Silence(io.TextIOBase):
-    """Takes what xacro prints."""
-
-    def write(self, text: str) -> int:
-        return len(text)
-
-
 def main() -> None:
     """Expand the requested file and answer with its text, or with what went wrong and where."""
-    request = json.load(sys.stdin)
+    request = pickle.load(sys.stdin.buffer)
     limit_resources()
-    with contextlib.redirect_stdout(_Silence()), contextlib.redirect_stderr(_Silence()):
-        answer = _answer(request)
+    with (
+        open(os.devnull, "w", encoding="utf-8") as nowhere,
+        redirect_stdout(nowhere),
+        redirect_stderr(nowhere),
+    ):
+        answer = _answer(request)  # xacro prints
     json.dump(answer, sys.stdout)
 
 
 def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
-    path = request["packages"]
-    packages = Packages(
-        PackagePath(
-            starts=tuple(map(Path, path["starts"])),
-            given={name: Path(folder) for name, folder in path["given"].items()},
-            ament_prefixes=tuple(map(Path, path["ament_prefixes"])),
-            search=tuple(map(Path, path["search"])),
-            allowed=tuple(map(Path, path["allowed"])),
-        )
-    )
+    packages = Packages(request["packages"])
     sys.setrecursionlimit(FRAMES)
     _guard(Sources(), Expressions(xacro.NameSpace, xacro.YamlDictWrapper), packages, request["environment"])
     close_the_door(packages)
@@ -79,9 +67,8 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
         # Without xacro's banner: it holds the file's path, and the text is published and part of digests.
         text = '<?xml version="1.0"?>' + document.documentElement.toxml()
         if len(text) > MAX_BYTES:
-            raise Refused(
-                f"the file expands to {len(text)} bytes; at most {MAX_BYTES} are read", code="too-large"
-            )
+            message = f"the file expands to {len(text)} bytes; at most {MAX_BYTES} are read"
+            raise Refused(message, code="too-large")
         return {"urdf": text, **_table(document.documentElement)}
     except RecursionError:
         return _fault("it is nested too deeply; a macro or property may call itself without end")
@@ -110,18 +97,13 @@ def _guard(
 
     def evaluate_extension(text: str, context: Mapping[str, Any]) -> str:
         names = {**substitution._eval_dict, "arg": lambda name: substitution._eval_arg(name, context["arg"])}
-        arguments = {
-            name: substitution.convert_value(value, "auto") for name, value in context["arg"].items()
-        }
+        arguments = {key: substitution.convert_value(value, "auto") for key, value in context["arg"].items()}
         return str(expressions.evaluate(text, {**arguments, **names}))
 
     def find(package: str) -> str:
-        try:
+        if package in packages:
             return str(packages[package])
-        except KeyError:
-            raise Refused(
-                f"$(find {package}): package not found; {unknown_package(package, packages)}"
-            ) from None
+        raise Refused(f"$(find {package}): package not found; {unknown_package(package, packages)}")
 
     def env(name: str) -> str:
         if name in environment:
@@ -201,10 +183,8 @@ def _explain(error: Exception) -> dict[str, Any]:
         message = message[:LONGEST] + "…"
     message += f" (in macro '{macro}')" if macro else ""
     if missing := UNDEFINED_ARGUMENT.search(message):
-        name = missing[1]
-        message += (
-            f"; give --arg {name}:=VALUE, or <xacro:arg name='{name}' default=''/> before its first use"
-        )
+        default = f"<xacro:arg name='{missing[1]}' default=''/> before its first use"
+        message += f"; give --arg {missing[1]}:=VALUE, or {default}"
     if "substitution command [find-pkg-share" in message:
         message += "; $(find-pkg-share …) is of launch files, here write $(find PACKAGE)"
     return _fault(message, file or xacro.filestack[-1], line, refused.code if refused else "xacro")

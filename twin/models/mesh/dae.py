@@ -18,8 +18,8 @@ from lxml import etree
 from twin.geometry import Array
 from twin.models.mesh.allowance import Allowance
 from twin.models.mesh.dae_geometry import GeometryReader, Part
-from twin.models.mesh.mesh_formats import MOST_FACES, Faces, too_many
-from twin.models.urdf.document import Element
+from twin.models.mesh.mesh_formats import MOST_FACES, Faces, Rgb, TriangleMesh, too_many
+from twin.models.urdf.document import Element, safe_parser
 
 MOST_TAGS = 300_000
 """Start and end tags, comments and the like; as many attributes."""
@@ -31,27 +31,10 @@ UP_AXES = {
 """Rotations to z up, by the specification's table of right, up and inward axes."""
 _INSTANCES = ("instance_geometry", "instance_controller", "instance_node")
 
-Rgb = tuple[float, float, float]
 NO_COLOUR = (math.nan, math.nan, math.nan)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Collada:
-    """The triangles of a COLLADA file."""
-
-    points: Array
-    """Shape (n, 3) [m]."""
-    faces: Faces
-    """Shape (m, 3)."""
-    colour: Rgb | None
-    """The diffuse colour of most of the triangles."""
-    face_colours: Array | None
-    """The diffuse colour of each triangle, shape (m, 3), not a number where it has none."""
-    up_axis: str
-    """`X_UP`, `Y_UP` or `Z_UP`."""
-
-
-def read_dae(data: bytes, *, apply_up_axis: bool) -> Collada:
+def read_dae(data: bytes, *, apply_up_axis: bool) -> TriangleMesh:
     """Return what a COLLADA file shows.
 
     `<unit meter>` and the nodes' transforms are applied, and `<up_axis>` if it is there and wanted. RViz,
@@ -94,9 +77,10 @@ def read_dae(data: bytes, *, apply_up_axis: bool) -> Collada:
     for shade, size in zip(shades, sizes, strict=True):
         if shade is not None:
             known[shade] += size
-    return Collada(
+    return TriangleMesh(
         points=points,
         faces=faces,
+        format="dae",
         colour=known.most_common(1)[0][0] if known else None,
         face_colours=np.repeat([shade or NO_COLOUR for shade in shades], sizes, axis=0) if known else None,
         up_axis=up_axis,
@@ -108,16 +92,8 @@ def _parse(data: bytes) -> Element:
     for sign, noun in ((b"<", "tags"), (b"=", "attributes")):
         if data.count(sign) > MOST_TAGS:
             raise ValueError(f"has more than {MOST_TAGS} {noun}")
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        remove_comments=True,
-        huge_tree=True,
-    )
     try:
-        root = etree.fromstring(data, parser)
+        root = etree.fromstring(data, safe_parser(huge_tree=True))
     except etree.XMLSyntaxError as error:
         raise ValueError(f"is not well-formed XML: {error.msg}") from None
     if etree.QName(root).localname != "COLLADA":
@@ -127,10 +103,8 @@ def _parse(data: bytes) -> Element:
 
 def _refuse_doctype(data: bytes) -> None:
     """Entities could read files and exhaust memory. A DOCTYPE stands before the root element."""
-    found: list[str] = []
 
-    def stop(name: str, *_: object) -> None:
-        found.append(name)
+    def stop(*_: object) -> None:
         raise StopIteration
 
     def refuse(*_: object) -> None:
@@ -187,7 +161,7 @@ class _Scene:
             raise ValueError("has no scene")
         showing = _showing(root)
         top = _target(scene, "url", self._by_id)
-        pending = [(node, np.eye(4)) for node in reversed(_children(top, "node"))]
+        pending = [(node, np.eye(4)) for node in reversed(top) if _tag(node) == "node"]
         while pending:
             element, T_scene_parent = pending.pop()
             if element not in showing:
@@ -248,10 +222,6 @@ def _showing(root: Element) -> set[Element]:
 
 def _tag(element: Element) -> str:
     return etree.QName(element).localname if isinstance(element.tag, str) else ""
-
-
-def _children(element: Element, tag: str) -> list[Element]:
-    return [child for child in element if _tag(child) == tag]
 
 
 def _transform(node: Element, allowance: Allowance) -> Array:

@@ -48,9 +48,8 @@ class GeometryReader:
 
     def _read(self, geometry: Element) -> Iterator[Part]:
         for primitive in geometry.iterfind("{*}mesh/*"):
-            read = (
-                _PRIMITIVES.get(etree.QName(primitive).localname) if isinstance(primitive.tag, str) else None
-            )
+            tag = etree.QName(primitive).localname if isinstance(primitive.tag, str) else ""
+            read = _PRIMITIVES.get(tag)
             if read is None:
                 continue
             self._allowance.take_piece()
@@ -61,9 +60,8 @@ class GeometryReader:
             if not 0 <= faces.min() <= faces.max() < len(points):
                 raise ValueError(f"has triangles between points 0 to {faces.max()}, of {len(points)}")
             used, faces = np.unique(faces, return_inverse=True)
-            yield Part(
-                points=points[used], faces=faces.reshape(-1, 3), material=primitive.get("material", "")
-            )
+            material = primitive.get("material", "")
+            yield Part(points=points[used], faces=faces.reshape(-1, 3), material=material)
 
     def _inputs(self, primitive: Element) -> tuple[int, int, Array]:
         """Return where in a tuple of indices the point's stands, how long the tuple is, and the points."""
@@ -81,10 +79,7 @@ class GeometryReader:
 
     def _vertices(self, vertices: Element) -> Array:
         if vertices not in self._positions:
-            position = next(
-                (entry for entry in vertices.iterfind("{*}input") if entry.get("semantic") == "POSITION"),
-                None,
-            )
+            position = vertices.find("{*}input[@semantic='POSITION']")
             if position is None:
                 raise ValueError("has vertices without an input POSITION")
             source = _referred(position, self._by_id)
@@ -126,11 +121,8 @@ def _indices(element: Element | None, offset: int, stride: int, allowance: Allow
 
 def _loops(primitive: Element, offset: int, stride: int, allowance: Allowance) -> tuple[Faces, Faces]:
     """Return the corners of all `<p>` one after the other, and how many each has."""
-    loops = [
-        np.zeros(0, np.int64),
-        *(_indices(loop, offset, stride, allowance) for loop in primitive.iter("{*}p")),
-    ]
-    return np.concatenate(loops), np.array([len(loop) for loop in loops])
+    loops = [_indices(loop, offset, stride, allowance) for loop in primitive.iter("{*}p")]
+    return np.concatenate([np.zeros(0, np.int64), *loops]), np.array(list(map(len, loops)), dtype=np.int64)
 
 
 def _runs(counts: Faces) -> tuple[Faces, Faces]:

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from twin.geometry import Array
-from twin.models.mesh.meshes import TriangleMesh, is_flat, read_mesh, scaled_points
+from twin.models.mesh.mesh_formats import TriangleMesh
+from twin.models.mesh.meshes import is_flat, read_mesh, scaled_points
 from twin.models.shapes import Mesh
 
 SOME_POINTS, MANY_POINTS = 5_000, 20_000
@@ -61,9 +62,8 @@ def _hull_of(mesh: Mesh, _content: TriangleMesh) -> Hull | None:
     sums = corners.sum(axis=1)
     centroid = volumes @ sums / (4.0 * volume)
     # Of a tetrahedron with one corner at zero: ∫ x xᵀ = V/20 (Σ aᵢ aᵢᵀ + s sᵀ), s the sum of its corners.
-    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + np.einsum(
-        "t,ti,tj->ij", volumes, sums, sums
-    )
+    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners)
+    second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
     covariance = second / (20.0 * volume) - np.outer(centroid, centroid)
     return Hull(
         points=points[hull.vertices],
@@ -82,8 +82,6 @@ def _outermost(points: Array) -> Array:
     spread = np.stack((across * np.cos(turn), across * np.sin(turn), z), axis=1)
     directions = np.concatenate((np.eye(3), -np.eye(3), spread))
     transposed = np.ascontiguousarray(points.T)
-    parts = np.array_split(
-        directions, max(50, len(points) // 8000)
-    )  # some at a time, as all take much memory
+    parts = np.array_split(directions, max(50, len(points) // 8000))  # all at once take much memory
     chosen = np.concatenate([np.argmax(part @ transposed, axis=1) for part in parts])
     return points[np.unique(chosen)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from array import array
+from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Literal
 
@@ -17,6 +18,7 @@ from twin.geometry import Array
 
 Format = Literal["stl", "ascii-stl", "obj", "dae", "msh"]
 Faces = NDArray[np.int64]
+Rgb = tuple[float, float, float]
 
 READABLE = "STL, OBJ and COLLADA (.dae)"
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -39,6 +41,25 @@ _VERTEX = re.compile(rb"^[ \t\r\f\v]*+vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", re.IG
 _ENDFACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 _OBJ_POINT = re.compile(rb"^[ \t\r\f\v]*+v\s", re.MULTILINE)
 _OBJ_LINE = re.compile(rb"^[ \t\f\v]*+([vf])(?!\S)([^\n]*)", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TriangleMesh:
+    """The surface in a mesh file."""
+
+    points: Array
+    """Shape (n, 3), in the file's axes [m, before the robot file's scale]; each is a corner of a triangle."""
+    faces: Faces
+    """Shape (m, 3), counter-clockwise seen from outside."""
+    format: Format
+    is_verbatim: bool = True
+    """The file has no other points; MuJoCo would take them into the convex hull."""
+    colour: Rgb | None = None
+    """Of most of the triangles; only COLLADA files tell."""
+    face_colours: Array | None = None
+    """Of each triangle, shape (m, 3), not a number where it has none; only COLLADA files tell."""
+    up_axis: str = "Z_UP"
+    """What the file calls up; other axes are those of COLLADA files only."""
 
 
 def format_of(data: bytes, suffix: str) -> Format:
@@ -151,12 +172,7 @@ def read_obj(data: bytes) -> tuple[Array, Faces]:
             line = data.count(b"\n", 0, match.start()) + 1
             shown = match[0][: 4 * _SHOWN].decode(errors="replace").strip()[:_SHOWN]
             raise ValueError(f"has a broken line {line}: '{shown}'") from None
-        if (
-            len(points) > 3 * MOST_POINTS
-            or len(faces) > 3 * MOST_FACES
-            or polygons > MOST_FACES
-            or largest > MOST_FACES
-        ):
+        if len(points) > 3 * MOST_POINTS or max(len(faces) // 3, polygons, largest) > MOST_FACES:
             raise too_many()
     return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,19 +11,20 @@ import numpy as np
 from twin.errors import ModelError, Problem
 from twin.files.reading import read_bytes
 from twin.geometry import Array
-from twin.models.description import Link, RobotDescription
-from twin.models.mesh.dae import Rgb, read_dae
+from twin.models.description import RobotDescription
+from twin.models.mesh.dae import read_dae
 from twin.models.mesh.mesh_formats import (
     MOST_FACES,
     Faces,
     Format,
+    TriangleMesh,
     format_of,
     read_ascii_stl,
     read_msh,
     read_obj,
     read_stl,
 )
-from twin.models.shapes import Collision, Mesh, Visual
+from twin.models.shapes import Collision, Mesh
 from twin.models.urdf.xml_text import as_utf8
 
 MOST_BYTES = 48 * 1024 * 1024
@@ -38,25 +39,6 @@ _MIX = 0x9E3779B97F4A7C15
 """2^64 over the golden ratio: multiples of it spread well."""
 FLAT = 1e-6
 """Thickness, relative to its size, up to which a mesh has no volume."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TriangleMesh:
-    """The surface in a mesh file."""
-
-    points: Array
-    """Shape (n, 3), in the file's axes [m, before the robot file's scale]; each is a corner of a triangle."""
-    faces: Faces
-    """Shape (m, 3), counter-clockwise seen from outside."""
-    format: Format
-    is_verbatim: bool = True
-    """The file has no other points; MuJoCo would take them into the convex hull."""
-    colour: Rgb | None = None
-    """Of most of the triangles; only COLLADA files tell."""
-    face_colours: Array | None = None
-    """Of each triangle, shape (m, 3), not a number where it has none; only COLLADA files tell."""
-    up_axis: str = "Z_UP"
-    """What the file calls up; other axes are those of COLLADA files only."""
 
 
 def read_mesh(path: Path, *, apply_up_axis: bool = True) -> TriangleMesh:
@@ -123,8 +105,7 @@ def _read_now(path: Path, apply_up_axis: bool) -> TriangleMesh:
 
 def _parse(data: bytes, kind: Format, apply_up_axis: bool) -> TriangleMesh:
     if kind == "dae":
-        collada = read_dae(data, apply_up_axis=apply_up_axis)
-        return TriangleMesh(format=kind, **vars(collada))
+        return read_dae(data, apply_up_axis=apply_up_axis)
     readers = {"stl": read_stl, "ascii-stl": read_ascii_stl, "obj": read_obj, "msh": read_msh}
     points, faces = readers[kind](data)
     return TriangleMesh(points=points, faces=faces, format=kind)
@@ -173,34 +154,25 @@ def mesh_faults(description: RobotDescription, *, visuals: bool = True) -> tuple
         visuals: Also look at the meshes that are seen only.
     """
     faults: dict[Problem, None] = {}
-    for link in description.links.values():
-        shapes: tuple[Visual | Collision, ...] = (*(link.visuals if visuals else ()), *link.collisions)
-        for shape in shapes:
-            if isinstance(shape.geometry, Mesh):
-                fault = _fault_of(shape, shape.geometry, link, description)
-                if fault is not None:
-                    faults[fault] = None
+    for name, link in description.links.items():
+        for shape in link.shapes if visuals else link.collisions:
+            mesh = shape.geometry
+            if isinstance(mesh, Mesh) and (fault := _fault_of(mesh, isinstance(shape, Collision))):
+                message = f"mesh '{mesh.path.name}' of link '{name}' {fault[0]}"
+                line, element = shape.line or None, f"link '{name}'"
+                faults[Problem(message, description.source, line, code=fault[1], element=element)] = None
     return tuple(faults)
 
 
-def _fault_of(
-    shape: Visual | Collision, mesh: Mesh, link: Link, description: RobotDescription
-) -> Problem | None:
+def _fault_of(mesh: Mesh, touched: bool) -> tuple[str, str] | None:
+    """Return what is wrong with a mesh, and its code."""
     try:
         points = scaled_points(mesh)
     except ModelError as error:
-        message, code = error.problems[0].message, error.problems[0].code
-    else:
-        if not isinstance(shape, Collision) or not is_flat(points):
-            return None
-        message, code = "is flat, and a thing to touch needs a volume; use a thin <box>", "bad-mesh"
-    return Problem(
-        f"mesh '{mesh.path.name}' of link '{link.name}' {message}",
-        description.source,
-        shape.line or None,
-        code=code,
-        element=f"link '{link.name}'",
-    )
+        return error.problems[0].message, error.problems[0].code
+    if touched and is_flat(points):
+        return "is flat, and a thing to touch needs a volume; use a thin <box>", "bad-mesh"
+    return None
 
 
 def scaled_points(mesh: Mesh) -> Array:

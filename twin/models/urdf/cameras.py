@@ -14,11 +14,8 @@ from twin.models.urdf.sensors import kind_of, read_common, read_pose, sensor_ele
 CAMERA = ("camera", "depth", "depth_camera", "rgbd", "rgbd_camera", "multicamera")
 """Types whose image a pinhole camera makes."""
 FRAME_TAGS = (
-    "camera/optical_frame_id",
-    "gz_frame_id",
-    "ignition_frame_id",
-    "plugin/frame_name",
-    "plugin/frameName",
+    *("camera/optical_frame_id", "gz_frame_id", "ignition_frame_id"),
+    *("plugin/frame_name", "plugin/frameName"),
 )
 DEFAULTS: Mapping[str, float] = {
     "horizontal_fov": 1.047,
@@ -51,15 +48,15 @@ def read_cameras(
             names = [*taken, *(other.name for other in cameras)]
             common["name"] = unique_name(name or common["name"], link, names)
             common["T_link_sensor"] = common["T_link_sensor"] @ read_pose(camera)
-            value = {path: _number(camera, path) for path in DEFAULTS}
+            fov, width, height, near, far, noise = (_number(camera, path) for path in DEFAULTS)
             spec = CameraSpec(
                 **common,
-                horizontal_fov=value["horizontal_fov"],
-                width=int(value["image/width"]),
-                height=int(value["image/height"]),
-                near=value["clip/near"],
-                far=value["clip/far"],
-                noise_stddev=value["noise/stddev"],
+                horizontal_fov=fov,
+                width=int(width),
+                height=int(height),
+                near=near,
+                far=far,
+                noise_stddev=noise,
                 optical_frame=text_of(element, *FRAME_TAGS),
             )
             cameras.append(spec)

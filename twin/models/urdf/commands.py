@@ -7,6 +7,7 @@ from typing import get_args
 
 from twin.errors import nearest
 from twin.models.description import Joint
+from twin.models.kinematics import ONE_DOF
 from twin.models.specs import CommandSpec, Interface
 from twin.models.urdf.document import Element, Report
 from twin.models.urdf.gazebo import number_in
@@ -24,31 +25,19 @@ def read_commands(root: Element, joints: Mapping[str, Joint], report: Report) ->
             continue
         kind = interface.get("name", "")
         if kind not in INTERFACES:
-            report.add(
-                interface,
-                f"command interface '{kind}' of joint '{name}': {nearest(kind, INTERFACES)}",
-                code="bad-command",
-            )
+            message = f"command interface '{kind}' of joint '{name}': {nearest(kind, INTERFACES)}"
+            report.add(interface, message, code="bad-command")
             continue
+        fault = ""
         if name not in joints:
-            report.add(
-                element,
-                f"<ros2_control> commands joint '{name}', which does not exist; {nearest(name, joints)}",
-                code="bad-command",
-            )
-            continue
-        if joints[name].mimic is not None:
-            report.add(
-                element,
-                f"<ros2_control> commands joint '{name}', which mimics another; command its leader",
-                code="bad-command",
-            )
-        elif joints[name].type not in ("revolute", "continuous", "prismatic"):
-            report.add(
-                element,
-                f"<ros2_control> commands joint '{name}', which is {joints[name].type}",
-                code="bad-command",
-            )
+            fault = f"does not exist; {nearest(name, joints)}"
+        elif joints[name].mimic is not None:
+            fault = "mimics another; command its leader"
+        elif joints[name].type not in ONE_DOF:
+            fault = f"is {joints[name].type}"
+        if fault:
+            message = f"<ros2_control> commands joint '{name}', which {fault}"
+            report.add(element, message, code="bad-command")
         lower, upper = (_param(interface, bound) for bound in ("min", "max"))
         spec = CommandSpec(joint=name, interface=kind, lower=lower, upper=upper, line=report.line(element))
         commands.setdefault(name, spec)
@@ -67,7 +56,7 @@ def read_states(root: Element, joints: Mapping[str, Joint]) -> dict[str, tuple[I
     states: dict[str, tuple[Interface, ...]] = {}
     for element in root.iterfind("ros2_control/joint"):
         joint = joints.get(element.get("name", ""))
-        if joint is None or joint.type not in ("revolute", "continuous", "prismatic"):
+        if joint is None or joint.type not in ONE_DOF:
             continue
         names = [interface.get("name") for interface in element.findall("state_interface")]
         known = tuple(name for name in get_args(Interface) if name in names)

@@ -83,41 +83,28 @@ class Report:
     ) -> tuple[float, ...]:
         """Return `count` finite numbers; a wrong attribute is noted and becomes the default or zeros."""
         fallback = default if default is not None else (0.0,) * count
-        text = element.get(name)
+        text, needed = element.get(name), "a number" if count == 1 else f"{count} numbers"
         if text is None:
             if default is None:
-                self.add(
-                    element,
-                    f"{describe(element)} has no {name}=; {_count(count)} needed",
-                    code="missing-attribute",
-                )
+                message = f"{describe(element)} has no {name}=; {needed} needed"
+                self.add(element, message, code="missing-attribute")
             return fallback
+        most = FARTHEST if (element.tag, name) == ("origin", "xyz") else LARGEST
         try:
             values = plain_numbers(text)
         except ValueError:
-            self.add(
-                element, f"{describe(element)}: {name}='{text}' is not {_count(count)}", code="bad-number"
-            )
-            return fallback
-        if len(values) != count:
-            self.add(
-                element,
-                f"{describe(element)}: {name}='{text}' has {len(values)} numbers, not {count}",
-                code="bad-number",
-            )
-            return fallback
-        if not all(map(math.isfinite, values)):
-            self.add(element, f"{describe(element)}: {name}='{text}' is not finite", code="bad-number")
-            return fallback
-        most = FARTHEST if (element.tag, name) == ("origin", "xyz") else LARGEST
-        if max(map(abs, values)) > most and element.tag != "limit":
-            self.add(
-                element,
-                f"{describe(element)}: {name}='{text}' is out of range; at most {most:g}",
-                code="bad-number",
-            )
-            return fallback
-        return values
+            fault = f"is not {needed}"
+        else:
+            if len(values) != count:
+                fault = f"has {len(values)} numbers, not {count}"
+            elif not all(map(math.isfinite, values)):
+                fault = "is not finite"
+            elif max(map(abs, values)) > most and element.tag != "limit":
+                fault = f"is out of range; at most {most:g}"
+            else:
+                return values
+        self.add(element, f"{describe(element)}: {name}='{text}' {fault}", code="bad-number")
+        return fallback
 
     def number(self, element: Element, name: str, default: float | None = None) -> float:
         """Return one finite number of an attribute."""
@@ -158,43 +145,41 @@ def parse(text: bytes, report: Report) -> Element:
         ModelError: Not well-formed, too large, too deep, or with a DOCTYPE.
     """
     lines = scan(text, report.source, has_lines=report.table is None)
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
     try:
-        root = etree.fromstring(text, parser)
+        root = etree.fromstring(text, safe_parser(remove_pis=True))
     except etree.XMLSyntaxError as error:
         line = error.lineno if report.table is None else None
         message = " ".join(error.msg.split()).partition(", line ")[0]
         if "prefix" in message:
             message += "; declare it in the outermost element: xmlns:PREFIX='...'"
-        raise ModelError(
-            Problem(f"not well-formed XML: {message}", report.source, line, code="bad-xml")
-        ) from None
+        problem = Problem(f"not well-formed XML: {message}", report.source, line, code="bad-xml")
+        raise ModelError(problem) from None
     _drop_default_namespace(root)
     report.locate(root, lines)
     _check_names(root, report)
     _refuse_unexpanded(root, report)
     if root.tag != "robot":
-        report.add(
-            root, f"the root element is <{root.tag}>; a URDF file has <robot name='...'>", code="not-urdf"
-        )
+        message = f"the root element is <{root.tag}>; a URDF file has <robot name='...'>"
+        report.add(root, message, code="not-urdf")
         report.raise_if_any()
     return root
 
 
+def safe_parser(**more: bool) -> etree.XMLParser:
+    """Return a parser of UTF-8 that leaves out comments and opens nothing; `more` are options of lxml's."""
+    return etree.XMLParser(
+        encoding="utf-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=True,
+        **more,
+    )
+
+
 def first(element: Element, *names: str) -> Element | None:
     """Return the first child found under one of these names or paths, tried in order."""
-    for name in names:
-        child = element.find(name)
-        if child is not None:
-            return child
-    return None
+    return next((child for name in names if (child := element.find(name)) is not None), None)
 
 
 def text_of(element: Element, *names: str) -> str | None:
@@ -241,20 +226,16 @@ def _drop_default_namespace(root: Element) -> None:
 
 def _check_names(root: Element, report: Report) -> None:
     """Note links and joints whose names have spaces at their ends or what is not seen, and mend them."""
+    fault = "has spaces at its ends or line breaks, or characters that are not seen; remove them"
     for element in root.iter():
         for attribute in NAMES:
-            name = element.get(attribute)
-            plain = None if name is None else " ".join(part for part in _BREAKS.split(name) if part).strip()
+            name = element.get(attribute, "")
+            plain = " ".join(filter(None, _BREAKS.split(name))).strip()
             if plain == name:
                 continue
             element.set(attribute, plain)
             if plain and element.tag in NAMED:
-                report.add(
-                    element,
-                    f"{describe(element)}: {attribute}= has spaces at its ends or line breaks, "
-                    "or characters that are not seen; remove them",
-                    code="bad-name",
-                )
+                report.add(element, f"{describe(element)}: {attribute}= {fault}", code="bad-name")
 
 
 def _refuse_unexpanded(root: Element, report: Report) -> None:
@@ -270,7 +251,3 @@ def _refuse_unexpanded(root: Element, report: Report) -> None:
         first, more = found[0], f" (and {len(found) - 1} more)" if len(found) > 1 else ""
         what = f"<{first.prefix}:{etree.QName(first).localname}>" if first.prefix else describe(first)
         report.add(first, f"{what}{more} is left as xacro found it; {declare}", code="xacro")
-
-
-def _count(count: int) -> str:
-    return "a number" if count == 1 else f"{count} numbers"

@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any, TypeVar
 
 from twin.models.description import Joint, Spring, Surface
+from twin.models.kinematics import ONE_DOF
 from twin.models.urdf.document import LARGEST, Element, Report, first
 from twin.models.urdf.plain_numbers import plain_number
 
 MU1 = ("mu1", "collision/surface/friction/ode/mu")
 MU2 = ("mu2", "collision/surface/friction/ode/mu2")
 SELF_COLLIDE = ("selfCollide", "self_collide")
+_Said = TypeVar("_Said", Surface, Spring)
 NUMBERS = (*MU1, *MU2, "springStiffness", "springReference")
 """Tags whose number has an effect."""
 
@@ -54,27 +57,17 @@ def read_surfaces(root: Element, report: Report) -> dict[str, Surface]:
     """Return the contact parameters of links, from `<gazebo reference='link'>`; the last value holds."""
     surfaces: dict[str, Surface] = {}
     for link, element in extensions_of(root):
-        known = surfaces.get(link, Surface())
         friction = number_in(first(element, *MU1))
         if friction is not None and friction < 0.0:
-            report.add(
-                element,
-                f"mu1 of link '{link}' is {friction:g}; friction is not negative",
-                code="bad-friction",
-            )
+            message = f"mu1 of link '{link}' is {friction:g}; friction is not negative"
+            report.add(element, message, code="bad-friction")
             friction = None
-        friction2 = number_in(first(element, *MU2))
-        gravity = _gravity(element)
-        self_collide = flag_in(first(element, *SELF_COLLIDE))
-        found = replace(
-            known,
-            friction=known.friction if friction is None else friction,
-            friction2=known.friction2 if friction2 is None else friction2,
-            gravity=known.gravity if gravity is None else gravity,
-            self_collide=known.self_collide if self_collide is None else self_collide,
+        surfaces[link] = _replaced(
+            surfaces.get(link, Surface()),
+            friction=friction,
+            gravity=_gravity(element),
+            self_collide=flag_in(first(element, *SELF_COLLIDE)),
         )
-        if found != known:
-            surfaces[link] = replace(found, line=report.line(element))
     return surfaces
 
 
@@ -83,17 +76,19 @@ def read_springs(root: Element, joints: Mapping[str, Joint]) -> dict[str, Spring
     springs: dict[str, Spring] = {}
     for name, element in extensions_of(root):
         joint = joints.get(name)
-        if joint is None or joint.type not in ("revolute", "continuous", "prismatic"):
+        if joint is None or joint.type not in ONE_DOF:
             continue
-        known = springs.get(name, Spring(stiffness=0.0))
-        stiffness, reference = (
-            number_in(element.find(tag)) for tag in ("springStiffness", "springReference")
-        )
-        springs[name] = Spring(
-            stiffness=known.stiffness if stiffness is None else stiffness,
-            reference=known.reference if reference is None else reference,
+        springs[name] = _replaced(
+            springs.get(name, Spring(stiffness=0.0)),
+            stiffness=number_in(element.find("springStiffness")),
+            reference=number_in(element.find("springReference")),
         )
     return {name: spring for name, spring in springs.items() if spring.stiffness > 0.0}
+
+
+def _replaced(known: _Said, **values: Any) -> _Said:
+    """Return `known` with those values that are not None."""
+    return replace(known, **{name: value for name, value in values.items() if value is not None})
 
 
 def read_static(root: Element) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import get_args
+from typing import TypeVar, get_args
 
 from twin.errors import nearest, shortened
 from twin.models.description import Joint, JointType, Limit, Link, Mimic
@@ -13,6 +13,7 @@ from twin.models.kinematics import ONE_DOF
 from twin.models.urdf.document import Element, Report, describe
 from twin.models.urdf.links import read_origin
 
+_Item = TypeVar("_Item", Link, Joint)
 JOINT_TYPES: tuple[str, ...] = get_args(JointType)
 BOUNDED = ("revolute", "prismatic")
 SHOWN = 20
@@ -24,9 +25,8 @@ def read_joint(element: Element, report: Report) -> Joint:
     name = report.required(element, "name")
     kind = element.get("type", "")
     if kind not in JOINT_TYPES:
-        report.add(
-            element, f"joint '{name}' has type '{kind}'; {nearest(kind, JOINT_TYPES)}", code="joint-type"
-        )
+        message = f"joint '{name}' has type '{kind}'; {nearest(kind, JOINT_TYPES)}"
+        report.add(element, message, code="joint-type")
         kind = "fixed"
     dynamics = element.find("dynamics")
     return Joint(
@@ -61,11 +61,8 @@ def _read_axis(element: Element, kind: str, report: Report) -> tuple[float, floa
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
         if kind not in ("fixed", "floating") and len(report.problems) == known:
-            report.add(
-                axis,
-                f"{describe(element)} has a zero axis; give a direction such as xyz='0 0 1'",
-                code="zero-axis",
-            )
+            message = f"{describe(element)} has a zero axis; give a direction such as xyz='0 0 1'"
+            report.add(axis, message, code="zero-axis")
         return (1.0, 0.0, 0.0)
     return (x / length, y / length, z / length)
 
@@ -80,18 +77,14 @@ def _read_limit(element: Element, kind: str, report: Report) -> Limit:
     effort, velocity = report.optional_number(limit, "effort"), report.optional_number(limit, "velocity")
     for what, value in (("effort", effort), ("velocity", velocity)):
         if value is not None and value < 0.0:
-            report.add(
-                limit, f"{describe(element)}: {what} limit {value:g} is negative", code="negative-limit"
-            )
+            message = f"{describe(element)}: {what} limit {value:g} is negative"
+            report.add(limit, message, code="negative-limit")
     if kind not in BOUNDED:
         return Limit(effort=effort, velocity=velocity)
     lower, upper = report.number(limit, "lower", 0.0), report.number(limit, "upper", 0.0)
     if lower > upper:
-        report.add(
-            limit,
-            f"{describe(element)}: lower limit {lower:g} is above the upper limit {upper:g}",
-            code="swapped-limits",
-        )
+        message = f"{describe(element)}: lower limit {lower:g} is above the upper limit {upper:g}"
+        report.add(limit, message, code="swapped-limits")
         lower, upper = upper, lower
     return Limit(lower=lower, upper=upper, effort=effort, velocity=velocity)
 
@@ -114,24 +107,18 @@ def _read_mimic(element: Element, report: Report) -> Mimic | None:
     )
 
 
-def unique(
-    kind: str, items: Iterable[tuple[Element, Link | Joint]], report: Report
-) -> dict[str, Link | Joint]:
+def unique(kind: str, items: Iterable[tuple[Element, _Item]], report: Report) -> dict[str, _Item]:
     """Return the items by name in file order, noting names used twice."""
-    found: dict[str, Link | Joint] = {}
+    found: dict[str, _Item] = {}
     for element, item in items:
         if not item.name:
             continue
         if item.name in found:
             earlier = found[item.name].line
             where = f" (first at line {earlier})" if earlier else ""
-            report.add(
-                element,
-                f"{kind} '{item.name}' is defined twice{where}; names are unique",
-                code="duplicate-name",
-            )
-            continue
-        found[item.name] = item
+            message = f"{kind} '{item.name}' is defined twice{where}; names are unique"
+            report.add(element, message, code="duplicate-name")
+        found.setdefault(item.name, item)
     return found
 
 
@@ -154,11 +141,8 @@ def check_tree(
     elif not roots:
         _add_cycle(next(iter(links)), parent_joint, elements, report)
     elif len(roots) > 1:
-        report.add(
-            None,
-            f"the robot has {len(roots)} root links ({shortened(roots)}); connect all but one by joints",
-            code="several-roots",
-        )
+        message = f"the robot has {len(roots)} root links ({shortened(roots)}); connect all but one by joints"
+        report.add(None, message, code="several-roots")
     else:
         _check_reachable(links, parent_joint, elements, report)
     return roots[0] if roots else ""
@@ -176,13 +160,9 @@ def _parent_joints(
                 missing = f"{role} link '{name}' of joint '{joint.name}' does not exist"
                 report.add(element, f"{missing}; {nearest(name, links)}", code="unknown-link")
         if joint.child in parent_joint:
-            other = parent_joint[joint.child].name
-            both = f"joints '{other}' and '{joint.name}'"
-            report.add(
-                element,
-                f"link '{joint.child}' has two parents: {both}; a robot is a tree",
-                code="two-parents",
-            )
+            both = f"joints '{parent_joint[joint.child].name}' and '{joint.name}'"
+            message = f"link '{joint.child}' has two parents: {both}; a robot is a tree"
+            report.add(element, message, code="two-parents")
         parent_joint.setdefault(joint.child, joint)
     return parent_joint
 
@@ -227,27 +207,21 @@ def without_idle_mimics(
     joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report
 ) -> dict[str, Joint]:
     """Return the joints without those `<mimic>` that cannot have an effect, which are noted as warnings."""
-    return {
-        name: _without_idle_mimic(joint, joints, elements[name], report) for name, joint in joints.items()
-    }
-
-
-def _without_idle_mimic(joint: Joint, joints: Mapping[str, Joint], element: Element, report: Report) -> Joint:
-    if joint.mimic is None:
-        return joint
-    if not joint.mimic.joint:
-        return replace(joint, mimic=None)  # noted before
-    if joint.type not in ONE_DOF:
-        why = f"joint '{joint.name}' is {joint.type} and cannot mimic another; remove <mimic>"
-    elif joint.mimic.joint not in joints:
-        missing = (
-            f"joint '{joint.name}' mimics '{joint.mimic.joint}', which does not exist, and moves on its own"
-        )
-        why = f"{missing}; {nearest(joint.mimic.joint, joints)}"
-    else:
-        return joint
-    report.warn(element.find("mimic"), why, code="idle-mimic")
-    return replace(joint, mimic=None)
+    moving = dict(joints)
+    for name, joint in joints.items():
+        if joint.mimic is None:
+            continue
+        leader = joint.mimic.joint
+        if joint.type in ONE_DOF and leader in joints:
+            continue
+        moving[name] = replace(joint, mimic=None)
+        if leader:  # else it was noted before
+            why = f"joint '{name}' is {joint.type} and cannot mimic another; remove <mimic>"
+            if joint.type in ONE_DOF:
+                alone = f"joint '{name}' mimics '{leader}', which does not exist, and moves on its own"
+                why = f"{alone}; {nearest(leader, joints)}"
+            report.warn(elements[name].find("mimic"), why, code="idle-mimic")
+    return moving
 
 
 def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,17 +14,7 @@ from twin.models.description import Inertial, Link, Surface
 from twin.models.mass_properties import LEAST
 from twin.models.mesh.meshes import read_mesh
 from twin.models.options import ReadOptions
-from twin.models.shapes import (
-    Box,
-    Capsule,
-    Collision,
-    Cylinder,
-    Geometry,
-    Mesh,
-    SkippedMesh,
-    Sphere,
-    Visual,
-)
+from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, SkippedMesh, Sphere, Visual
 from twin.models.urdf.document import Element, Report, describe, owner
 from twin.models.urdf.packages import Packages
 from twin.models.urdf.resources import locate
@@ -64,26 +55,20 @@ def read_link(element: Element, context: LinkContext) -> Link:
     name = report.required(element, "name")
     inertials = element.findall("inertial")
     if len(inertials) > 1:
-        report.add(
-            inertials[1],
-            f"link '{name}' has {len(inertials)} <inertial>; one is allowed",
-            code="bad-inertial",
-        )
+        message = f"link '{name}' has {len(inertials)} <inertial>; one is allowed"
+        report.add(inertials[1], message, code="bad-inertial")
     return Link(
         name=name,
         inertial=_read_inertial(inertials[0], name, report) if inertials else None,
         visuals=tuple(
-            _read_visual(child, found, context) for child, found in _shapes(element, "visual", context)
-        ),
-        collisions=tuple(
-            Collision(
-                T_link_geometry=read_origin(child, report),
-                geometry=found,
-                name=child.get("name", ""),
-                line=report.line(child),
+            Visual(
+                **common,
+                rgba=_read_material(child, context),
+                has_material=child.find("material") is not None,
             )
-            for child, found in _shapes(element, "collision", context)
+            for child, common in _shapes(element, "visual", context)
         ),
+        collisions=tuple(Collision(**common) for _, common in _shapes(element, "collision", context)),
         surface=context.surfaces.get(name, Surface()),
         line=report.line(element),
     )
@@ -95,20 +80,14 @@ def read_origin(element: Element, report: Report) -> Pose3:
     if origin is None:
         return Pose3.from_xyz_rpy()
     zero = (0.0, 0.0, 0.0)
-    return Pose3.from_xyz_rpy(
-        report.numbers(origin, "xyz", 3, zero),
-        report.numbers(origin, "rpy", 3, zero),
-    )
+    return Pose3.from_xyz_rpy(*(report.numbers(origin, name, 3, zero) for name in ("xyz", "rpy")))
 
 
 def _read_inertial(element: Element, link: str, report: Report) -> Inertial | None:
     mass_element, inertia_element = element.find("mass"), element.find("inertia")
     if mass_element is None or inertia_element is None:
-        report.add(
-            element,
-            f"<inertial> of link '{link}' needs <mass value=''/> and <inertia ixx='' .../>",
-            code="bad-inertial",
-        )
+        message = f"<inertial> of link '{link}' needs <mass value=''/> and <inertia ixx='' .../>"
+        report.add(element, message, code="bad-inertial")
         return None
     mass = report.number(mass_element, "value", 1.0 if mass_element.get("value") else None)
     inertia, centre = _read_inertia(inertia_element, report), read_origin(element, report)
@@ -127,23 +106,20 @@ def _read_inertia(element: Element, report: Report) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _shapes(link: Element, role: str, context: LinkContext) -> Iterator[tuple[Element, Geometry]]:
-    """Yield the `<visual>` or `<collision>` elements that are not left out."""
+def _shapes(link: Element, role: str, context: LinkContext) -> Iterator[tuple[Element, dict[str, Any]]]:
+    """Yield the `<visual>` or `<collision>` elements that are not left out, with the values of a `Shape`."""
     for element in link.findall(role):
         geometry = _read_geometry(element, context)
         if geometry is not None:
-            yield element, geometry
-
-
-def _read_visual(element: Element, geometry: Geometry, context: LinkContext) -> Visual:
-    return Visual(
-        T_link_geometry=read_origin(element, context.report),
-        geometry=geometry,
-        rgba=_read_material(element, context),
-        has_material=element.find("material") is not None,
-        name=element.get("name", ""),
-        line=context.report.line(element),
-    )
+            yield (
+                element,
+                {
+                    "T_link_geometry": read_origin(element, context.report),
+                    "geometry": geometry,
+                    "name": element.get("name", ""),
+                    "line": context.report.line(element),
+                },
+            )
 
 
 def _read_material(element: Element, context: LinkContext) -> Rgba:
@@ -158,11 +134,8 @@ def _read_material(element: Element, context: LinkContext) -> Rgba:
         return context.materials[name]
     if material.find("texture") is None:
         valid = nearest(name, context.materials) if context.materials else "the file defines none"
-        context.report.warn(
-            material,
-            f"material '{name}' of {owner(element)} is not defined and shown gray; {valid}",
-            code="undefined-material",
-        )
+        message = f"material '{name}' of {owner(element)} is not defined and shown gray; {valid}"
+        context.report.warn(material, message, code="undefined-material")
     return DEFAULT_RGBA
 
 
@@ -177,48 +150,34 @@ def _read_geometry(element: Element, context: LinkContext) -> Geometry | None:
     placeholder = Sphere(radius=1.0)
     geometry = element.find("geometry")
     if geometry is None or len(geometry) != 1:
-        report.add(
-            element,
-            f"{describe(element)} needs one <geometry> with one shape: {', '.join(GEOMETRIES)}",
-            code="bad-geometry",
-        )
+        message = f"{describe(element)} needs one <geometry> with one shape: {', '.join(GEOMETRIES)}"
+        report.add(element, message, code="bad-geometry")
         return placeholder
     shape = geometry[0]
     if shape.tag == "mesh":
         mesh = _read_mesh(shape, context)
         return placeholder if mesh is None and context.options.missing_mesh == "error" else mesh
     if shape.tag not in GEOMETRIES:
-        report.add(
-            shape,
-            f"unknown geometry <{shape.tag}> in {describe(element)}; {nearest(shape.tag, GEOMETRIES)}",
-            code="bad-geometry",
-        )
+        message = f"unknown geometry <{shape.tag}> in {describe(element)}; {nearest(shape.tag, GEOMETRIES)}"
+        report.add(shape, message, code="bad-geometry")
         return placeholder
     known = len(report.problems)
-    read = _read_primitive(shape, report)
-    if len(report.problems) == known and min(_dimensions(read)) < THINNEST:
+    read, dimensions = _read_primitive(shape, report)
+    if len(report.problems) == known and min(dimensions) < THINNEST:
         report.add(shape, f"{describe(shape)} has a dimension that is not positive", code="bad-geometry")
     return read
 
 
-def _read_primitive(shape: Element, report: Report) -> Box | Cylinder | Sphere | Capsule:
+def _read_primitive(shape: Element, report: Report) -> tuple[Geometry, tuple[float, ...]]:
+    """Return the shape and its dimensions [m]."""
     if shape.tag == "box":
         x, y, z = report.numbers(shape, "size", 3)
-        return Box(size=(x, y, z))
+        return Box(size=(x, y, z)), (x, y, z)
+    radius = report.number(shape, "radius")
     if shape.tag == "sphere":
-        return Sphere(radius=report.number(shape, "radius"))
-    radius, length = report.number(shape, "radius"), report.number(shape, "length")
-    if shape.tag == "cylinder":
-        return Cylinder(radius=radius, length=length)
-    return Capsule(radius=radius, length=length)
-
-
-def _dimensions(geometry: Box | Cylinder | Sphere | Capsule) -> tuple[float, ...]:
-    if isinstance(geometry, Box):
-        return geometry.size
-    if isinstance(geometry, Sphere):
-        return (geometry.radius,)
-    return (geometry.radius, geometry.length)
+        return Sphere(radius=radius), (radius,)
+    kind, length = Cylinder if shape.tag == "cylinder" else Capsule, report.number(shape, "length")
+    return kind(radius=radius, length=length), (radius, length)
 
 
 def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
@@ -234,22 +193,16 @@ def _read_mesh(shape: Element, context: LinkContext) -> Mesh | None:
     reason = found.reason
     if found.path is not None:
         mesh = Mesh(path=found.path, scale=(x, y, z), apply_up_axis=options.apply_up_axis)
-        fault = _mesh_fault(mesh) if options.missing_mesh == "skip" else None
-        if fault is None:
+        try:
+            if options.missing_mesh == "skip":
+                read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
             return mesh
-        reason = fault
+        except ModelError as error:
+            reason = error.problems[0].message
     if options.missing_mesh == "skip":
         _skip(shape, reference, reason, report)
     else:
         report.add(shape, f"mesh '{reference}' of {owner(shape)} {reason}", code=found.code)
-    return None
-
-
-def _mesh_fault(mesh: Mesh) -> str | None:
-    try:
-        read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
-    except ModelError as error:
-        return error.problems[0].message
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,10 +50,8 @@ class PackagePath:
         """
         missing = [name for name, path in options.packages.items() if not path.is_dir()]
         if missing:
-            raise ModelError(
-                Problem(f"package '{name}': no such folder {options.packages[name]}", code="no-package")
-                for name in missing
-            )
+            messages = (f"package '{name}': no such folder {options.packages[name]}" for name in missing)
+            raise ModelError(Problem(message, code="no-package") for message in messages)
         # A link and what it points to may lie in two packages, as in a workspace installed by symbolic links.
         starts = dict.fromkeys((source.absolute().parent, source.resolve().parent))
         return cls(
@@ -83,10 +82,9 @@ class Packages(Mapping[str, Path]):
     def __getitem__(self, name: str) -> Path:
         """Return the folder of a package, which may be read from then on."""
         while name not in self._found:
-            try:
-                found, folder = next(self._rest)
-            except StopIteration:
-                raise KeyError(name) from None
+            found, folder = next(self._rest, ("", None))
+            if folder is None:
+                raise KeyError(name)
             self._found.setdefault(found, folder)
         folder = self._found[name]
         self._roots[os.path.realpath(folder)] = None
@@ -148,13 +146,10 @@ def _names(folder: Path) -> Iterator[tuple[str, Path]]:
     """Yield a package folder under its own name and under that of its folder; nothing for another folder."""
     if not _is_package(folder):
         return
-    try:
-        text = (folder / MANIFEST).read_bytes()
-    except OSError:
-        text = b""
-    name = _NAME.search(_COMMENT.sub(b"", text))
-    if name is not None:
-        yield name[1].decode(errors="replace"), folder
+    with suppress(OSError):
+        name = _NAME.search(_COMMENT.sub(b"", (folder / MANIFEST).read_bytes()))
+        if name is not None:
+            yield name[1].decode(errors="replace"), folder
     yield folder.name, folder
 
 

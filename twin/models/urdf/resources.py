@@ -38,11 +38,9 @@ def locate(reference: str, source: Path, packages: Packages) -> Resource:
         if not path.is_file():
             return Resource(code="missing-mesh", reason="does not exist")
         if not packages.allows(path):
-            folder = path.resolve().parent
-            reason = "is outside of the file's folder and packages"
-            return Resource(
-                code="outside-path", reason=f"{reason}; if you trust it, give --allow-path {folder}"
-            )
+            trust = f"if you trust it, give --allow-path {path.resolve().parent}"
+            reason = f"is outside of the file's folder and packages; {trust}"
+            return Resource(code="outside-path", reason=reason)
         return Resource(path=path)
     except (OSError, ValueError):
         return Resource(code="missing-mesh", reason="is no name of a file")
@@ -57,10 +55,8 @@ def _path(reference: str, source: Path, packages: Mapping[str, Path]) -> Path | 
         name, _, inside = rest.lstrip("/").partition("/")
         folder = packages.get(name)
         if folder is None:
-            return Resource(
-                code="missing-mesh",
-                reason=f"does not exist; no package '{name}'; {unknown_package(name, packages)}",
-            )
+            reason = f"does not exist; no package '{name}'; {unknown_package(name, packages)}"
+            return Resource(code="missing-mesh", reason=reason)
         return folder / inside.lstrip("/")
     if scheme == "file":
         return source.parent / rest.removeprefix("//")

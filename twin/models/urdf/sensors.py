@@ -12,7 +12,7 @@ from twin.models.description import Link
 from twin.models.options import ReadOptions
 from twin.models.sensors import SENSORS
 from twin.models.specs import SensorSpec
-from twin.models.urdf.document import LARGEST, Element, Report, first, text_of
+from twin.models.urdf.document import LARGEST, Element, Report, text_of
 from twin.models.urdf.drives import library_of
 from twin.models.urdf.gazebo import value_of
 from twin.models.urdf.plain_numbers import plain_numbers
@@ -29,6 +29,7 @@ TOPIC_TAGS = (
     "plugin/topic",
     "topicName",
 )
+RATE_TAGS = ("update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate")
 MAX_RATE_HZ = 1e6
 
 
@@ -54,9 +55,8 @@ def read_sensors(
             continue
         sensor = _read_sensor(element, link, report, plugin)
         if any((sensor.name, sensor.link) == (other.name, other.link) for other in sensors):
-            report.add(
-                element, f"sensor '{sensor.name}' is defined twice; names are unique", code="bad-sensor"
-            )
+            message = f"sensor '{sensor.name}' is defined twice; names are unique"
+            report.add(element, message, code="bad-sensor")
         name = unique_name(sensor.name, link, [other.name for other in sensors])
         sensors.append(replace(sensor, name=name))
     return tuple(sensors)
@@ -112,17 +112,10 @@ def _read_sensor(element: Element, link: str, report: Report, plugin: Plugin[Any
 
 def read_common(element: Element, link: str, report: Report, *, topic: str, rate_hz: float) -> Common:
     """Return what all sensors have; a rate of 0, which is every step in Gazebo, becomes the usual one."""
-    rate = report.child_number(
-        element, "update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate"
-    )
-    rate = rate or rate_hz
+    rate = report.child_number(element, *RATE_TAGS) or rate_hz
     if not 0.0 < rate <= MAX_RATE_HZ:
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}' has update rate {rate:g} Hz; "
-            f"it is positive and at most {MAX_RATE_HZ:g}",
-            code="bad-sensor",
-        )
+        valid = f"it is positive and at most {MAX_RATE_HZ:g}"
+        add_fault(report, element, f" has update rate {rate:g} Hz; {valid}")
         rate = 1.0
     given = text_of(element, *TOPIC_TAGS) or topic
     return {
@@ -133,6 +126,11 @@ def read_common(element: Element, link: str, report: Report, *, topic: str, rate
         "T_link_sensor": read_pose(element),
         "line": report.line(element),
     }
+
+
+def add_fault(report: Report, element: Element, fault: str) -> None:
+    """Note what is wrong with a sensor; `fault` goes on after its name."""
+    report.add(element, f"sensor '{element.get('name', '')}'{fault}", code="bad-sensor")
 
 
 def read_pose(element: Element) -> Pose3:
@@ -154,11 +152,7 @@ def deviation(element: Element, report: Report, *paths: str) -> float | None:
     """Return a standard deviation, or None."""
     value = report.child_number(element, *paths)
     if value is not None and value < 0.0:
-        report.add(
-            element,
-            f"sensor '{element.get('name', '')}' has noise of {value:g}; a deviation is not negative",
-            code="bad-sensor",
-        )
+        add_fault(report, element, f" has noise of {value:g}; a deviation is not negative")
     return value
 
 
@@ -166,11 +160,7 @@ def required_number(sensor: Element, parent: Element | None, name: str, report: 
     """Return the number of a child that a sensor cannot do without."""
     value = None if parent is None else report.child_number(parent, name)
     if value is None:
-        if parent is None or first(parent, name) is None:
-            report.add(
-                sensor,
-                f"sensor '{sensor.get('name', '')}' of type {sensor.get('type')} has no <{name}>",
-                code="bad-sensor",
-            )
+        if parent is None or parent.find(name) is None:
+            add_fault(report, sensor, f" of type {sensor.get('type')} has no <{name}>")
         return 1.0
     return value

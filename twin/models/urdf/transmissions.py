@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from twin.models.description import Joint
+from twin.models.kinematics import ONE_DOF
 from twin.models.specs import CommandSpec, Interface
 from twin.models.urdf.document import Element, Report, text_of
 from twin.models.urdf.gazebo import number_in
@@ -30,8 +31,6 @@ class Transmission:
     """One `<transmission>` and what becomes of it."""
 
     element: Element
-    kind: str
-    """Without its package, such as `SimpleTransmission`."""
     joint: str | None
     """The joint that it commands; None if it has no effect."""
     interface: Interface | None
@@ -48,24 +47,25 @@ def transmissions(root: Element, joints: Mapping[str, Joint]) -> Iterator[Transm
         spelled = text_of(element, "type") or element.get("type", "")
         kind = spelled.rpartition("/")[2]
         names = [joint.get("name", "") for joint in element.findall("joint")]
-        interfaces = tuple(
-            (item.text or "").strip().rpartition("/")[2] for item in element.iter("hardwareInterface")
-        )
-        known = [HARDWARE[name] for name in interfaces if name in HARDWARE]
-        interface: Interface | None = known[0] if known else None
+        interfaces = tuple(map(hardware_interface, element.iter("hardwareInterface")))
+        interface = next((HARDWARE[name] for name in interfaces if name in HARDWARE), None)
         if interface is None and not interfaces and PR2 in spelled:
             interface = "effort"
         reduction = number_in(next(element.iter("mechanicalReduction"), None))
         fault = _fault(kind, names, interface, interfaces, joints)
         yield Transmission(
             element=element,
-            kind=kind,
             joint=None if fault else names[0],
             interface=None if fault else interface,
             interfaces=interfaces,
             reduction=1.0 if reduction is None else reduction,
             fault=fault,
         )
+
+
+def hardware_interface(element: Element) -> str:
+    """Return the text of a `<hardwareInterface>`, without its package."""
+    return str((element.text or "").strip().rpartition("/")[2])
 
 
 def read_transmissions(
@@ -96,13 +96,12 @@ def _fault(
     joint = joints.get(names[0])
     if joint is None:
         return f"joint '{names[0]}' does not exist"
-    if joint.type not in ("revolute", "continuous", "prismatic"):
+    if joint.type not in ONE_DOF:
         return f"joint '{names[0]}' is {joint.type}"
     if joint.mimic is not None:
         return f"joint '{names[0]}' follows '{joint.mimic.joint}'"
     if interface is None:
         named = ", ".join(interfaces)
-        return (
-            f"its hardware interface {named} commands nothing" if named else "it has no <hardwareInterface>"
-        )
+        fault = f"its hardware interface {named} commands nothing"
+        return fault if named else "it has no <hardwareInterface>"
     return ""

@@ -44,11 +44,7 @@ def read_utf8(source: Path) -> bytes:
     """
     try:
         if source.stat().st_size > MAX_BYTES:
-            raise _fault(
-                f"the file has {source.stat().st_size} bytes; at most {MAX_BYTES} are read",
-                source,
-                code="too-large",
-            )
+            raise _too_large(source.stat().st_size, source)
         raw = read_bytes(source, MAX_BYTES)
     except OSError as error:
         raise _fault(f"cannot be read: {error.strerror}; give a file", source, code="no-file") from None
@@ -91,9 +87,7 @@ def scan(text: bytes, source: Path, *, has_lines: bool = True) -> list[int]:
             exhaust memory, and no robot needs them.
     """
     if len(text) > MAX_BYTES:
-        raise _fault(
-            f"the file has {len(text)} bytes; at most {MAX_BYTES} are read", source, code="too-large"
-        )
+        raise _too_large(len(text), source)
     if not text.strip():
         raise _fault("the file is empty; a URDF file has <robot name='...'>", source)
     return _Scanner(source, has_lines).scan(text)
@@ -163,6 +157,10 @@ def _encoding(raw: bytes, source: Path) -> tuple[str, bytes]:
         raise _fault(f"encoding '{name}' is unknown; save the file as UTF-8", source, 1)
     # US-ASCII files with a stray character are UTF-8 in practice.
     return ("utf-8" if name in ("utf8", "us-ascii", "ascii") else name), raw
+
+
+def _too_large(size: int, source: Path) -> ModelError:
+    return _fault(f"the file has {size} bytes; at most {MAX_BYTES} are read", source, code="too-large")
 
 
 def _fault(message: str, source: Path, line: int | None = None, *, code: str = "bad-xml") -> ModelError:

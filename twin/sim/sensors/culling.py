@@ -98,7 +98,5 @@ def _boxes(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> tuple[Array, Array
         mujoco.mju_quat2Mat(row, quat)
     turns = rows.reshape(-1, 3, 3)
     centre, half = np.hsplit(model.geom_aabb[geoms], 2)
-    return (
-        model.geom_pos[geoms] + np.einsum("nij,nj->ni", turns, centre),
-        np.einsum("nij,nj->ni", np.abs(turns), half),
-    )
+    placed = model.geom_pos[geoms] + np.einsum("nij,nj->ni", turns, centre)
+    return placed, np.einsum("nij,nj->ni", np.abs(turns), half)
