@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import ModuleType
 
 from twin.errors import NavigationError, Problem, nearest
-from twin.navigation.behavior_trees import (
-    decorators,
-    leaves,
-    nav2_control,
-    parallel,
-    sequences,
-)
+from twin.navigation.behavior_trees import decorators, leaves, nav2_control, parallel, sequences
 from twin.navigation.behavior_trees.blackboard import Blackboard
-from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeContext, TreeNode
+from twin.navigation.behavior_trees.node import DecoratorNode, NodeSetup, Status, TreeContext, TreeNode
 from twin.navigation.behavior_trees.ports import is_pointer, read_value
 from twin.navigation.behavior_trees.xml_file import Element, TreeFile, read_file
 
@@ -28,46 +24,33 @@ _MOST_WAKE_UPS = 1000
 Registry = Mapping[str, type[TreeNode]]
 """Type as the XML writes it -> class."""
 
-_OLD_NAMES = {
+
+def nodes_of(*modules: ModuleType) -> Registry:
+    """Return the types that modules define, by their names; private and abstract ones are bases of others."""
+    return {
+        name: cls
+        for module in modules
+        for name, cls in vars(module).items()
+        if isinstance(cls, type) and issubclass(cls, TreeNode) and cls.__module__ == module.__name__
+        if not name.startswith("_") and not inspect.isabstract(cls)
+    }
+
+
+BASIC_NODES: Registry = {
+    **nodes_of(sequences, parallel, decorators, leaves, nav2_control),
     "SequenceStar": sequences.SequenceWithMemory,
     "RetryUntilSuccesful": decorators.RetryUntilSuccessful,
 }
-BASIC_NODES: Registry = {
-    cls.__name__: cls
-    for cls in (
-        sequences.Sequence,
-        sequences.SequenceWithMemory,
-        sequences.ReactiveSequence,
-        sequences.Fallback,
-        sequences.ReactiveFallback,
-        sequences.IfThenElse,
-        sequences.WhileDoElse,
-        parallel.Parallel,
-        parallel.ParallelAll,
-        decorators.Inverter,
-        decorators.ForceSuccess,
-        decorators.ForceFailure,
-        decorators.KeepRunningUntilFailure,
-        decorators.Repeat,
-        decorators.RetryUntilSuccessful,
-        decorators.RunOnce,
-        decorators.Delay,
-        decorators.Timeout,
-        leaves.AlwaysSuccess,
-        leaves.AlwaysFailure,
-        leaves.SetBlackboard,
-        leaves.UnsetBlackboard,
-        leaves.Sleep,
-        nav2_control.PipelineSequence,
-        nav2_control.RecoveryNode,
-        nav2_control.RoundRobin,
-        nav2_control.NonblockingSequence,
-        nav2_control.PersistentSequence,
-        nav2_control.RateController,
-        nav2_control.SingleTrigger,
-    )
-} | _OLD_NAMES
-"""Those that need nothing but a clock."""
+"""Those that need nothing but a clock, by their present and old names."""
+
+
+class _SubTree(DecoratorNode):
+    """The root of a tree inside of another one."""
+
+    def tick(self) -> Status:
+        """Tick it."""
+        self.set_status(Status.RUNNING)
+        return self.child.execute_tick()
 
 
 class Tree:
@@ -190,7 +173,7 @@ class TreeBuilder:
             children = tuple(self._make(child, context, blackboard) for child in element.children)
             ports = {key: text for key, text in element.attributes.items() if not key.startswith("_")}
         else:
-            cls, ports = decorators.SubTree, {}
+            cls, ports = _SubTree, {}
             inner = _inner_blackboard(element, blackboard)
             children = (self._make(self._trees[element.subtree].children[0], context, inner),)
         return cls(
