@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import inspect
 from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from types import ModuleType
 
@@ -153,14 +154,12 @@ class TreeBuilder:
         yield from (element.problem(_no_script(key)) for key in element.attributes if key in _CONDITIONS)
 
     def _cycles(self) -> list[Problem]:
-        for name in self._trees:
-            stack: list[tuple[str, tuple[str, ...]]] = [(name, ())]
-            while stack:
-                at, around = stack.pop()
-                if at in around:
-                    element = self._trees[name]
-                    return [element.problem(f"tree {at!r} contains itself: {' > '.join((*around, at))}")]
-                stack += [(inner, (*around, at)) for inner in _subtrees(self._trees[at])]
+        try:
+            TopologicalSorter({name: _subtrees(tree) for name, tree in self._trees.items()}).prepare()
+        except CycleError as error:
+            around: list[str] = error.args[1][::-1]
+            said = f"tree {around[0]!r} contains itself: {' > '.join(around)}"
+            return [self._trees[around[0]].problem(said)]
         return []
 
     # From elements to nodes

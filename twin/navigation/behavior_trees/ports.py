@@ -84,6 +84,7 @@ def _bool(text: str) -> bool:
 READERS: dict[str, Callable[[str], Any]] = {
     "string": str,
     "double": _number,
+    "seconds": _number,
     "limit": _limit,
     "int": int,
     "unsigned": _unsigned,
@@ -94,6 +95,7 @@ READERS: dict[str, Callable[[str], Any]] = {
 }
 _MEANT = {
     "double": "a number that is finite",
+    "seconds": "a number that is finite",
     "limit": "a number, or inf for no limit",
     "int": "a whole number",
     "unsigned": "a whole number that is not negative",

@@ -9,12 +9,11 @@ from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, new
 from twin.geometry import Pose2
 from twin.navigation.behavior_trees import paths
-from twin.navigation.behavior_trees.node import ConditionNode, NodeSetup
+from twin.navigation.behavior_trees.node import ConditionNode
 from twin.navigation.behavior_trees.ports import inputs
 from twin.nodes.messages import path_array
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 
-_GOAL = inputs(goal="message", goals="message")
 _FRAMES = inputs(global_frame="string", robot_base_frame="string")
 
 
@@ -58,33 +57,24 @@ class WouldASmootherRecoveryHelp(AreErrorCodesPresent):
     CODES = (500, 502, 504, 503)
 
 
-class GoalUpdated(NavigatorCondition):
-    """Whether the goal has changed since this node began to be ticked."""
+class GlobalUpdatedGoal(NavigatorCondition):
+    """Whether the goal has changed since the last tick; true at the first one."""
 
-    PORTS = _GOAL
+    PORTS = inputs(goal="message", goals="message")
     _goal: Any = None
 
     def holds(self) -> bool:
         """Compare."""
-        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
-        before, self._goal = self._goal, present
-        return self.status.is_active and before != present
+        before, self._goal = self._goal, (self.get_or_entry("goal"), self.get_or_entry("goals"))
+        return bool(before != self._goal)
 
 
-class GlobalUpdatedGoal(NavigatorCondition):
-    """Whether the goal has changed since the last tick; true at the first one."""
-
-    PORTS = _GOAL
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._goal: Any = None
+class GoalUpdated(GlobalUpdatedGoal):
+    """Whether the goal has changed since this node began to be ticked."""
 
     def holds(self) -> bool:
         """Compare."""
-        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
-        before, self._goal = self._goal, present
-        return bool(before is None or before != present)
+        return super().holds() and self.status.is_active
 
 
 class GoalReached(NavigatorCondition):

@@ -11,7 +11,7 @@ from typing import Any
 
 from twin.bridge.actions import ActionClient
 from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import Odometry, PoseStamped, ns
+from twin.bridge.msgs import Duration, Odometry, PoseStamped, duration, ns
 from twin.bridge.node import Node
 from twin.bridge.qos import SENSOR_DATA, QoS
 from twin.bridge.services import Client
@@ -22,6 +22,9 @@ from twin.navigation.behavior_trees.factory import Registry
 from twin.navigation.behavior_trees.node import TreeContext
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.robot_pose import RobotPose
+
+_LONGEST = 2.0**31 - 1.0
+"""What a Duration message can hold [s]: 68 years."""
 
 
 class Odometer:
@@ -148,3 +151,8 @@ def fill(cls: type, **values: Any) -> Any:
     """Return a message; values for fields that this version of it does not have are left out."""
     known = {field.name for field in fields(cls)}
     return new(cls, **{name: value for name, value in values.items() if name in known and value is not None})
+
+
+def seconds(value: float) -> Duration:
+    """Return seconds as a Duration message, the longest there is if they are more."""
+    return duration(round(min(max(value, -_LONGEST), _LONGEST) * 1e9))
