@@ -21,14 +21,7 @@ from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout,
 from twin.navigation.planning.config import HybridConfig
 from twin.navigation.planning.curves import advance
 from twin.navigation.planning.grid_search import GridSearch
-from twin.navigation.planning.hybrid_kernel import (
-    FOUND,
-    OUT_OF_NODES,
-    Ints,
-    curve_cost,
-    expand,
-    pose_cost,
-)
+from twin.navigation.planning.hybrid_kernel import FOUND, OUT_OF_NODES, Ints, curve_cost, expand, pose_cost
 from twin.navigation.planning.planner import GlobalPlanner, check_inside
 
 _SLACK = 1.3
@@ -97,29 +90,22 @@ class HybridPlanner(GlobalPlanner):
     @property
     def _penalties(self) -> Array:
         config = self.config
-        return np.array(
-            [
-                config.cost_penalty,
-                config.non_straight_penalty,
-                config.change_penalty,
-                config.reverse_penalty,
-            ]
-        )
+        turning = (config.non_straight_penalty, config.change_penalty)
+        return np.array([config.cost_penalty, *turning, config.reverse_penalty])
 
     def _frame(self, costmap: Costmap) -> _Frame:
         corners = self.footprint
         reach = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+        reach += costmap.resolution  # for costs are those of the cells' centres
         clear_below = 0
         if self.inflation_radius >= reach:
-            # One cell more, for costs are those of the cells' centres.
             cost = inflation_costs(
-                reach + costmap.resolution,
+                reach,
                 inscribed_radius=costmap.inscribed_radius,
                 inflation_radius=math.inf,
                 cost_scaling_factor=costmap.cost_scaling_factor,
             )
-            within = self.inflation_radius >= reach + costmap.resolution
-            clear_below = int(cost) if within else 0
+            clear_below = int(cost)
         radius = max(self.config.minimum_turning_radius / costmap.resolution, 1.0)
         return _Frame(costmap, corners / costmap.resolution, radius, clear_below)
 
@@ -252,11 +238,9 @@ def _aheads(most: int) -> list[int]:
 
 def _driven(first: Array, pieces: list[tuple[int, float]], radius: float) -> Array:
     """Return the poses along pieces, shape (n, 3), at most a cell apart."""
-    poses = [(float(first[0]), float(first[1]), float(first[2]))]
+    poses = [tuple(first.tolist())]
     for turn, length in pieces:
         count = max(1, math.ceil(abs(length) * radius))
         x, y, yaw = poses[-1]
         poses += [advance(x, y, yaw, turn, length * i / count, radius) for i in range(1, count + 1)]
-    if len(poses) == 1:
-        poses.append(poses[0])
-    return np.array(poses)
+    return np.array(poses if len(poses) > 1 else 2 * poses)

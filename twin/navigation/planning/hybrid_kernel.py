@@ -355,12 +355,15 @@ def expand(
                 curve = _curve_length(new_x, new_y, new_yaw, goal, radius, reverse, turns, lengths)
                 left = max(left, curve)
             if nodes == capacity or waiting == capacity:
-                more = 2 * capacity
-                poses, g = _longer2(poses, more), _longer(g, more)
-                parent, move, items = _longer(parent, more), _longer(move, more), _longer(items, more)
-                bin_of, keys, closed = _longer(bin_of, more), _longer(keys, more), _longer(closed, more)
+                poses, g, parent, move = _doubled(poses), _doubled(g), _doubled(parent), _doubled(move)
+                items, bin_of, keys, closed = (
+                    _doubled(items),
+                    _doubled(bin_of),
+                    _doubled(keys),
+                    _doubled(closed),
+                )
                 closed[capacity:] = False
-                capacity = more
+                capacity *= 2
             # A pose reached better becomes a node of its own: what came from the worse one keeps its way.
             fresh = nodes
             nodes += 1
@@ -379,14 +382,6 @@ def expand(
 
 
 @jit
-def _longer(values: Any, size: int) -> Any:
-    more = np.empty(size, values.dtype)
-    more[: values.shape[0]] = values
-    return more
-
-
-@jit
-def _longer2(values: Array, size: int) -> Array:
-    more = np.empty((size, values.shape[1]))
-    more[: values.shape[0]] = values
-    return more
+def _doubled(values: Any) -> Any:
+    """Return an array with as many rows more, whose values are arbitrary."""
+    return np.concatenate((values, np.empty_like(values)))
