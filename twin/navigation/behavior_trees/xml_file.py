@@ -47,6 +47,10 @@ class TreeFile:
     """ID -> the `BehaviorTree` element."""
     problems: list[Problem] = field(default_factory=list)
 
+    def refuse(self, message: str, file: Path, line: int | None = None) -> None:
+        """Note a fault."""
+        self.problems.append(Problem(message, file, line))
+
 
 def read_file(path: Path) -> TreeFile:
     """Read a file with everything it includes; faults are in `problems`, all of them."""
@@ -55,25 +59,19 @@ def read_file(path: Path) -> TreeFile:
     return found
 
 
-def _read(path: Path, found: TreeFile, around: tuple[Path, ...], included_at: Problem | None = None) -> None:
+def _read(
+    path: Path, found: TreeFile, around: tuple[Path, ...], included_at: tuple[Path, int] | None = None
+) -> None:
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
     try:
         root = etree.fromstring(read_bytes(path), parser)
     except OSError as error:
         said = f"cannot be read: {error.strerror or error}"
-        if included_at is not None:
-            found.problems.append(Problem(f"{path} {said}", included_at.file, included_at.line))
-        else:
-            found.problems.append(Problem(said, path))
-        return
+        return found.refuse(f"{path} {said}", *included_at) if included_at else found.refuse(said, path)
     except etree.XMLSyntaxError as error:
-        found.problems.append(Problem(f"not well-formed XML: {error.msg}", path, error.lineno))
-        return
+        return found.refuse(f"not well-formed XML: {error.msg}", path, error.lineno)
     if root.tag != "root":
-        found.problems.append(
-            Problem(f"the outermost tag is <{root.tag}>, not <root>", path, root.sourceline)
-        )
-        return
+        return found.refuse(f"the outermost tag is <{root.tag}>, not <root>", path, root.sourceline)
     form = 4 if root.get("BTCPP_format", "3") == "4" else 3
     if not around:
         found.main = root.get("main_tree_to_execute")
@@ -84,21 +82,19 @@ def _read(path: Path, found: TreeFile, around: tuple[Path, ...], included_at: Pr
             _add_tree(_element(tag, path, form, found.problems), found)
         elif tag.tag != "TreeNodesModel":
             said = f"<{tag.tag}> is not known here; valid: <BehaviorTree>, <include>, <TreeNodesModel>"
-            found.problems.append(Problem(said, path, tag.sourceline))
+            found.refuse(said, path, tag.sourceline)
+    return None
 
 
 def _include(tag: etree._Element, path: Path, found: TreeFile, around: tuple[Path, ...]) -> None:
-    at = Problem("", path, tag.sourceline)
-    target = tag.get("path")
+    at, target = (path, tag.sourceline), tag.get("path")
     if target is None or tag.get("ros_pkg") is not None:
         said = "<include> needs a path relative to its file; ROS packages (ros_pkg) are not searched"
-        found.problems.append(Problem(said, path, tag.sourceline))
-        return
-    included = path.parent / target
-    if included.resolve() in around:
-        found.problems.append(Problem(f"{target} includes itself", path, tag.sourceline))
-        return
-    _read(included, found, around, at)
+        found.refuse(said, *at)
+    elif (included := path.parent / target).resolve() in around:
+        found.refuse(f"{target} includes itself", *at)
+    else:
+        _read(included, found, around, at)
 
 
 def _add_tree(tree: Element, found: TreeFile) -> None:
@@ -107,9 +103,8 @@ def _add_tree(tree: Element, found: TreeFile) -> None:
     if before is not None:
         found.problems.append(tree.problem(f"tree {name!r} is there already: {before.file}:{before.line}"))
     elif len(tree.children) != 1:
-        found.problems.append(
-            tree.problem(f"tree {name!r} must have exactly one child, not {len(tree.children)}")
-        )
+        said = f"tree {name!r} must have exactly one child, not {len(tree.children)}"
+        found.problems.append(tree.problem(said))
     else:
         found.trees[name] = tree
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
 from twin.geometry import Array, Pose2
-from twin.navigation.mapping.alignment import Alignment, Lines
+from twin.navigation.mapping.alignment import Lines
 from twin.navigation.mapping.correlation import Correlation, CorrelationGrid, Window
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.uncertainty import inverted
@@ -62,7 +63,8 @@ class Reference:
         """Return the reference of scans at poses, shape (n, 3); None if they saw nothing."""
         places = [Pose2(x, y, yaw) for x, y, yaw in poses.tolist()]
         points = [place.apply(scan.points) for scan, place in zip(scans, places, strict=True)]
-        normals = [_turned(scan.normals, place) for scan, place in zip(scans, places, strict=True)]
+        turns = [Pose2(0.0, 0.0, place.yaw) for place in places]
+        normals = [turn.apply(scan.normals) for scan, turn in zip(scans, turns, strict=True)]
         merged = np.concatenate(points)
         if not len(merged):
             return None
@@ -129,7 +131,7 @@ class Reference:
             return None
         return Match(
             pose=fine.pose,
-            covariance=_covariance(fine, information),
+            covariance=inverted(fine.information / CORRELATED + information) + FLOOR,
             response=coarse.response,
             inliers=fine.inliers,
             contradicted=contradicted(scan, fine.pose, self.scans, self.poses),
@@ -138,19 +140,7 @@ class Reference:
     def best(self, scan: Scan, coarse: Sequence[Correlation], believed: Pose2, prior: Array) -> Match | None:
         """Return the match of the best score that alignment leads to; see `refined`."""
         matches = [self.refined(scan, candidate, believed, prior) for candidate in coarse]
-        return max((match for match in matches if match is not None), key=_score, default=None)
-
-
-def _score(match: Match) -> float:
-    return match.score
-
-
-def _turned(vectors: Array, pose: Pose2) -> Array:
-    return Pose2(0.0, 0.0, pose.yaw).apply(vectors)
-
-
-def _covariance(fine: Alignment, prior: Array) -> Array:
-    return inverted(fine.information / CORRELATED + prior) + FLOOR
+        return max((match for match in matches if match is not None), key=attrgetter("score"), default=None)
 
 
 def levels_for(half_width: float, resolution: float) -> int:

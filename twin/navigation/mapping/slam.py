@@ -115,16 +115,15 @@ class Slam:
 
     def to_bytes(self) -> bytes:
         """Return the pose graph with its scans and the parameters."""
-        return pack(
-            SavedGraph(
-                config=self.config,
-                graph=self._mapped.graph,
-                scans=self._mapped.scans,
-                stamps_ns=self._mapped.stamps_ns,
-                steps=self._closer.steps,
-                covariance=self.covariance,
-            )
+        saved = SavedGraph(
+            config=self.config,
+            graph=self._mapped.graph,
+            scans=self._mapped.scans,
+            stamps_ns=self._mapped.stamps_ns,
+            steps=self._closer.steps,
+            covariance=self.covariance,
         )
+        return pack(saved)
 
     def save(self, path: str | Path) -> None:
         """Write the pose graph with its scans and the parameters to a file.
@@ -146,41 +145,22 @@ class Slam:
         start: Pose2 | None = None,
         config: SlamConfig | None = None,
     ) -> Slam:
-        """Go on with a saved pose graph; see `from_bytes`.
+        """Go on with a saved pose graph.
+
+        Args:
+            path: What `save` has written.
+            mode: "mapping" adds to the graph, "localization" leaves it as it is.
+            start: About where the robot is in the map frame; None: where the first scan was taken.
+            config: Other parameters than the saved ones.
 
         Raises:
             MapError: the file cannot be read, or is not a saved pose graph.
         """
         try:
-            data = read_bytes(Path(path))
+            saved = unpack(read_bytes(Path(path)), str(path))
         except OSError as fault:
-            raise MapError(
-                f"{path}: {fault.strerror or fault}; valid is a file that SLAM has saved"
-            ) from None
-        return Slam.from_bytes(data, mode=mode, start=start, config=config, name=str(path))
-
-    @staticmethod
-    def from_bytes(
-        data: bytes,
-        *,
-        mode: Mode = "mapping",
-        start: Pose2 | None = None,
-        config: SlamConfig | None = None,
-        name: str = "pose graph",
-    ) -> Slam:
-        """Go on with a saved pose graph.
-
-        Args:
-            data: What `to_bytes` has returned.
-            mode: "mapping" adds to the graph, "localization" leaves it as it is.
-            start: About where the robot is in the map frame; None: where the first scan was taken.
-            config: Other parameters than the saved ones.
-            name: What an error calls the data.
-
-        Raises:
-            MapError: the data are not those of a saved pose graph.
-        """
-        saved = unpack(data, name)
+            reason = fault.strerror or fault
+            raise MapError(f"{path}: {reason}; valid is a file that SLAM has saved") from None
         slam = Slam(config or saved.config)
         slam.mode = mode
         slam._mapped = MappedScans(slam.config, saved.graph, saved.scans, saved.stamps_ns)

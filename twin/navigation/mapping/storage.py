@@ -79,22 +79,26 @@ def _unpacked(config: SlamConfig, arrays: dict[str, NDArray[np.generic]]) -> Sav
     graph = PoseGraph()
     for pose in _rows(arrays["poses"]):
         graph.add_node(pose)
-    for nodes, pose, information, loop in zip(
+    for (first, second), pose, information, loop in zip(
         np.asarray(arrays["edge_nodes"], np.int64).tolist(),
         _rows(arrays["edge_poses"]),
         np.asarray(arrays["edge_information"], np.float64),
         arrays["edge_loops"].tolist(),
         strict=True,
     ):
-        first, second = nodes
-        if not 0 <= min(nodes) <= max(nodes) < len(graph):
+        if not (0 <= first < len(graph) and 0 <= second < len(graph)):
             raise ValueError(f"edge {first}-{second}")
-        graph.add_edge(Edge(first=first, second=second, pose=pose, information=information, loop=bool(loop)))
+        edge = Edge(first=first, second=second, pose=pose, information=information, loop=bool(loop))
+        graph.edges.append(edge)
     ends = np.cumsum(np.asarray(arrays["beams"], np.int64))[:-1]
     ranges = np.split(np.asarray(arrays["ranges"], np.float64), ends)
     angles = np.split(np.asarray(arrays["angles"], np.float64), ends)
     sensors = _rows(arrays["sensors"])
-    scans = [_scan(config, *parts) for parts in zip(ranges, angles, sensors, strict=True)]
+    low, high = config.min_laser_range, config.max_laser_range
+    scans = [
+        Scan.from_ranges(*parts, min_range=low, max_range=high)
+        for parts in zip(ranges, angles, sensors, strict=True)
+    ]
     if len({len(scans), len(graph), len(arrays["stamps_ns"]), len(arrays["steps"])}) != 1 or not scans:
         raise ValueError("numbers of nodes differ")
     return SavedGraph(
@@ -104,12 +108,6 @@ def _unpacked(config: SlamConfig, arrays: dict[str, NDArray[np.generic]]) -> Sav
         stamps_ns=np.asarray(arrays["stamps_ns"], np.int64).tolist(),
         steps=list(np.asarray(arrays["steps"], np.float64)),
         covariance=np.asarray(arrays["covariance"], np.float64).reshape(3, 3),
-    )
-
-
-def _scan(config: SlamConfig, ranges: Array, angles: Array, sensor: Pose2) -> Scan:
-    return Scan.from_ranges(
-        ranges, angles, sensor, min_range=config.min_laser_range, max_range=config.max_laser_range
     )
 
 

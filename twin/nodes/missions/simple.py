@@ -48,9 +48,7 @@ class ActionSequenceNode(MissionNode):
             leaves.append(Do(f"State[{step.label}]", partial(self.enter, step.label)))
             if step.ready is not None:
                 leaves.append(WaitUntil(f"Ready[{step.label}]", step.ready))
-            leaves += [
-                CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
-            ]
+            leaves.append(CallAction(step.name, clients[step.name], step.goal, on_failure=self.note))
         self.run(sequence("Behaviors", leaves), period_ns)
 
 

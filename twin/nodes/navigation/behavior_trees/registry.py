@@ -8,22 +8,14 @@ from twin.navigation.behavior_trees.factory import BASIC_NODES, Registry, nodes_
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.navigation.behavior_trees.ports import Port
 from twin.navigation.plugins import checked
-from twin.nodes.navigation.behavior_trees import (
-    actions,
-    conditions,
-    decorators,
-    goals,
-    paths,
-    services,
-    state_conditions,
-)
+from twin.nodes.navigation.behavior_trees import actions, conditions, decorators, goals, paths, services
 from twin.nodes.navigation.behavior_trees.cancelling import CANCEL_NODES
 from twin.nodes.navigation.behavior_trees.selectors import SELECTORS
 from twin.plugins import Plugin
 
 NAVIGATOR_NODES: Registry = {
     **BASIC_NODES,
-    **nodes_of(actions, services, goals, paths, conditions, state_conditions, decorators),
+    **nodes_of(actions, services, goals, paths, conditions, decorators),
     **CANCEL_NODES,
     **SELECTORS,
     "ValidatePath": services.IsPathValid,
