@@ -102,7 +102,7 @@ class TreeBuilder:
             NavigationError: every fault, each with file and line.
         """
         found = read_file(path)
-        self.path, self._trees, self._registry = path, found.trees, registry
+        self._trees, self._registry = found.trees, registry
         problems = list(found.problems)
         for tree in found.trees.values():
             problems += self._faults(tree.children[0], 1)
@@ -175,16 +175,10 @@ class TreeBuilder:
             cls, ports = _SubTree, {}
             inner = _inner_blackboard(element, blackboard)
             children = (self._make(self._trees[element.subtree].children[0], context, inner),)
-        return cls(
-            NodeSetup(
-                name=element.name,
-                uid=uid,
-                context=context,
-                blackboard=blackboard,
-                ports=ports,
-                children=children,
-            )
+        setup = NodeSetup(
+            name=element.name, uid=uid, context=context, blackboard=blackboard, ports=ports, children=children
         )
+        return cls(setup)
 
 
 _ROUTE_NODES = (
@@ -193,15 +187,14 @@ _ROUTE_NODES = (
 )
 
 
+_LIST = "docs/navigation/behavior-trees.md"
+
+
 def _unknown(type_: str, valid: list[str]) -> str:
     if type_ in _ROUTE_NODES:
         return f"<{type_}> belongs to Nav2's route server, which is not here"
     close = difflib.get_close_matches(type_, valid, n=3, cutoff=0.5)
-    hint = (
-        f"did you mean {' or '.join(close)}?"
-        if close
-        else "docs/navigation/behavior-trees.md lists those there are"
-    )
+    hint = f"did you mean {' or '.join(close)}?" if close else f"{_LIST} lists those there are"
     return f"there is no node <{type_}>; {hint}"
 
 

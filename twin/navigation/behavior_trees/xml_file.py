@@ -25,8 +25,6 @@ class Element:
     children: tuple[Element, ...]
     file: Path
     line: int
-    format: int
-    """3 or 4: of BehaviorTree.CPP, as the file says."""
     subtree: str | None = None
     """ID of the tree that stands here."""
     shares_blackboard: bool = False
@@ -72,14 +70,14 @@ def _read(
         return found.refuse(f"not well-formed XML: {error.msg}", path, error.lineno)
     if root.tag != "root":
         return found.refuse(f"the outermost tag is <{root.tag}>, not <root>", path, root.sourceline)
-    form = 4 if root.get("BTCPP_format", "3") == "4" else 3
+    is_third = root.get("BTCPP_format", "3") != "4"
     if not around:
         found.main = root.get("main_tree_to_execute")
     for tag in root:
         if tag.tag == "include":
             _include(tag, path, found, (*around, path.resolve()))
         elif tag.tag == "BehaviorTree":
-            _add_tree(_element(tag, path, form, found.problems), found)
+            _add_tree(_element(tag, path, is_third, found.problems), found)
         elif tag.tag != "TreeNodesModel":
             said = f"<{tag.tag}> is not known here; valid: <BehaviorTree>, <include>, <TreeNodesModel>"
             found.refuse(said, path, tag.sourceline)
@@ -109,24 +107,23 @@ def _add_tree(tree: Element, found: TreeFile) -> None:
         found.trees[name] = tree
 
 
-def _element(tag: etree._Element, path: Path, form: int, problems: list[Problem]) -> Element:
+def _element(tag: etree._Element, path: Path, is_third: bool, problems: list[Problem]) -> Element:
     attributes = {str(key): str(value) for key, value in tag.attrib.items()}
     type_, id_ = str(tag.tag), attributes.pop("ID", None)
     is_explicit = type_ in _EXPLICIT
     if is_explicit and id_ is None:
         problems.append(Problem(f"<{type_}> needs an attribute ID", path, tag.sourceline))
     is_subtree = type_ in ("SubTree", "SubTreePlus")
-    if form == 3 and type_ == "SubTree":  # version 3 writes the names of entries without braces
+    if is_third and type_ == "SubTree":  # version 3 writes the names of entries without braces
         attributes = {key: _braced(key, value) for key, value in attributes.items()}
     name = id_ or "" if type_ == "BehaviorTree" else attributes.pop("name", id_ or type_)
     return Element(
         type="SubTree" if is_subtree else (id_ or type_) if is_explicit else type_,
         name=name,
         attributes=attributes,
-        children=tuple(_element(child, path, form, problems) for child in tag),
+        children=tuple(_element(child, path, is_third, problems) for child in tag),
         file=path,
         line=tag.sourceline,
-        format=form,
         subtree=(id_ or "") if is_subtree else None,
         shares_blackboard=attributes.pop("__shared_blackboard", "") == "true",
     )

@@ -76,27 +76,18 @@ class Reference:
             poses=places,
         )
 
-    def match(
-        self,
-        scan: Scan,
-        guess: Pose2,
-        window: Window,
-        prior: Array,
-        least: float,
-        believed: Pose2 | None = None,
-    ) -> Match | None:
+    def match(self, scan: Scan, guess: Pose2, window: Window, prior: Array, least: float) -> Match | None:
         """Return where `scan` fits, None if it fits nowhere in the window with a response of `least`.
 
         Args:
             scan: In the frame of its base.
-            guess: Of the pose of its base in the map frame.
+            guess: Of the pose of its base in the map frame, as odometry tells it.
             window: How far from the guess it is looked for.
             prior: Covariance of what is believed in the map frame, shape (3, 3).
             least: Response of the correlation below which nothing is found.
-            believed: The pose that odometry tells; None: the guess.
         """
         coarse = self.grid.search(scan.points, guess, window, least)
-        return None if coarse is None else self.refined(scan, coarse, believed or guess, prior)
+        return None if coarse is None else self.refined(scan, coarse, guess, prior)
 
     def rival(self, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array) -> Match | None:
         """Return where else `scan` fits best; None: nowhere nearly as well. See `match`."""

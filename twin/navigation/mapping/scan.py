@@ -72,7 +72,7 @@ def _gap(points: Array, i: int, j: int) -> float:
 
 @jit
 def _last_neighbour(points: Array, i: int, way: int, limit: float, reach: float) -> int:
-    """Return the last of up to 12 points to one side of point `i`, `way` 1 or -1, that a line may go through."""
+    """Return the last of up to 12 points beside point `i`, `way` 1 or -1, that a line may go through."""
     last = i
     while 0 <= last + way < points.shape[0] and abs(last - i) < 12:
         if _gap(points, last + way, last) > limit or (last != i and _gap(points, last, i) > reach):

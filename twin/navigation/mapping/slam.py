@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.files.writing import replaced
 from twin.geometry import Array, Pose2
-from twin.navigation.mapping.config import Mode, SlamConfig
+from twin.navigation.mapping.config import Mode
+from twin.navigation.mapping.config import SlamConfig as SlamConfig
 from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
 from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
@@ -23,10 +26,36 @@ from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
 from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
-from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
-__all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
+
+@dataclass(frozen=True, kw_only=True)
+class SlamUpdate:
+    """Where the robot is, after a scan was taken."""
+
+    pose: Pose2
+    """Of the base in the map frame."""
+    covariance: Array
+    """Of x, y, yaw in the map frame, shape (3, 3)."""
+    T_map_odom: Pose2
+    """What to publish as the transform map -> odom."""
+    loop_closed: bool
+    """Whether the whole graph has moved."""
+    node: int
+    """Of the scan in the graph; in localization mode the nearest node of the graph."""
+    response: float
+    """Part of the scan's points that lie on what was seen before, 0..1; 0 if only odometry was believed."""
+
+
+class GraphView(NamedTuple):
+    """The graph, to be shown."""
+
+    poses: Array
+    """Of the nodes in the map frame: x [m], y [m], yaw [rad], shape (n, 3)."""
+    edges: NDArray[np.int64]
+    """Pairs of nodes, shape (m, 2)."""
+    loops: NDArray[np.bool_]
+    """Which edges close loops, shape (m,)."""
 
 
 class Slam:
@@ -209,10 +238,8 @@ class Slam:
     def _has_moved(self, odom: Pose2) -> bool:
         assert self._odom is not None
         step = self._odom.inverse() @ odom
-        return (
-            math.hypot(step.x, step.y) >= self.config.minimum_travel_distance
-            or abs(step.yaw) >= self.config.minimum_travel_heading
-        )
+        driven = math.hypot(step.x, step.y) >= self.config.minimum_travel_distance
+        return driven or abs(step.yaw) >= self.config.minimum_travel_heading
 
     def _scan(self, ranges: ArrayLike, angles: ArrayLike, T_base_lidar: Pose2) -> Scan:
         low, high = self.config.min_laser_range, self.config.max_laser_range

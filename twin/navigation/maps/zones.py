@@ -60,15 +60,15 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> Array:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=np.float64)
 
 
-def circle(x: float, y: float, radius: float, *, corners: int = 64) -> Array:
-    """Return a polygon, shape (corners, 2) [m], about a circle.
+def circle(x: float, y: float, radius: float) -> Array:
+    """Return a polygon, shape (64, 2) [m], about a circle.
 
     Raises:
         MapError: the radius is not positive.
     """
     if not radius > 0.0:
         raise MapError(f"a zone's radius is {radius:g} m; valid is a positive number")
-    angles = np.arange(corners) * (2.0 * math.pi / corners)
+    angles = np.arange(64) * (2.0 * math.pi / 64)
     return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
 
 

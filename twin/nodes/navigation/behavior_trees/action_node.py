@@ -24,7 +24,7 @@ class NavigatorNode(TreeNode):
 
     context: NavigatorContext
     FIELDS: ClassVar[Mapping[str, str]] = {}
-    """Input port -> field of the message that is sent, where their names differ."""
+    """Port -> field of the message that is sent or comes back, where their names differ."""
 
     def filled(self, cls: type, **values: Any) -> Any:
         """Return a message with these values, and those of the ports for which it has fields."""
@@ -54,8 +54,6 @@ class ActionNode(NavigatorNode):
     ACTION: ClassVar[ActionType]
     SERVER: ClassVar[str]
     """Name of the action, unless `server_name` gives another."""
-    RESULTS: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Field of the result -> output port, set after success."""
 
     _sent: ClientGoal | None = None
     _sent_ns = 0
@@ -73,9 +71,11 @@ class ActionNode(NavigatorNode):
         return None
 
     def on_success(self, result: Any) -> Status:
-        """Write the outputs."""
-        for field, port in self.RESULTS:
-            self.put(port, getattr(result, field, None))
+        """Write the outputs that the result has fields for."""
+        for port in self.PORTS:
+            field = self.FIELDS.get(port.name, port.name)
+            if port.is_output and hasattr(result, field):
+                self.put(port.name, getattr(result, field))
         self._put_error(0, "")
         return Status.SUCCESS
 

@@ -17,8 +17,6 @@ _BASIC = ACTION_PORTS + ERROR_PORTS
 class _Planning(ActionNode):
     """Leaves an empty path on the blackboard when there is no plan."""
 
-    RESULTS: ClassVar[tuple[tuple[str, str], ...]] = (("path", "path"),)
-
     def make_goal(self, **values: Any) -> Any | None:
         """Return the goal; `use_start` without a start is ignored."""
         use = "use_start" not in self._ports or self.get("use_start") is not False
@@ -56,7 +54,6 @@ class ComputePathThroughPoses(_Planning):
         *inputs(goals="message", start="message", planner_id=("string", "")),
         *outputs(path="message", last_reached_index="int"),
     )
-    RESULTS = (("path", "path"), ("last_reached_index", "last_reached_index"))
 
 
 class SmoothPath(ActionNode):
@@ -69,14 +66,13 @@ class SmoothPath(ActionNode):
         *inputs(check_for_collisions=("bool", False), smoother_id=("string", "")),
         *outputs(smoothed_path="message", smoothing_duration="double", was_completed="bool"),
     )
-    FIELDS: ClassVar = {"unsmoothed_path": "path"}
-    RESULTS = (("path", "smoothed_path"), ("was_completed", "was_completed"))
+    FIELDS: ClassVar = {"unsmoothed_path": "path", "smoothed_path": "path"}
 
     def on_success(self, result: Any) -> Status:
         """Write the path and how long it took [s]."""
-        took = result.smoothing_duration
+        status, took = super().on_success(result), result.smoothing_duration
         self.put("smoothing_duration", took.sec + took.nanosec * 1e-9)
-        return super().on_success(result)
+        return status
 
 
 class FollowPath(ActionNode):
@@ -228,7 +224,6 @@ class DockRobot(ActionNode):
         *inputs(navigate_to_staging_pose=("bool", True)),
         *outputs(success="bool", num_retries="int"),
     )
-    RESULTS = (("success", "success"), ("num_retries", "num_retries"))
 
 
 class UndockRobot(ActionNode):
@@ -240,4 +235,3 @@ class UndockRobot(ActionNode):
         *inputs(dock_type=("string", ""), max_undocking_time=("double", 30.0)),
         *outputs(success="bool"),
     )
-    RESULTS = (("success", "success"),)
