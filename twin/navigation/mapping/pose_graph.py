@@ -113,7 +113,7 @@ class PoseGraph:
             How far the node that moved most has moved [m].
         """
         before = self.poses.copy()
-        edges = self._arrays()
+        edges = self.arrays()
         for _ in range(iterations):
             values, gradient = _linearise(self.poses, *edges, kernel)
             try:
@@ -128,7 +128,7 @@ class PoseGraph:
 
     def marginals(self) -> Marginals:
         """Return the covariances of the nodes as they are now."""
-        edges = self._arrays()
+        edges = self.arrays()
         values, _ = _linearise(self.poses, *edges, KERNEL)
         return Marginals(self._factor(edges[0], edges[1], values), self.poses.copy())
 
@@ -137,7 +137,8 @@ class PoseGraph:
         difference = _error(self.pose(edge.first), self.pose(edge.second), edge.pose)
         return float(difference @ edge.information @ difference)
 
-    def _arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
+        """Return the edges: first and second nodes, poses, information, and whether they close loops."""
         edges = self.edges
         return (
             np.array([edge.first for edge in edges], dtype=np.int64),

@@ -144,15 +144,7 @@ class Slam:
 
     def to_bytes(self) -> bytes:
         """Return the pose graph with its scans and the parameters."""
-        saved = SavedGraph(
-            config=self.config,
-            graph=self._mapped.graph,
-            scans=self._mapped.scans,
-            stamps_ns=self._mapped.stamps_ns,
-            steps=self._closer.steps,
-            covariance=self.covariance,
-        )
-        return pack(saved)
+        return pack(SavedGraph(self._mapped, self._closer.steps, self.covariance))
 
     def save(self, path: str | Path) -> None:
         """Write the pose graph with its scans and the parameters to a file.
@@ -190,12 +182,12 @@ class Slam:
         except OSError as fault:
             reason = fault.strerror or fault
             raise MapError(f"{path}: {reason}; valid is a file that SLAM has saved") from None
-        slam = Slam(config or saved.config)
+        slam, graph = Slam(config or saved.mapped.config), saved.mapped.graph
         slam.mode = mode
-        slam._mapped = MappedScans(slam.config, saved.graph, saved.scans, saved.stamps_ns)
+        slam._mapped, slam._mapped.config = saved.mapped, slam.config
         slam._closer.steps = saved.steps
-        slam._loops.accepted = sum(edge.loop for edge in saved.graph.edges)
-        slam.start_at(start or saved.graph.pose(0))
+        slam._loops.accepted = sum(edge.loop for edge in graph.edges)
+        slam.start_at(start or graph.pose(0))
         return slam
 
     def start_at(self, pose: Pose2) -> None:
@@ -228,12 +220,9 @@ class Slam:
 
     def graph(self) -> GraphView:
         """Return nodes and edges."""
-        edges = self._mapped.graph.edges
-        return GraphView(
-            poses=self._mapped.graph.poses.copy(),
-            edges=np.array([(edge.first, edge.second) for edge in edges], dtype=np.int64).reshape(-1, 2),
-            loops=np.array([edge.loop for edge in edges], dtype=np.bool_),
-        )
+        graph = self._mapped.graph
+        first, second, *_, loops = graph.arrays()
+        return GraphView(poses=graph.poses.copy(), edges=np.column_stack([first, second]), loops=loops)
 
     def _has_moved(self, odom: Pose2) -> bool:
         assert self._odom is not None

@@ -46,10 +46,8 @@ class Odometer:
         """Mean speed [m/s]; 0 before the first odometry."""
         if not self._readings:
             return 0.0
-        count = len(self._readings)
-        return math.hypot(
-            sum(r[1] for r in self._readings) / count, sum(r[2] for r in self._readings) / count
-        )
+        _, xs, ys = zip(*self._readings, strict=True)
+        return math.hypot(sum(xs) / len(xs), sum(ys) / len(ys))
 
     @property
     def acceleration(self) -> float:
@@ -99,7 +97,8 @@ class NavigatorContext(TreeContext):
         """[m]"""
         self.tree_nodes = tree_nodes
         """What trees may be made of."""
-        self._clients: dict[tuple[str, str], ActionClient | Client] = {}
+        self._actions: dict[tuple[str, str], ActionClient] = {}
+        self._services: dict[tuple[str, str], Client] = {}
         self._topics: dict[str, Latest] = {}
 
     @cached_property
@@ -109,19 +108,17 @@ class NavigatorContext(TreeContext):
 
     def action_client(self, type_: ActionType, name: str) -> ActionClient:
         """Return the client of an action."""
-        client = self._clients.get((type_.name, name))
-        if client is None:
-            client = self._clients[type_.name, name] = ActionClient(self.node, type_, name)
-        assert isinstance(client, ActionClient)
-        return client
+        key = type_.name, name
+        if key not in self._actions:
+            self._actions[key] = ActionClient(self.node, type_, name)
+        return self._actions[key]
 
     def service_client(self, type_: ServiceType, name: str) -> Client:
         """Return the client of a service."""
-        client = self._clients.get((type_.name, name))
-        if client is None:
-            client = self._clients[type_.name, name] = self.node.create_client(type_, name)
-        assert isinstance(client, Client)
-        return client
+        key = type_.name, name
+        if key not in self._services:
+            self._services[key] = self.node.create_client(type_, name)
+        return self._services[key]
 
     def latest(self, message_type: type, topic: str, qos: QoS | int = 10) -> Latest:
         """Return what holds the latest message of a topic from now on."""
