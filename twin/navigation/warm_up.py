@@ -106,7 +106,7 @@ def warm_up_localisation() -> None:
     field = LikelihoodField(SurfaceDistance(_room(), max_dist=2.0), z_hit=0.5, z_rand=0.5)
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
     regularised(np.ones((2, 3)), clusters(np.ones((2, 3))), np.ones((2, 3)))
-    tempered_weights(np.zeros(2), np.zeros(2), 1.0)
+    tempered_weights(np.zeros(2), np.zeros(2), 1.0, 1.0)
     same_surface(np.ones((2, 2)), np.ones((2, 2)), 0.05)
 
 

@@ -10,8 +10,7 @@ import pytest
 from twin.geometry import Pose2
 from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.navigation.exploration.explorer import Explorer
-from twin.navigation.exploration.frontiers import FrontierMap
-from twin.navigation.exploration.line_of_sight import seen_from
+from twin.navigation.exploration.frontiers import FrontierMap, seen_from
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 CELL = 0.1

@@ -38,7 +38,7 @@ def surfaces(hall: Any) -> SurfaceDistance:
 
 
 def beam_model(surfaces: SurfaceDistance, z_short: float = 0.05) -> BeamModel:
-    return BeamModel(surfaces, z_hit=0.5, z_short=z_short, z_max=0.05, z_rand=0.5, lambda_short=0.1)
+    return BeamModel(surfaces, AmclConfig(z_short=z_short))
 
 
 def test_the_beam_model_is_best_at_the_truth(hall: Any, surfaces: SurfaceDistance) -> None:

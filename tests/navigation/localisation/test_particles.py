@@ -73,12 +73,12 @@ def test_low_variance_resampling_draws_each_within_one_of_its_share(
 def test_tempered_weights(seed: int, scale: float) -> None:
     logs = np.random.default_rng(seed).normal(0.0, scale, 200)
     flat = np.zeros(200)
-    weights, exponent = tempered_weights(flat, logs, 20.0)
+    weights, exponent = tempered_weights(flat, logs, 20.0, 1.0)
     assert 0.0 < exponent <= 1.0
     assert weights.sum() == pytest.approx(1.0)
     assert 1.0 / (weights @ weights) >= 19.99
     assert (np.diff(weights[np.argsort(logs)]) >= 0.0).all()
-    full, exponent = tempered_weights(flat, logs, 1.0)
+    full, exponent = tempered_weights(flat, logs, 1.0, 1.0)
     assert exponent == 1.0
     assert full == pytest.approx(np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum())
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.planning.alternatives import AlternativesConfig, other_way
 from twin.navigation.planning.config import ThetaStarConfig
+from twin.navigation.planning.earlier_paths import avoiding
 from twin.navigation.planning.planner import Planner
 
 START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(9.5, 2.5, 0.0)
@@ -23,7 +23,7 @@ def walls(*gaps: float) -> Costmap:
 def crossings(costmap: Costmap, count: int) -> list[float]:
     planner, tried = Planner(config=ThetaStarConfig()), []
     for _ in range(count):
-        tried.append(other_way(planner, costmap, START, GOAL, tried, AlternativesConfig()))
+        tried.append(planner.create_plan(avoiding(costmap, tried), START, GOAL))
     return [float(np.interp(5.05, path[:, 0], path[:, 1])) for path in tried]
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import Costmap
-from twin.navigation.planning.commitment import committed
 from twin.navigation.planning.config import CommitmentConfig, PlannerConfig
+from twin.navigation.planning.earlier_paths import committed
 from twin.navigation.planning.planner import Planner
 
 START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(4.5, 2.5, 0.0)

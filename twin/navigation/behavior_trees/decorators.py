@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from twin.navigation.behavior_trees.node import DecoratorNode, NodeSetup, Status
+from twin.navigation.behavior_trees.node import DecoratorNode, Status
 from twin.navigation.behavior_trees.ports import Port, inputs
 
 _MS = 1_000_000
@@ -47,21 +47,12 @@ class KeepRunningUntilFailure(_Map):
     ENDS: ClassVar = {Status.SUCCESS: Status.RUNNING, Status.SKIPPED: Status.RUNNING}
 
 
-class SubTree(_Map):
-    """The root of a tree inside of another one."""
-
-    ENDS: ClassVar = {}
-
-
 class _Again(DecoratorNode):
     """Runs its child again after one kind of end, up to so many times (-1: for ever)."""
 
     AGAIN: ClassVar[Status]
     LIMIT: ClassVar[str]
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._count = 0
+    _count = 0
 
     def tick(self) -> Status:
         """Tick the child until it runs or ends in the other way."""
@@ -111,10 +102,7 @@ class RunOnce(DecoratorNode):
     """Runs its child to its end once; later it is skipped, or keeps that end."""
 
     PORTS = inputs(then_skip=("bool", True))
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._end: Status | None = None
+    _end: Status | None = None
 
     def tick(self) -> Status:
         """Tick the child, if it has not ended before."""
@@ -127,58 +115,51 @@ class RunOnce(DecoratorNode):
         return status
 
 
-class Delay(DecoratorNode):
+class _Timed(DecoratorNode):
+    """Remembers a moment until its child has ended."""
+
+    _moment: int | None = None
+    """[ns]"""
+
+    def tick_child(self) -> Status:
+        """Tick the child, and forget the moment with its end."""
+        status = self.child.execute_tick()
+        if status.is_completed:
+            self._moment = None
+        return status
+
+    def halt(self) -> None:
+        """Count the time anew next time."""
+        self._moment = None
+        super().halt()
+
+
+class Delay(_Timed):
     """Ticks its child when so much time has passed since its own start."""
 
     PORTS = (Port("delay_msec", "unsigned", required=True),)
 
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._due: int | None = None
-
     def tick(self) -> Status:
         """Wait, then tick the child."""
         self.set_status(Status.RUNNING)
-        if self._due is None:
-            self._due = self.context.now_ns() + self.get("delay_msec") * _MS
-        if self.context.now_ns() < self._due:
-            return Status.RUNNING
-        status = self.child.execute_tick()
-        if status.is_completed:
-            self._due = None
-        return status
-
-    def halt(self) -> None:
-        """Wait anew next time."""
-        self._due = None
-        super().halt()
+        now = self.context.now_ns()
+        if self._moment is None:
+            self._moment = now + self.get("delay_msec") * _MS
+        return Status.RUNNING if now < self._moment else self.tick_child()
 
 
-class Timeout(DecoratorNode):
+class Timeout(_Timed):
     """Halts its child and fails when it runs for too long; 0: never."""
 
     PORTS = (Port("msec", "unsigned", required=True),)
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._started: int | None = None
 
     def tick(self) -> Status:
         """Tick the child, if there is time left."""
         self.set_status(Status.RUNNING)
         now, limit = self.context.now_ns(), self.get("msec") * _MS
-        if self._started is None:
-            self._started = now
-        elif limit > 0 and now - self._started >= limit and self.child.status is Status.RUNNING:
-            self._started = None
-            self.child.reset()
+        if self._moment is None:
+            self._moment = now
+        elif limit > 0 and now - self._moment >= limit and self.child.status is Status.RUNNING:
+            self.halt()
             return Status.FAILURE
-        status = self.child.execute_tick()
-        if status.is_completed:
-            self._started = None
-        return status
-
-    def halt(self) -> None:
-        """Count the time anew next time."""
-        self._started = None
-        super().halt()
+        return self.tick_child()

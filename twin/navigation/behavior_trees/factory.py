@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from types import ModuleType
 
 from twin.errors import NavigationError, Problem, nearest
-from twin.navigation.behavior_trees import (
-    decorators,
-    leaves,
-    nav2_control,
-    parallel,
-    sequences,
-)
+from twin.navigation.behavior_trees import decorators, leaves, nav2_control, parallel, sequences
 from twin.navigation.behavior_trees.blackboard import Blackboard
-from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeContext, TreeNode
+from twin.navigation.behavior_trees.node import DecoratorNode, NodeSetup, Status, TreeContext, TreeNode
 from twin.navigation.behavior_trees.ports import is_pointer, read_value
 from twin.navigation.behavior_trees.xml_file import Element, TreeFile, read_file
 
@@ -28,46 +25,33 @@ _MOST_WAKE_UPS = 1000
 Registry = Mapping[str, type[TreeNode]]
 """Type as the XML writes it -> class."""
 
-_OLD_NAMES = {
+
+def nodes_of(*modules: ModuleType) -> Registry:
+    """Return the types that modules define, by their names; private and abstract ones are bases of others."""
+    return {
+        name: cls
+        for module in modules
+        for name, cls in vars(module).items()
+        if isinstance(cls, type) and issubclass(cls, TreeNode) and cls.__module__ == module.__name__
+        if not name.startswith("_") and not inspect.isabstract(cls)
+    }
+
+
+BASIC_NODES: Registry = {
+    **nodes_of(sequences, parallel, decorators, leaves, nav2_control),
     "SequenceStar": sequences.SequenceWithMemory,
     "RetryUntilSuccesful": decorators.RetryUntilSuccessful,
 }
-BASIC_NODES: Registry = {
-    cls.__name__: cls
-    for cls in (
-        sequences.Sequence,
-        sequences.SequenceWithMemory,
-        sequences.ReactiveSequence,
-        sequences.Fallback,
-        sequences.ReactiveFallback,
-        sequences.IfThenElse,
-        sequences.WhileDoElse,
-        parallel.Parallel,
-        parallel.ParallelAll,
-        decorators.Inverter,
-        decorators.ForceSuccess,
-        decorators.ForceFailure,
-        decorators.KeepRunningUntilFailure,
-        decorators.Repeat,
-        decorators.RetryUntilSuccessful,
-        decorators.RunOnce,
-        decorators.Delay,
-        decorators.Timeout,
-        leaves.AlwaysSuccess,
-        leaves.AlwaysFailure,
-        leaves.SetBlackboard,
-        leaves.UnsetBlackboard,
-        leaves.Sleep,
-        nav2_control.PipelineSequence,
-        nav2_control.RecoveryNode,
-        nav2_control.RoundRobin,
-        nav2_control.NonblockingSequence,
-        nav2_control.PersistentSequence,
-        nav2_control.RateController,
-        nav2_control.SingleTrigger,
-    )
-} | _OLD_NAMES
-"""Those that need nothing but a clock."""
+"""Those that need nothing but a clock, by their present and old names."""
+
+
+class _SubTree(DecoratorNode):
+    """The root of a tree inside of another one."""
+
+    def tick(self) -> Status:
+        """Tick it."""
+        self.set_status(Status.RUNNING)
+        return self.child.execute_tick()
 
 
 class Tree:
@@ -118,7 +102,7 @@ class TreeBuilder:
             NavigationError: every fault, each with file and line.
         """
         found = read_file(path)
-        self.path, self._trees, self._registry = path, found.trees, registry
+        self._trees, self._registry = found.trees, registry
         problems = list(found.problems)
         for tree in found.trees.values():
             problems += self._faults(tree.children[0], 1)
@@ -170,14 +154,12 @@ class TreeBuilder:
         yield from (element.problem(_no_script(key)) for key in element.attributes if key in _CONDITIONS)
 
     def _cycles(self) -> list[Problem]:
-        for name in self._trees:
-            stack: list[tuple[str, tuple[str, ...]]] = [(name, ())]
-            while stack:
-                at, around = stack.pop()
-                if at in around:
-                    element = self._trees[name]
-                    return [element.problem(f"tree {at!r} contains itself: {' > '.join((*around, at))}")]
-                stack += [(inner, (*around, at)) for inner in _subtrees(self._trees[at])]
+        try:
+            TopologicalSorter({name: _subtrees(tree) for name, tree in self._trees.items()}).prepare()
+        except CycleError as error:
+            around: list[str] = error.args[1][::-1]
+            said = f"tree {around[0]!r} contains itself: {' > '.join(around)}"
+            return [self._trees[around[0]].problem(said)]
         return []
 
     # From elements to nodes
@@ -190,19 +172,13 @@ class TreeBuilder:
             children = tuple(self._make(child, context, blackboard) for child in element.children)
             ports = {key: text for key, text in element.attributes.items() if not key.startswith("_")}
         else:
-            cls, ports = decorators.SubTree, {}
+            cls, ports = _SubTree, {}
             inner = _inner_blackboard(element, blackboard)
             children = (self._make(self._trees[element.subtree].children[0], context, inner),)
-        return cls(
-            NodeSetup(
-                name=element.name,
-                uid=uid,
-                context=context,
-                blackboard=blackboard,
-                ports=ports,
-                children=children,
-            )
+        setup = NodeSetup(
+            name=element.name, uid=uid, context=context, blackboard=blackboard, ports=ports, children=children
         )
+        return cls(setup)
 
 
 _ROUTE_NODES = (
@@ -211,15 +187,14 @@ _ROUTE_NODES = (
 )
 
 
+_LIST = "docs/navigation/behavior-trees.md"
+
+
 def _unknown(type_: str, valid: list[str]) -> str:
     if type_ in _ROUTE_NODES:
         return f"<{type_}> belongs to Nav2's route server, which is not here"
     close = difflib.get_close_matches(type_, valid, n=3, cutoff=0.5)
-    hint = (
-        f"did you mean {' or '.join(close)}?"
-        if close
-        else "docs/navigation/behavior-trees.md lists those there are"
-    )
+    hint = f"did you mean {' or '.join(close)}?" if close else f"{_LIST} lists those there are"
     return f"there is no node <{type_}>; {hint}"
 
 

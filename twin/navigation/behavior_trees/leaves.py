@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeNode
+from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.navigation.behavior_trees.ports import Port, is_pointer
 
 
@@ -49,10 +49,7 @@ class Sleep(TreeNode):
     """Runs for so long, then succeeds."""
 
     PORTS = (Port("msec", "unsigned", required=True),)
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._due = 0
+    _due = 0
 
     def tick(self) -> Status:
         """Wait."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from twin.navigation.behavior_trees.node import ControlNode, DecoratorNode, NodeSetup, Status
+from twin.navigation.behavior_trees.node import ControlNode, DecoratorNode, Status
 from twin.navigation.behavior_trees.ports import Port, inputs
 
 
 class PipelineSequence(ControlNode):
     """Ticks earlier children again while a later one runs; the last one's success is its own."""
 
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._furthest = 0
+    _furthest = 0
 
     def tick(self) -> Status:
         """Tick all children up to the furthest one reached so far."""
@@ -19,34 +17,35 @@ class PipelineSequence(ControlNode):
         for i, child in enumerate(self.children):
             status = child.execute_tick()
             if status is Status.FAILURE:
-                return self._end(status)
+                return self.end(status)
             skipped += status is Status.SKIPPED
             if status is Status.RUNNING and i >= self._furthest:
                 self._furthest = i
                 return status
-        return self._end(Status.SKIPPED if skipped == len(self.children) else Status.SUCCESS)
+        return self.end(Status.SKIPPED if skipped == len(self.children) else Status.SUCCESS)
 
     def halt(self) -> None:
         """Start with the first child next time."""
         self._furthest = 0
         super().halt()
 
-    def _end(self, status: Status) -> Status:
-        self._furthest = 0
-        self.reset_children()
+
+class _IdleIfSkipped(ControlNode):
+    def end(self, status: Status) -> Status:
+        """Begin anew next time; a node that is skipped is idle."""
+        self.halt()
+        if status is Status.SKIPPED:
+            self.set_status(Status.IDLE)
         return status
 
 
-class RecoveryNode(ControlNode):
+class RecoveryNode(_IdleIfSkipped):
     """Runs its first child; when that fails, runs the second one and tries again, at most so many times."""
 
     CHILDREN = (2, 2)
     PORTS = inputs(number_of_retries=("int", 1))
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._recovering = False
-        self._count = 0
+    _recovering = False
+    _count = 0
 
     def tick(self) -> Status:
         """Tick the first child; after its failure the second, after whose success the first again."""
@@ -58,20 +57,18 @@ class RecoveryNode(ControlNode):
                 if status is Status.RUNNING:
                     return status
                 if status is not Status.FAILURE or self._count >= self.get("number_of_retries"):
-                    return self._end(status)
+                    return self.end(status)
                 main.reset()
                 self._recovering = True
             status = recovery.execute_tick()
             if status is Status.RUNNING:
                 return status
-            if status is Status.SKIPPED:
-                recovery.reset()
-                self._recovering = False
-                return Status.FAILURE
             if status is Status.FAILURE:
-                return self._end(status)
+                return self.end(status)
             recovery.reset()
             self._recovering = False
+            if status is Status.SKIPPED:
+                return Status.FAILURE
             self._count += 1
 
     def halt(self) -> None:
@@ -79,14 +76,8 @@ class RecoveryNode(ControlNode):
         self._recovering, self._count = False, 0
         super().halt()
 
-    def _end(self, status: Status) -> Status:
-        self.halt()
-        if status is Status.SKIPPED:
-            self.set_status(Status.IDLE)
-        return status
 
-
-class RoundRobin(ControlNode):
+class RoundRobin(_IdleIfSkipped):
     """Runs one child a time, at every entry the next one; fails when all have failed, or after the last.
 
     Without `wrap_around` it fails when the last child has ended, also with success, and begins anew
@@ -94,10 +85,7 @@ class RoundRobin(ControlNode):
     """
 
     PORTS = inputs(wrap_around=("bool", True))
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._current = self._failed = 0
+    _current = _failed = 0
 
     def tick(self) -> Status:
         """Tick the child whose turn it is; after a failure the next one."""
@@ -121,11 +109,7 @@ class RoundRobin(ControlNode):
                 self._failed = 0
                 self.reset_children()
                 return status
-        self.halt()
-        if skipped < count:
-            return Status.FAILURE
-        self.set_status(Status.IDLE)
-        return Status.SKIPPED
+        return self.end(Status.FAILURE if skipped < count else Status.SKIPPED)
 
     def halt(self) -> None:
         """Begin with the first child next time."""
@@ -142,13 +126,9 @@ class NonblockingSequence(ControlNode):
         for child in self.children:
             status = child.execute_tick()
             if status is Status.FAILURE:
-                self.reset_children()
-                return status
+                return self.end(status)
             all_succeeded &= status is not Status.RUNNING
-        if not all_succeeded:
-            return Status.RUNNING
-        self.reset_children()
-        return Status.SUCCESS
+        return self.end(Status.SUCCESS) if all_succeeded else Status.RUNNING
 
 
 class PersistentSequence(ControlNode):
@@ -177,11 +157,8 @@ class RateController(DecoratorNode):
     """Ticks its child at once, then again when its period has passed; runs in between."""
 
     PORTS = inputs(hz=("double", 10.0))
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._started = 0
-        self._is_first = True
+    _started = 0
+    _is_first = True
 
     def tick(self) -> Status:
         """Tick the child if it is due or still running."""
@@ -202,9 +179,7 @@ class RateController(DecoratorNode):
 class SingleTrigger(DecoratorNode):
     """Runs its child once, then fails until it is reset."""
 
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._is_first = True
+    _is_first = True
 
     def tick(self) -> Status:
         """Tick the child if it has not ended since the last reset."""

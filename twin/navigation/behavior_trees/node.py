@@ -82,8 +82,8 @@ class TreeNode(ABC):
         """Do the node's work once; RUNNING, SUCCESS, FAILURE or SKIPPED."""
 
     def halt(self) -> None:
-        """Stop running; only called while the status is RUNNING."""
-        return
+        """Stop running, and reset the children; only called while the status is RUNNING."""
+        self.reset_children()
 
     def execute_tick(self) -> Status:
         """Tick and keep the status; a node that is skipped stays as it was."""
@@ -124,14 +124,11 @@ class TreeNode(ABC):
             return read_value(text, port.type)
         value = self.blackboard.get(self._entry(name, text))
         if isinstance(value, str) and port.type not in ("string", "any", "message"):
-            return self._read(name, text, value)
+            try:
+                return read_value(value, port.type)
+            except ValueError as error:
+                raise NavigationError(f"{self.name}: {name} {error}; {text} is {value!r}") from error
         return port.default if value is None else value
-
-    def _read(self, name: str, text: str, value: str) -> Any:
-        try:
-            return read_value(value, self._ports[name].type)
-        except ValueError as error:
-            raise NavigationError(f"{self.name}: {name} {error}; {text} is {value!r}") from error
 
     def get_or_entry(self, name: str) -> Any:
         """Return a port's value, or the blackboard entry of its name if the file leaves the port out."""
@@ -154,9 +151,10 @@ class ControlNode(TreeNode):
     KIND = "Control"
     CHILDREN: ClassVar[tuple[int, int | None]] = (1, None)
 
-    def halt(self) -> None:
-        """Reset the children."""
-        self.reset_children()
+    def end(self, status: Status) -> Status:
+        """Begin anew next time; return the status with which this time ends."""
+        self.halt()
+        return status
 
 
 class DecoratorNode(TreeNode):
@@ -176,10 +174,6 @@ class DecoratorNode(TreeNode):
         if self.child.status.is_completed:
             self.child.set_status(Status.IDLE)
         return status
-
-    def halt(self) -> None:
-        """Reset the child."""
-        self.child.reset()
 
 
 class ConditionNode(TreeNode):

@@ -52,48 +52,34 @@ def is_pointer(text: str) -> bool:
     return len(text) >= 3 and text[0] == "{" and text[-1] == "}"
 
 
-def _limit(text: str) -> float:
-    value = float(text)
-    if math.isnan(value):
-        raise ValueError
-    return value
+def _reader(read: Callable[[str], Any], is_valid: Callable[[Any], bool]) -> Callable[[str], Any]:
+    def checked(text: str) -> Any:
+        value = read(text)
+        if not is_valid(value):
+            raise ValueError
+        return value
+
+    return checked
 
 
-def _number(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError
-    return value
-
-
-def _unsigned(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise ValueError
-    return value
-
-
-def _bool(text: str) -> bool:
-    values = {"1": True, "true": True, "TRUE": True, "True": True}
-    values |= {"0": False, "false": False, "FALSE": False, "False": False}
-    if text not in values:
-        raise ValueError
-    return values[text]
-
+_BOOLS = dict.fromkeys(("1", "true", "TRUE", "True"), True)
+_BOOLS |= dict.fromkeys(("0", "false", "FALSE", "False"), False)
 
 READERS: dict[str, Callable[[str], Any]] = {
     "string": str,
-    "double": _number,
-    "limit": _limit,
+    "double": _reader(float, math.isfinite),
+    "seconds": _reader(float, math.isfinite),
+    "limit": _reader(float, lambda value: not math.isnan(value)),
     "int": int,
-    "unsigned": _unsigned,
-    "bool": _bool,
+    "unsigned": _reader(int, lambda value: value >= 0),
+    "bool": _reader(_BOOLS.get, lambda value: value is not None),
     "strings": lambda text: text.split(";") if text else [],
     "ints": lambda text: [int(part) for part in text.split(";")],
     "any": str,
 }
 _MEANT = {
     "double": "a number that is finite",
+    "seconds": "a number that is finite",
     "limit": "a number, or inf for no limit",
     "int": "a whole number",
     "unsigned": "a whole number that is not negative",

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from twin.navigation.behavior_trees.node import ControlNode, NodeSetup, Status
+from twin.navigation.behavior_trees.node import ControlNode, Status
 
 
-class _InOrder(ControlNode):
-    """Goes on to the next child when one ended with `GO_ON`; any other end is its own."""
+class _Chain(ControlNode):
+    """Goes on to the next child when one ended with `GO_ON`; an end with `STOP` is its own."""
 
     GO_ON: ClassVar[Status]
     STOP: ClassVar[Status]
+
+
+class _InOrder(_Chain):
+    """Keeps its place from tick to tick."""
+
     INTERRUPTIBLE: ClassVar[bool] = False
     """Whether the tree is ticked from its root between two children that end at once."""
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._current = 0
-        self._skipped = 0
+    _current = _skipped = 0
 
     def tick(self) -> Status:
         """Tick from the current child on."""
@@ -36,12 +37,8 @@ class _InOrder(ControlNode):
                 return status
             self._skipped += status is Status.SKIPPED
             self._current += 1
-            if (
-                self.INTERRUPTIBLE
-                and was_idle
-                and status is self.GO_ON
-                and self._current < len(self.children)
-            ):
+            is_last = self._current == len(self.children)
+            if self.INTERRUPTIBLE and was_idle and status is self.GO_ON and not is_last:
                 self.context.woken = True
                 return Status.RUNNING
         all_skipped = self._skipped == len(self.children)
@@ -85,11 +82,8 @@ class SequenceWithMemory(Sequence):
         self.reset_children()
 
 
-class _Reactive(ControlNode):
+class _Reactive(_Chain):
     """Ticks from the first child every time; the one that runs halts all others."""
-
-    GO_ON: ClassVar[Status]
-    STOP: ClassVar[Status]
 
     def tick(self) -> Status:
         """Tick the children in order until one runs or stops it."""
@@ -104,12 +98,10 @@ class _Reactive(ControlNode):
                         other.reset()
                 return status
             if status is self.STOP:
-                self.reset_children()
-                return status
+                return self.end(status)
             if status is Status.SKIPPED:
                 child.reset()
-        self.reset_children()
-        return Status.SKIPPED if all_skipped else self.GO_ON
+        return self.end(Status.SKIPPED if all_skipped else self.GO_ON)
 
 
 class ReactiveSequence(_Reactive):
@@ -128,10 +120,7 @@ class IfThenElse(ControlNode):
     """Ticks the second child if the first succeeds, else the third; asks once."""
 
     CHILDREN = (2, 3)
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._chosen = 0
+    _chosen = 0
 
     def tick(self) -> Status:
         """Ask, then tick what was chosen until it ends."""
@@ -145,10 +134,7 @@ class IfThenElse(ControlNode):
             else:
                 return status
         status = self.children[self._chosen].execute_tick()
-        if status is not Status.RUNNING:
-            self.reset_children()
-            self._chosen = 0
-        return status
+        return status if status is Status.RUNNING else self.end(status)
 
     def halt(self) -> None:
         """Ask again next time."""
@@ -171,6 +157,4 @@ class WhileDoElse(ControlNode):
         if other < len(self.children):
             self.children[other].reset()
         status = self.children[chosen].execute_tick() if chosen < len(self.children) else Status.FAILURE
-        if status is not Status.RUNNING:
-            self.reset_children()
-        return status
+        return status if status is Status.RUNNING else self.end(status)

@@ -25,8 +25,6 @@ class Element:
     children: tuple[Element, ...]
     file: Path
     line: int
-    format: int
-    """3 or 4: of BehaviorTree.CPP, as the file says."""
     subtree: str | None = None
     """ID of the tree that stands here."""
     shares_blackboard: bool = False
@@ -47,6 +45,10 @@ class TreeFile:
     """ID -> the `BehaviorTree` element."""
     problems: list[Problem] = field(default_factory=list)
 
+    def refuse(self, message: str, file: Path, line: int | None = None) -> None:
+        """Note a fault."""
+        self.problems.append(Problem(message, file, line))
+
 
 def read_file(path: Path) -> TreeFile:
     """Read a file with everything it includes; faults are in `problems`, all of them."""
@@ -55,50 +57,42 @@ def read_file(path: Path) -> TreeFile:
     return found
 
 
-def _read(path: Path, found: TreeFile, around: tuple[Path, ...], included_at: Problem | None = None) -> None:
+def _read(
+    path: Path, found: TreeFile, around: tuple[Path, ...], included_at: tuple[Path, int] | None = None
+) -> None:
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
     try:
         root = etree.fromstring(read_bytes(path), parser)
     except OSError as error:
         said = f"cannot be read: {error.strerror or error}"
-        if included_at is not None:
-            found.problems.append(Problem(f"{path} {said}", included_at.file, included_at.line))
-        else:
-            found.problems.append(Problem(said, path))
-        return
+        return found.refuse(f"{path} {said}", *included_at) if included_at else found.refuse(said, path)
     except etree.XMLSyntaxError as error:
-        found.problems.append(Problem(f"not well-formed XML: {error.msg}", path, error.lineno))
-        return
+        return found.refuse(f"not well-formed XML: {error.msg}", path, error.lineno)
     if root.tag != "root":
-        found.problems.append(
-            Problem(f"the outermost tag is <{root.tag}>, not <root>", path, root.sourceline)
-        )
-        return
-    form = 4 if root.get("BTCPP_format", "3") == "4" else 3
+        return found.refuse(f"the outermost tag is <{root.tag}>, not <root>", path, root.sourceline)
+    is_third = root.get("BTCPP_format", "3") != "4"
     if not around:
         found.main = root.get("main_tree_to_execute")
     for tag in root:
         if tag.tag == "include":
             _include(tag, path, found, (*around, path.resolve()))
         elif tag.tag == "BehaviorTree":
-            _add_tree(_element(tag, path, form, found.problems), found)
+            _add_tree(_element(tag, path, is_third, found.problems), found)
         elif tag.tag != "TreeNodesModel":
             said = f"<{tag.tag}> is not known here; valid: <BehaviorTree>, <include>, <TreeNodesModel>"
-            found.problems.append(Problem(said, path, tag.sourceline))
+            found.refuse(said, path, tag.sourceline)
+    return None
 
 
 def _include(tag: etree._Element, path: Path, found: TreeFile, around: tuple[Path, ...]) -> None:
-    at = Problem("", path, tag.sourceline)
-    target = tag.get("path")
+    at, target = (path, tag.sourceline), tag.get("path")
     if target is None or tag.get("ros_pkg") is not None:
         said = "<include> needs a path relative to its file; ROS packages (ros_pkg) are not searched"
-        found.problems.append(Problem(said, path, tag.sourceline))
-        return
-    included = path.parent / target
-    if included.resolve() in around:
-        found.problems.append(Problem(f"{target} includes itself", path, tag.sourceline))
-        return
-    _read(included, found, around, at)
+        found.refuse(said, *at)
+    elif (included := path.parent / target).resolve() in around:
+        found.refuse(f"{target} includes itself", *at)
+    else:
+        _read(included, found, around, at)
 
 
 def _add_tree(tree: Element, found: TreeFile) -> None:
@@ -107,31 +101,29 @@ def _add_tree(tree: Element, found: TreeFile) -> None:
     if before is not None:
         found.problems.append(tree.problem(f"tree {name!r} is there already: {before.file}:{before.line}"))
     elif len(tree.children) != 1:
-        found.problems.append(
-            tree.problem(f"tree {name!r} must have exactly one child, not {len(tree.children)}")
-        )
+        said = f"tree {name!r} must have exactly one child, not {len(tree.children)}"
+        found.problems.append(tree.problem(said))
     else:
         found.trees[name] = tree
 
 
-def _element(tag: etree._Element, path: Path, form: int, problems: list[Problem]) -> Element:
+def _element(tag: etree._Element, path: Path, is_third: bool, problems: list[Problem]) -> Element:
     attributes = {str(key): str(value) for key, value in tag.attrib.items()}
     type_, id_ = str(tag.tag), attributes.pop("ID", None)
     is_explicit = type_ in _EXPLICIT
     if is_explicit and id_ is None:
         problems.append(Problem(f"<{type_}> needs an attribute ID", path, tag.sourceline))
     is_subtree = type_ in ("SubTree", "SubTreePlus")
-    if form == 3 and type_ == "SubTree":  # version 3 writes the names of entries without braces
+    if is_third and type_ == "SubTree":  # version 3 writes the names of entries without braces
         attributes = {key: _braced(key, value) for key, value in attributes.items()}
     name = id_ or "" if type_ == "BehaviorTree" else attributes.pop("name", id_ or type_)
     return Element(
         type="SubTree" if is_subtree else (id_ or type_) if is_explicit else type_,
         name=name,
         attributes=attributes,
-        children=tuple(_element(child, path, form, problems) for child in tag),
+        children=tuple(_element(child, path, is_third, problems) for child in tag),
         file=path,
         line=tag.sourceline,
-        format=form,
         subtree=(id_ or "") if is_subtree else None,
         shares_blackboard=attributes.pop("__shared_blackboard", "") == "true",
     )

@@ -34,11 +34,8 @@ from twin.navigation.maps.occupancy_map import FREE, OccupancyMap
 
 _FIT_SIGMA = 0.1
 """Distance from the nearest surface at which a beam counts as explained by 0.6 [m]."""
-
-
 _BETTER = 0.25
 """By so much more of the scan must be explained elsewhere before the robot is looked for there."""
-
 _POINT = 1e-14
 """Particles that are together like this are one point [m², rad²]."""
 _ONE_FIT = 10.0
@@ -85,16 +82,18 @@ class Amcl:
         self._random = np.random.Generator(
             np.random.Philox(key=seed if config.random_seed < 0 else config.random_seed)
         )
-        self._odom: Pose2 | None = None
-        self._updates = 0
-        self._confidence = self._no_confidence()
-        self.particles: Array = np.zeros((0, 3))
+        self.global_localisation()
+
+    def _restart(self, particles: Array) -> None:
+        self.particles = particles
         """Poses in the map frame, shape (n, 3)."""
-        self.weights: Array = np.zeros(0)
+        self.weights: Array = np.full(len(particles), 1.0 / len(particles))
         """Shape (n,), sum 1."""
         self.estimate: Estimate | None = None
         """The latest one."""
-        self.global_localisation()
+        self._odom: Pose2 | None = None
+        self._updates = 0
+        self._confidence = Confidence(self.config.recovery_alpha_slow, self.config.recovery_alpha_fast)
 
     def initialise(self, pose: Pose2, covariance: ArrayLike) -> None:
         """Start from a guess: its pose in the map frame and the covariance, shape (3, 3), of x, y, yaw."""
@@ -135,9 +134,7 @@ class Amcl:
             min_range=config.laser_min_range,
             max_range=config.laser_max_range if config.laser_max_range > 0.0 else math.inf,
         )
-        prior = None
-        if len(beams):
-            prior = self._weigh(beams)
+        prior = self._weigh(beams) if len(beams) else None
         self.estimate = self._estimated(odom, beams, prior)
         self._updates += 1
         if self._updates % config.resample_interval == 0:
@@ -147,17 +144,6 @@ class Amcl:
     def rebase(self, odom: Pose2) -> None:
         """Take odometry as continuing from `odom` without motion: it jumped."""
         self._odom = odom
-
-    def _restart(self, particles: Array) -> None:
-        self.particles = particles
-        self.weights = np.full(len(particles), 1.0 / len(particles))
-        self.estimate = None
-        self._odom = None
-        self._updates = 0
-        self._confidence = self._no_confidence()
-
-    def _no_confidence(self) -> Confidence:
-        return Confidence(self.config.recovery_alpha_slow, self.config.recovery_alpha_fast)
 
     def _anywhere(self, count: int) -> Array:
         """Return poses uniform over the free cells and all headings, shape (count, 3)."""
@@ -210,11 +196,8 @@ class Amcl:
             prior: Covariance before it, where particles were together.
         """
         cluster = clusters(self.particles)
-        if cluster.any():
-            members = heaviest(cluster, self.weights)
-            pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
-        else:
-            pose, covariance = mean_and_covariance(self.particles, self.weights)
+        members = heaviest(cluster, self.weights)
+        pose, covariance = mean_and_covariance(self.particles[members], self.weights[members])
         fit = math.nan
         if len(beams):
             ends = pose.apply(beams.ends)

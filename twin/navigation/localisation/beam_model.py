@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.navigation._jit import jit
+from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.laser_scan import Beams
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 
@@ -20,19 +21,10 @@ class BeamModel:
     per beam and particle.
     """
 
-    def __init__(
-        self,
-        surfaces: SurfaceDistance,
-        *,
-        z_hit: float,
-        z_short: float,
-        z_max: float,
-        z_rand: float,
-        lambda_short: float,
-    ) -> None:
+    def __init__(self, surfaces: SurfaceDistance, config: AmclConfig) -> None:
         """Take the mixture's weights, and the decay of unexpected short readings [1/m]."""
         self._surfaces = surfaces
-        self._mixture = (z_hit, z_short, z_max, z_rand, lambda_short)
+        self._mixture = (config.z_hit, config.z_short, config.z_max, config.z_rand, config.lambda_short)
 
     def log_likelihood(self, particles: Array, beams: Beams, depth: float, sigma: float) -> Array:
         """Return the log-likelihood of a scan, shape (n,), summed over beams.

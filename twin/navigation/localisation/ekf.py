@@ -144,11 +144,7 @@ class Ekf:
         R, by_roll, by_pitch, by_yaw = _rotation_and_derivatives(roll, pitch, yaw)
         F = np.eye(SIZE)
         F[POSITION, VELOCITY], F[POSITION, ACCELERATION] = dt * R, 0.5 * dt * dt * R
-        F[POSITION, ROLL], F[POSITION, PITCH], F[POSITION, YAW] = (
-            by_roll @ moved,
-            by_pitch @ moved,
-            by_yaw @ moved,
-        )
+        F[POSITION, ANGLES] = np.column_stack([by_roll @ moved, by_pitch @ moved, by_yaw @ moved])
         F[ANGLES, RATES] = dt * _rates_to_angles(roll, pitch)
         _, q, r = self.state[RATES]
         sr, cr, tp, cp = np.sin(roll), np.cos(roll), np.tan(pitch), np.cos(pitch)

@@ -152,9 +152,8 @@ def same_surface(points: Array, normals: Array, resolution: float) -> NDArray[np
         for g in range(count):
             j = first[g]
             along = normals[i, 0] * normals[j, 0] + normals[i, 1] * normals[j, 1]
-            off = (points[i, 0] - points[j, 0]) * normals[j, 0] + (points[i, 1] - points[j, 1]) * normals[
-                j, 1
-            ]
+            dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+            off = dx * normals[j, 0] + dy * normals[j, 1]
             if along > _SAME_DIRECTION and abs(off) < resolution:
                 surface[i] = g
                 break

@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.scan_watch import RepeatedScan
 
-
-@dataclass(frozen=True, kw_only=True)
-class InputWatchConfig:
-    """What no healthy robot does."""
-
-    max_speed: float = 3.0
-    """Odometry that is faster than this has jumped [m/s]."""
-    max_turn_rate: float = 15.0
-    """The same of turning [rad/s]."""
-    frozen_after: int = 5
-    """So many equal scans in a row, while odometry moves, are one old scan."""
-    frozen_distance: float = 0.1
-    """How far odometry must have come meanwhile [m]."""
-    least_share: float = 0.05
-    """Of the readings that must have hit something for the lidar not to be blind."""
+_MAX_SPEED = 3.0
+"""Odometry that is faster than this has jumped [m/s]."""
+_MAX_TURN_RATE = 15.0
+"""The same of turning [rad/s]."""
+_FROZEN_AFTER = 5
+"""So many equal scans in a row, while odometry moves, are one old scan."""
+_FROZEN_DISTANCE = 0.1
+"""How far odometry must have come meanwhile [m]."""
+_LEAST_SHARE = 0.05
+"""Of the readings that must have hit something for the lidar not to be blind."""
 
 
 class InputWatch:
     """Compares each scan, and the odometry at its stamp, with those before."""
 
-    def __init__(self, config: InputWatchConfig | None = None) -> None:
-        self._config = config = config or InputWatchConfig()
-        self._repeated = RepeatedScan(config.frozen_after, config.frozen_distance)
+    def __init__(self) -> None:
+        self._repeated = RepeatedScan(_FROZEN_AFTER, _FROZEN_DISTANCE)
         self._odom: tuple[int, Pose2] | None = None
 
     def has_jumped(self, odom: Pose2, time_ns: int) -> bool:
@@ -42,8 +34,8 @@ class InputWatch:
             return False
         elapsed = (time_ns - before[0]) * 1e-9
         turned = abs(wrap_angle(odom.yaw - before[1].yaw))
-        fast = before[1].distance(odom) > self._config.max_speed * elapsed
-        return fast or turned > min(self._config.max_turn_rate * elapsed, 3.1)
+        fast = before[1].distance(odom) > _MAX_SPEED * elapsed
+        return fast or turned > min(_MAX_TURN_RATE * elapsed, 3.1)
 
     def fault(self, ranges: ArrayLike, odom: Pose2) -> str:
         """Return why a scan cannot be used, empty if it can.
@@ -54,7 +46,7 @@ class InputWatch:
         """
         values = np.asarray(ranges, dtype=np.float64)
         frozen = self._repeated.is_frozen(values, odom)
-        if np.count_nonzero(np.isfinite(values)) < self._config.least_share * len(values):
+        if np.count_nonzero(np.isfinite(values)) < _LEAST_SHARE * len(values):
             return "the scan is blind: hardly a reading hit anything"
         if frozen:
             return "the scan is frozen: it stays the same while the robot moves"

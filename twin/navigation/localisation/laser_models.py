@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,26 +16,14 @@ from twin.navigation.localisation.surface_distance import SurfaceDistance
 
 _CONVERGED_XY = 0.5
 """Particles that are all within this of their mean, along x and along y, are one opinion (nav2) [m]."""
+_ASKED = 50
+"""So many particles speak for all: they lie within a metre of each other."""
 
 
-class LaserModel(Protocol):
-    """How well poses explain a scan."""
-
-    def log_likelihood(self, particles: Array, beams: Beams, depth: float, sigma: float) -> Array:
-        """Return the log-likelihood of a scan for each pose, shape (n, 3) -> (n,), up to a constant."""
-
-
-def laser_model(config: AmclConfig, surfaces: SurfaceDistance) -> LaserModel:
+def laser_model(config: AmclConfig, surfaces: SurfaceDistance) -> BeamModel | LikelihoodField:
     """Return the model that a config names."""
     if config.laser_model_type == "beam":
-        return BeamModel(
-            surfaces,
-            z_hit=config.z_hit,
-            z_short=config.z_short,
-            z_max=config.z_max,
-            z_rand=config.z_rand,
-            lambda_short=config.lambda_short,
-        )
+        return BeamModel(surfaces, config)
     return LikelihoodField(surfaces, z_hit=config.z_hit, z_rand=config.z_rand)
 
 
@@ -65,8 +53,4 @@ def without_strangers(
     kept = explained > config.beam_skip_threshold * len(looked_at)
     if np.count_nonzero(~kept) >= config.beam_skip_error_threshold * len(beams):
         return beams
-    return Beams(ends=beams.ends[kept], origin=beams.origin, missed=beams.missed, max_range=beams.max_range)
-
-
-_ASKED = 50
-"""So many particles speak for all: they lie within a metre of each other."""
+    return replace(beams, ends=beams.ends[kept])

@@ -58,11 +58,9 @@ def chosen_beams(
     valid = r > max(min_range, 0.0)  # False for what is not a number
     hit, missed = valid & (r < max_range), valid & (r >= max_range)
     yaw = a[hit] + T_base_lidar.yaw
-    ends = np.empty((len(yaw), 2))
-    ends[:, 0] = T_base_lidar.x + r[hit] * np.cos(yaw)
-    ends[:, 1] = T_base_lidar.y + r[hit] * np.sin(yaw)
+    x, y = T_base_lidar.x + r[hit] * np.cos(yaw), T_base_lidar.y + r[hit] * np.sin(yaw)
     return Beams(
-        ends=ends,
+        ends=np.column_stack([x, y]),
         origin=T_base_lidar,
         missed=a[missed] + T_base_lidar.yaw,
         max_range=max_range if math.isfinite(max_range) else 100.0,

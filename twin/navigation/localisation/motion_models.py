@@ -36,12 +36,8 @@ def sample_motion(
     sigma2 = math.sqrt(a1 * turn2**2 + a2 * trans**2)
     heading = particles[:, 2] + rot1 + sigma1 * noise[0]
     step = trans + sigma_trans * noise[1]
-    moved = np.empty_like(particles)
-    moved[:, 0] = particles[:, 0] + step * np.cos(heading)
-    moved[:, 1] = particles[:, 1] + step * np.sin(heading)
-    moved[:, 2] = heading + rot2 + sigma2 * noise[2]
-    moved[:, 2] = _wrapped(moved[:, 2])
-    return moved
+    x, y = particles[:, 0] + step * np.cos(heading), particles[:, 1] + step * np.sin(heading)
+    return np.column_stack([x, y, _wrapped(heading + rot2 + sigma2 * noise[2])])
 
 
 def sample_omni_motion(
@@ -69,11 +65,9 @@ def sample_omni_motion(
     across = math.sqrt(a4 * turn**2 + a5 * trans**2) * noise[1]
     bearing = particles[:, 2] + math.atan2(step.y, step.x)
     c, s = np.cos(bearing), np.sin(bearing)
-    moved = np.empty_like(particles)
-    moved[:, 0] = particles[:, 0] + along * c - across * s
-    moved[:, 1] = particles[:, 1] + along * s + across * c
-    moved[:, 2] = _wrapped(particles[:, 2] + turn + math.sqrt(a1 * turn**2 + a2 * trans**2) * noise[2])
-    return moved
+    x, y = particles[:, 0] + along * c - across * s, particles[:, 1] + along * s + across * c
+    yaw = particles[:, 2] + turn + math.sqrt(a1 * turn**2 + a2 * trans**2) * noise[2]
+    return np.column_stack([x, y, _wrapped(yaw)])
 
 
 def _wrapped(yaw: Array) -> Array:

@@ -86,8 +86,7 @@ def _fit_in_a_bin(particles: Array) -> bool:
 
 def heaviest(cluster: NDArray[np.int64], weights: Array) -> NDArray[np.bool_]:
     """Return which particles, shape (n,), are in the cluster of the largest weight."""
-    members: NDArray[np.bool_] = cluster == int(np.argmax(np.bincount(cluster, weights=weights)))
-    return members
+    return np.asarray(cluster == np.argmax(np.bincount(cluster, weights=weights)))
 
 
 def regularised(particles: Array, cluster: NDArray[np.int64], noise: Array) -> Array:
@@ -117,9 +116,8 @@ def _blurred(particles: Array, noise: Array) -> Array:
     if count < 2:
         return particles
     mean, covariance = mean_and_covariance(particles, np.full(count, 1.0 / count))
-    return _shrunk_and_blurred(
-        particles, noise, np.array(mean), covariance, min(0.5, (0.8 * count) ** (-1.0 / 7.0))
-    )
+    width = min(0.5, (0.8 * count) ** (-1.0 / 7.0))
+    return _shrunk_and_blurred(particles, noise, np.array(mean), covariance, width)
 
 
 @jit
@@ -195,8 +193,9 @@ def reshaped(particles: Array, mean: Pose2, covariance: Array, wanted: Array) ->
     return np.asarray(moved)
 
 
+@jit
 def tempered_weights(
-    log_prior: Array, log_likelihood: Array, least_effective: float, most: float = 1.0
+    log_prior: Array, log_likelihood: Array, least_effective: float, most: float
 ) -> tuple[Array, float]:
     """Return normalised weights, shape (n,), and the exponent that the likelihood has in them.
 
@@ -210,13 +209,6 @@ def tempered_weights(
         least_effective: Effective sample size.
         most: Largest exponent.
     """
-    return _tempered_weights(log_prior, log_likelihood, least_effective, most)
-
-
-@jit
-def _tempered_weights(
-    log_prior: Array, log_likelihood: Array, least_effective: float, most: float
-) -> tuple[Array, float]:
     weights = np.empty(log_prior.shape[0])
     low, high, exponent = 0.0, most, most
     for _ in range(13):

@@ -32,10 +32,7 @@ class Localised(NamedTuple):
 def at_start(mapped: MappedScans, scan: Scan, start: Pose2) -> Localised:
     """Return where the robot is that is said to be at `start` in the map frame."""
     width, angle = START_WINDOW
-    match = mapped.registration(mapped.near(start), width).match(scan, start, START_COVARIANCE, angle)
-    if match is None:
-        return Localised(start, START_COVARIANCE, None)
-    return Localised(match.pose, match.covariance, match)
+    return _matched(mapped, scan, start, START_COVARIANCE, width, angle)
 
 
 def while_driving(mapped: MappedScans, scan: Scan, guess: Pose2, prior: Array) -> Localised:
@@ -44,7 +41,13 @@ def while_driving(mapped: MappedScans, scan: Scan, guess: Pose2, prior: Array) -
     spread = 3.0 * math.sqrt(float(np.linalg.eigvalsh(prior[:2, :2])[-1]))
     widest = 0.5 * config.loop_search_space_dimension
     half = max(min(spread, widest), 0.5 * config.correlation_search_space_dimension)
-    match = mapped.registration(mapped.near(guess), half).match(scan, guess, prior)
+    return _matched(mapped, scan, guess, prior, half)
+
+
+def _matched(
+    mapped: MappedScans, scan: Scan, guess: Pose2, prior: Array, half: float, angle: float | None = None
+) -> Localised:
+    match = mapped.registration(mapped.near(guess), half).match(scan, guess, prior, angle)
     if match is None:
         return Localised(guess, prior, None)
     return Localised(match.pose, match.covariance, match)

@@ -31,8 +31,7 @@ class LoopAcceptance:
         """Add edges, none or some; return whether the whole graph has moved."""
         if not edges:
             return False
-        for edge in edges:
-            graph.add_edge(edge)
+        graph.edges += edges
         self._waiting += len(edges)
         self.accepted += len(edges)
         worst = max(graph.squared_error(edge) for edge in edges)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,14 +46,11 @@ GATE = 20.0
 """Squared difference [sigma^2] of three values that is still believed (once in 6000 it is exceeded)."""
 REFRESH = 10
 """Covariances are computed anew after so many scans."""
-
-
 SPREAD = 0.2
 """Scans that are apart by less than this [m, rad] see the same."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Candidate:
+class _Candidate(NamedTuple):
     edge: Edge
     needed: int
     """So many must agree."""
@@ -137,9 +136,10 @@ class LoopCloser:
         least = self.config.loop_match_minimum_response_coarse
         expected = self._match(graph, scans, node, place, near, prior, least, position < SURE)
         if expected is not None:
-            moved = difference(graph.pose(node), expected[0].pose)
-            if moved @ np.linalg.solve(prior + expected[0].covariance, moved) <= GATE:
-                return _Candidate(edge=_edge(place, node, graph.pose(place), expected[0]), needed=expected[1])
+            match, needed = expected
+            moved = difference(graph.pose(node), match.pose)
+            if moved @ np.linalg.solve(prior + match.covariance, moved) <= GATE:
+                return _Candidate(_edge(place, node, graph.pose(place), match), needed)
         half = min(FAR * near.half_width + FARTHER[0], FARTHEST)
         if half <= near.half_width:
             return None
@@ -147,8 +147,7 @@ class LoopCloser:
         elsewhere = self._match(graph, scans, node, place, far, FAR**2 * prior, FAR_RESPONSE, False)
         if elsewhere is None:
             return None
-        edge = _edge(place, node, graph.pose(place), elsewhere[0])
-        return _Candidate(edge=edge, needed=AGREEING_FAR)
+        return _Candidate(_edge(place, node, graph.pose(place), elsewhere[0]), AGREEING_FAR)
 
     def _match(
         self,
@@ -201,8 +200,7 @@ class LoopCloser:
         after = spread(graph.poses, range(place, max(last, place + 1)), half)
         members = [*before[::-1], *after[1:]]
         away = np.hypot(*(graph.poses[members, :2] - graph.poses[place, :2]).T)
-        near = (away < config.scan_buffer_maximum_scan_distance).tolist()
-        return [member for member, is_near in zip(members, near, strict=True) if is_near]
+        return list(compress(members, away < config.scan_buffer_maximum_scan_distance))
 
     def _agreed(self, graph: PoseGraph) -> list[Edge]:
         """Return waiting edges that agree with the latest one about how far the path has drifted."""
@@ -250,11 +248,7 @@ def apart(first: Array, second: Array) -> bool:
 
 
 def _edge(place: int, node: int, here: Pose2, match: Match) -> Edge:
-    covariance = turned(match.covariance, -here.yaw)
+    information = inverted(turned(match.covariance, -here.yaw))
     return Edge(
-        first=place,
-        second=node,
-        pose=here.inverse() @ match.pose,
-        information=inverted(covariance),
-        loop=True,
+        first=place, second=node, pose=here.inverse() @ match.pose, information=information, loop=True
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
@@ -39,14 +40,10 @@ class MappedScans:
 
     def connect(self, first: int, second: int, covariance: Array) -> None:
         """Hold two nodes where they are now, with a covariance, shape (3, 3), in the frame of the first."""
-        self.graph.add_edge(
-            Edge(
-                first=first,
-                second=second,
-                pose=self.graph.pose(first).inverse() @ self.graph.pose(second),
-                information=inverted(covariance),
-                loop=False,
-            )
+        step = self.graph.pose(first).inverse() @ self.graph.pose(second)
+        information = inverted(covariance)
+        self.graph.edges.append(
+            Edge(first=first, second=second, pose=step, information=information, loop=False)
         )
 
     def recent(self, guess: Pose2) -> list[int]:
@@ -57,8 +54,7 @@ class MappedScans:
         config = self.config
         nodes = spread(self.graph.poses, range(len(self.graph) - 1, -1, -1), config.scan_buffer_size)
         away = np.hypot(*(self.graph.poses[nodes, :2] - guess[:2]).T)
-        near = zip(nodes, (away < config.scan_buffer_maximum_scan_distance).tolist(), strict=True)
-        return [node for node, is_near in near if is_near] or nodes[:1]
+        return list(compress(nodes, away < config.scan_buffer_maximum_scan_distance)) or nodes[:1]
 
     def near(self, guess: Pose2, most: int | None = None) -> list[int]:
         """Return the nodes that most likely have seen what is seen at `guess`: near, looking the same way."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
 from twin.geometry import Array, Pose2
-from twin.navigation.mapping.alignment import Alignment, Lines
+from twin.navigation.mapping.alignment import Lines
 from twin.navigation.mapping.correlation import Correlation, CorrelationGrid, Window
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.uncertainty import inverted
@@ -62,7 +63,8 @@ class Reference:
         """Return the reference of scans at poses, shape (n, 3); None if they saw nothing."""
         places = [Pose2(x, y, yaw) for x, y, yaw in poses.tolist()]
         points = [place.apply(scan.points) for scan, place in zip(scans, places, strict=True)]
-        normals = [_turned(scan.normals, place) for scan, place in zip(scans, places, strict=True)]
+        turns = [Pose2(0.0, 0.0, place.yaw) for place in places]
+        normals = [turn.apply(scan.normals) for scan, turn in zip(scans, turns, strict=True)]
         merged = np.concatenate(points)
         if not len(merged):
             return None
@@ -74,27 +76,18 @@ class Reference:
             poses=places,
         )
 
-    def match(
-        self,
-        scan: Scan,
-        guess: Pose2,
-        window: Window,
-        prior: Array,
-        least: float,
-        believed: Pose2 | None = None,
-    ) -> Match | None:
+    def match(self, scan: Scan, guess: Pose2, window: Window, prior: Array, least: float) -> Match | None:
         """Return where `scan` fits, None if it fits nowhere in the window with a response of `least`.
 
         Args:
             scan: In the frame of its base.
-            guess: Of the pose of its base in the map frame.
+            guess: Of the pose of its base in the map frame, as odometry tells it.
             window: How far from the guess it is looked for.
             prior: Covariance of what is believed in the map frame, shape (3, 3).
             least: Response of the correlation below which nothing is found.
-            believed: The pose that odometry tells; None: the guess.
         """
         coarse = self.grid.search(scan.points, guess, window, least)
-        return None if coarse is None else self.refined(scan, coarse, believed or guess, prior)
+        return None if coarse is None else self.refined(scan, coarse, guess, prior)
 
     def rival(self, scan: Scan, match: Match, guess: Pose2, window: Window, prior: Array) -> Match | None:
         """Return where else `scan` fits best; None: nowhere nearly as well. See `match`."""
@@ -129,7 +122,7 @@ class Reference:
             return None
         return Match(
             pose=fine.pose,
-            covariance=_covariance(fine, information),
+            covariance=inverted(fine.information / CORRELATED + information) + FLOOR,
             response=coarse.response,
             inliers=fine.inliers,
             contradicted=contradicted(scan, fine.pose, self.scans, self.poses),
@@ -138,19 +131,7 @@ class Reference:
     def best(self, scan: Scan, coarse: Sequence[Correlation], believed: Pose2, prior: Array) -> Match | None:
         """Return the match of the best score that alignment leads to; see `refined`."""
         matches = [self.refined(scan, candidate, believed, prior) for candidate in coarse]
-        return max((match for match in matches if match is not None), key=_score, default=None)
-
-
-def _score(match: Match) -> float:
-    return match.score
-
-
-def _turned(vectors: Array, pose: Pose2) -> Array:
-    return Pose2(0.0, 0.0, pose.yaw).apply(vectors)
-
-
-def _covariance(fine: Alignment, prior: Array) -> Array:
-    return inverted(fine.information / CORRELATED + prior) + FLOOR
+        return max((match for match in matches if match is not None), key=attrgetter("score"), default=None)
 
 
 def levels_for(half_width: float, resolution: float) -> int:

@@ -102,10 +102,6 @@ class PoseGraph:
         self._count += 1
         return self._count - 1
 
-    def add_edge(self, edge: Edge) -> None:
-        """Add a measurement between two nodes."""
-        self.edges.append(edge)
-
     def optimise(self, iterations: int = 10, kernel: float = KERNEL) -> float:
         """Move the nodes to where they explain the edges best.
 
@@ -117,7 +113,7 @@ class PoseGraph:
             How far the node that moved most has moved [m].
         """
         before = self.poses.copy()
-        edges = self._arrays()
+        edges = self.arrays()
         for _ in range(iterations):
             values, gradient = _linearise(self.poses, *edges, kernel)
             try:
@@ -132,7 +128,7 @@ class PoseGraph:
 
     def marginals(self) -> Marginals:
         """Return the covariances of the nodes as they are now."""
-        edges = self._arrays()
+        edges = self.arrays()
         values, _ = _linearise(self.poses, *edges, KERNEL)
         return Marginals(self._factor(edges[0], edges[1], values), self.poses.copy())
 
@@ -141,7 +137,8 @@ class PoseGraph:
         difference = _error(self.pose(edge.first), self.pose(edge.second), edge.pose)
         return float(difference @ edge.information @ difference)
 
-    def _arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
+        """Return the edges: first and second nodes, poses, information, and whether they close loops."""
         edges = self.edges
         return (
             np.array([edge.first for edge in edges], dtype=np.int64),
@@ -156,15 +153,10 @@ class PoseGraph:
         inner = np.arange(3)
         rows = 3 * blocks[0][..., None, None] + inner[:, None] + 0 * inner
         columns = 3 * blocks[1][..., None, None] + inner + 0 * inner[:, None]
-        anchor = np.arange(3)
-        size = 3 * self._count
-        matrix = csc_matrix(
-            (
-                np.concatenate([values.ravel(), np.full(3, 1e12)]),
-                (np.concatenate([rows.ravel(), anchor]), np.concatenate([columns.ravel(), anchor])),
-            ),
-            shape=(size, size),
-        )
+        # The first pose is held where it is.
+        at = tuple(np.concatenate([part.ravel(), inner]) for part in (rows, columns))
+        entries = np.concatenate([values.ravel(), np.full(3, 1e12)])
+        matrix = csc_matrix((entries, at), shape=(3 * self._count, 3 * self._count))
         options = {"SymmetricMode": True}
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 

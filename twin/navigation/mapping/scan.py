@@ -66,6 +66,22 @@ class Scan:
 
 
 @jit
+def _gap(points: Array, i: int, j: int) -> float:
+    return math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1])
+
+
+@jit
+def _last_neighbour(points: Array, i: int, way: int, limit: float, reach: float) -> int:
+    """Return the last of up to 12 points beside point `i`, `way` 1 or -1, that a line may go through."""
+    last = i
+    while 0 <= last + way < points.shape[0] and abs(last - i) < 12:
+        if _gap(points, last + way, last) > limit or (last != i and _gap(points, last, i) > reach):
+            break
+        last += way
+    return last
+
+
+@jit
 def _lines(
     points: Array, ranges: Array, spacing: float, tolerance: float, reach: float
 ) -> tuple[NDArray[np.bool_], Array, Array]:
@@ -76,35 +92,14 @@ def _lines(
     half = np.zeros(n)
     kept = -1
     for i in range(n):
-        if kept < 0 or math.hypot(points[i, 0] - points[kept, 0], points[i, 1] - points[kept, 1]) >= spacing:
+        if kept < 0 or _gap(points, i, kept) >= spacing:
             keep[i] = True
             kept = i
         else:
             continue
         # Far points, seen at a slant, have far neighbours: a corridor's walls give the heading.
         limit = max(reach, 0.06 * ranges[i])
-        low, high = i, i
-        while low > 0 and i - low < 12:
-            if math.hypot(points[low - 1, 0] - points[low, 0], points[low - 1, 1] - points[low, 1]) > limit:
-                break
-            if (
-                i - low >= 1
-                and math.hypot(points[low, 0] - points[i, 0], points[low, 1] - points[i, 1]) > reach
-            ):
-                break
-            low -= 1
-        while high < n - 1 and high - i < 12:
-            if (
-                math.hypot(points[high + 1, 0] - points[high, 0], points[high + 1, 1] - points[high, 1])
-                > limit
-            ):
-                break
-            if (
-                high - i >= 1
-                and math.hypot(points[high, 0] - points[i, 0], points[high, 1] - points[i, 1]) > reach
-            ):
-                break
-            high += 1
+        low, high = _last_neighbour(points, i, -1, limit, reach), _last_neighbour(points, i, 1, limit, reach)
         count = high - low + 1
         if count < 3:
             continue
@@ -130,6 +125,5 @@ def _lines(
             nx, ny = -nx, -ny
         normals[i, 0] = nx
         normals[i, 1] = ny
-        span = math.hypot(points[high, 0] - points[low, 0], points[high, 1] - points[low, 1])
-        half[i] = min(0.5 * span, 0.6)
+        half[i] = min(0.5 * _gap(points, high, low), 0.6)
     return keep, normals, half

@@ -88,20 +88,15 @@ class ScanMap:
 
     def _grow(self, cells: NDArray[np.int64]) -> None:
         low, high = cells.min(axis=0), cells.max(axis=0) + 1
-        height, width = self._hits.shape
-        old_high = self._low + np.array([width, height])
-        if np.all(low >= self._low) and np.all(high <= old_high):
-            return
-        empty = self._hits.size == 1
-        new_low = np.where(low < self._low, low - MARGIN, self._low) if not empty else low - MARGIN
-        new_high = np.where(high > old_high, high + MARGIN, old_high) if not empty else high + MARGIN
-        size = (new_high - new_low)[::-1]
-        hits, passes = np.zeros(size, dtype=np.int32), np.zeros(size, dtype=np.int32)
-        if not empty:
-            column, row = self._low - new_low
-            hits[row : row + height, column : column + width] = self._hits
-            passes[row : row + height, column : column + width] = self._passes
-        self._hits, self._passes, self._low = hits, passes, new_low
+        if self._hits.size == 1:  # nothing is drawn yet: begin beside what is
+            self._low = low + 1
+        old_high = self._low + self._hits.shape[::-1]
+        below = np.where(low < self._low, self._low - low + MARGIN, 0)
+        above = np.where(high > old_high, high - old_high + MARGIN, 0)
+        if below.any() or above.any():
+            margins = np.column_stack([below, above])[::-1]
+            self._hits, self._passes = np.pad(self._hits, margins), np.pad(self._passes, margins)
+            self._low = self._low - below
 
 
 @jit

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.files.writing import replaced
 from twin.geometry import Array, Pose2
-from twin.navigation.mapping.config import Mode, SlamConfig
+from twin.navigation.mapping.config import Mode
+from twin.navigation.mapping.config import SlamConfig as SlamConfig
 from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
 from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
@@ -23,10 +26,36 @@ from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
 from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
-from twin.navigation.mapping.updates import GraphView, SlamUpdate
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
-__all__ = ["GraphView", "Slam", "SlamConfig", "SlamUpdate"]
+
+@dataclass(frozen=True, kw_only=True)
+class SlamUpdate:
+    """Where the robot is, after a scan was taken."""
+
+    pose: Pose2
+    """Of the base in the map frame."""
+    covariance: Array
+    """Of x, y, yaw in the map frame, shape (3, 3)."""
+    T_map_odom: Pose2
+    """What to publish as the transform map -> odom."""
+    loop_closed: bool
+    """Whether the whole graph has moved."""
+    node: int
+    """Of the scan in the graph; in localization mode the nearest node of the graph."""
+    response: float
+    """Part of the scan's points that lie on what was seen before, 0..1; 0 if only odometry was believed."""
+
+
+class GraphView(NamedTuple):
+    """The graph, to be shown."""
+
+    poses: Array
+    """Of the nodes in the map frame: x [m], y [m], yaw [rad], shape (n, 3)."""
+    edges: NDArray[np.int64]
+    """Pairs of nodes, shape (m, 2)."""
+    loops: NDArray[np.bool_]
+    """Which edges close loops, shape (m,)."""
 
 
 class Slam:
@@ -115,16 +144,7 @@ class Slam:
 
     def to_bytes(self) -> bytes:
         """Return the pose graph with its scans and the parameters."""
-        return pack(
-            SavedGraph(
-                config=self.config,
-                graph=self._mapped.graph,
-                scans=self._mapped.scans,
-                stamps_ns=self._mapped.stamps_ns,
-                steps=self._closer.steps,
-                covariance=self.covariance,
-            )
-        )
+        return pack(SavedGraph(self._mapped, self._closer.steps, self.covariance))
 
     def save(self, path: str | Path) -> None:
         """Write the pose graph with its scans and the parameters to a file.
@@ -146,47 +166,28 @@ class Slam:
         start: Pose2 | None = None,
         config: SlamConfig | None = None,
     ) -> Slam:
-        """Go on with a saved pose graph; see `from_bytes`.
+        """Go on with a saved pose graph.
+
+        Args:
+            path: What `save` has written.
+            mode: "mapping" adds to the graph, "localization" leaves it as it is.
+            start: About where the robot is in the map frame; None: where the first scan was taken.
+            config: Other parameters than the saved ones.
 
         Raises:
             MapError: the file cannot be read, or is not a saved pose graph.
         """
         try:
-            data = read_bytes(Path(path))
+            saved = unpack(read_bytes(Path(path)), str(path))
         except OSError as fault:
-            raise MapError(
-                f"{path}: {fault.strerror or fault}; valid is a file that SLAM has saved"
-            ) from None
-        return Slam.from_bytes(data, mode=mode, start=start, config=config, name=str(path))
-
-    @staticmethod
-    def from_bytes(
-        data: bytes,
-        *,
-        mode: Mode = "mapping",
-        start: Pose2 | None = None,
-        config: SlamConfig | None = None,
-        name: str = "pose graph",
-    ) -> Slam:
-        """Go on with a saved pose graph.
-
-        Args:
-            data: What `to_bytes` has returned.
-            mode: "mapping" adds to the graph, "localization" leaves it as it is.
-            start: About where the robot is in the map frame; None: where the first scan was taken.
-            config: Other parameters than the saved ones.
-            name: What an error calls the data.
-
-        Raises:
-            MapError: the data are not those of a saved pose graph.
-        """
-        saved = unpack(data, name)
-        slam = Slam(config or saved.config)
+            reason = fault.strerror or fault
+            raise MapError(f"{path}: {reason}; valid is a file that SLAM has saved") from None
+        slam, graph = Slam(config or saved.mapped.config), saved.mapped.graph
         slam.mode = mode
-        slam._mapped = MappedScans(slam.config, saved.graph, saved.scans, saved.stamps_ns)
+        slam._mapped, slam._mapped.config = saved.mapped, slam.config
         slam._closer.steps = saved.steps
-        slam._loops.accepted = sum(edge.loop for edge in saved.graph.edges)
-        slam.start_at(start or saved.graph.pose(0))
+        slam._loops.accepted = sum(edge.loop for edge in graph.edges)
+        slam.start_at(start or graph.pose(0))
         return slam
 
     def start_at(self, pose: Pose2) -> None:
@@ -219,20 +220,15 @@ class Slam:
 
     def graph(self) -> GraphView:
         """Return nodes and edges."""
-        edges = self._mapped.graph.edges
-        return GraphView(
-            poses=self._mapped.graph.poses.copy(),
-            edges=np.array([(edge.first, edge.second) for edge in edges], dtype=np.int64).reshape(-1, 2),
-            loops=np.array([edge.loop for edge in edges], dtype=np.bool_),
-        )
+        graph = self._mapped.graph
+        first, second, *_, loops = graph.arrays()
+        return GraphView(poses=graph.poses.copy(), edges=np.column_stack([first, second]), loops=loops)
 
     def _has_moved(self, odom: Pose2) -> bool:
         assert self._odom is not None
         step = self._odom.inverse() @ odom
-        return (
-            math.hypot(step.x, step.y) >= self.config.minimum_travel_distance
-            or abs(step.yaw) >= self.config.minimum_travel_heading
-        )
+        driven = math.hypot(step.x, step.y) >= self.config.minimum_travel_distance
+        return driven or abs(step.yaw) >= self.config.minimum_travel_heading
 
     def _scan(self, ranges: ArrayLike, angles: ArrayLike, T_base_lidar: Pose2) -> Scan:
         low, high = self.config.min_laser_range, self.config.max_laser_range

@@ -6,7 +6,8 @@ import io
 import json
 import zipfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +15,17 @@ from numpy.typing import NDArray
 from twin.errors import MapError
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
+from twin.navigation.mapping.mapped_scans import MappedScans
 from twin.navigation.mapping.pose_graph import Edge, PoseGraph
 from twin.navigation.mapping.scan import Scan
 
 FORMAT = "twin pose graph 1"
 
 
-@dataclass(frozen=True, kw_only=True)
-class SavedGraph:
+class SavedGraph(NamedTuple):
     """What a file holds."""
 
-    config: SlamConfig
-    graph: PoseGraph
-    scans: list[Scan]
-    stamps_ns: list[int]
-    """When each scan was taken."""
+    mapped: MappedScans
     steps: list[Array]
     """Covariance of each node in the frame of the one before, shape (3, 3)."""
     covariance: Array
@@ -37,21 +34,22 @@ class SavedGraph:
 
 def pack(saved: SavedGraph) -> bytes:
     """Return a graph as bytes; the same graph gives the same bytes."""
-    edges = saved.graph.edges
+    mapped, scans = saved.mapped, saved.mapped.scans
+    first, second, poses, information, loops = mapped.graph.arrays()
     arrays: dict[str, NDArray[np.generic]] = {
-        "header": np.array(json.dumps({"format": FORMAT, "config": asdict(saved.config)})),
-        "poses": saved.graph.poses,
-        "stamps_ns": np.array(saved.stamps_ns, dtype=np.int64),
+        "header": np.array(json.dumps({"format": FORMAT, "config": asdict(mapped.config)})),
+        "poses": mapped.graph.poses,
+        "stamps_ns": np.array(mapped.stamps_ns, dtype=np.int64),
         "steps": np.array(saved.steps).reshape(-1, 3, 3),
         "covariance": saved.covariance,
-        "edge_nodes": np.array([(edge.first, edge.second) for edge in edges], np.int64).reshape(-1, 2),
-        "edge_poses": np.array([edge.pose for edge in edges], np.float64).reshape(-1, 3),
-        "edge_information": np.array([edge.information for edge in edges]).reshape(-1, 3, 3),
-        "edge_loops": np.array([edge.loop for edge in edges], dtype=np.bool_),
-        "sensors": np.array([scan.sensor for scan in saved.scans], np.float64).reshape(-1, 3),
-        "beams": np.array([len(scan.ranges) for scan in saved.scans], np.int64),
-        "ranges": np.concatenate([np.zeros(0), *(scan.ranges for scan in saved.scans)]),
-        "angles": np.concatenate([np.zeros(0), *(scan.angles for scan in saved.scans)]),
+        "edge_nodes": np.column_stack([first, second]),
+        "edge_poses": poses,
+        "edge_information": information,
+        "edge_loops": loops,
+        "sensors": np.array([scan.sensor for scan in scans], np.float64).reshape(-1, 3),
+        "beams": np.array([len(scan.ranges) for scan in scans], np.int64),
+        "ranges": np.concatenate([np.zeros(0), *(scan.ranges for scan in scans)]),
+        "angles": np.concatenate([np.zeros(0), *(scan.angles for scan in scans)]),
     }
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]  # numpy's stub takes **kwds for its flag
@@ -79,37 +77,33 @@ def _unpacked(config: SlamConfig, arrays: dict[str, NDArray[np.generic]]) -> Sav
     graph = PoseGraph()
     for pose in _rows(arrays["poses"]):
         graph.add_node(pose)
-    for nodes, pose, information, loop in zip(
+    for (first, second), pose, information, loop in zip(
         np.asarray(arrays["edge_nodes"], np.int64).tolist(),
         _rows(arrays["edge_poses"]),
         np.asarray(arrays["edge_information"], np.float64),
         arrays["edge_loops"].tolist(),
         strict=True,
     ):
-        first, second = nodes
-        if not 0 <= min(nodes) <= max(nodes) < len(graph):
+        if not (0 <= first < len(graph) and 0 <= second < len(graph)):
             raise ValueError(f"edge {first}-{second}")
-        graph.add_edge(Edge(first=first, second=second, pose=pose, information=information, loop=bool(loop)))
+        edge = Edge(first=first, second=second, pose=pose, information=information, loop=bool(loop))
+        graph.edges.append(edge)
     ends = np.cumsum(np.asarray(arrays["beams"], np.int64))[:-1]
     ranges = np.split(np.asarray(arrays["ranges"], np.float64), ends)
     angles = np.split(np.asarray(arrays["angles"], np.float64), ends)
     sensors = _rows(arrays["sensors"])
-    scans = [_scan(config, *parts) for parts in zip(ranges, angles, sensors, strict=True)]
+    low, high = config.min_laser_range, config.max_laser_range
+    scans = [
+        Scan.from_ranges(*parts, min_range=low, max_range=high)
+        for parts in zip(ranges, angles, sensors, strict=True)
+    ]
     if len({len(scans), len(graph), len(arrays["stamps_ns"]), len(arrays["steps"])}) != 1 or not scans:
         raise ValueError("numbers of nodes differ")
+    stamps_ns = np.asarray(arrays["stamps_ns"], np.int64).tolist()
     return SavedGraph(
-        config=config,
-        graph=graph,
-        scans=scans,
-        stamps_ns=np.asarray(arrays["stamps_ns"], np.int64).tolist(),
+        mapped=MappedScans(config, graph, scans, stamps_ns),
         steps=list(np.asarray(arrays["steps"], np.float64)),
         covariance=np.asarray(arrays["covariance"], np.float64).reshape(3, 3),
-    )
-
-
-def _scan(config: SlamConfig, ranges: Array, angles: Array, sensor: Pose2) -> Scan:
-    return Scan.from_ranges(
-        ranges, angles, sensor, min_range=config.min_laser_range, max_range=config.max_laser_range
     )
 
 

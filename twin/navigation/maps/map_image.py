@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 
 from twin.errors import MapError, Problem
 from twin.files.reading import read_bytes
+
+_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)*+(\d++)")
+"""Of a PGM: white space and comments stand between numbers."""
 
 
 def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
@@ -30,9 +34,8 @@ def read_image(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
         with Image.open(io.BytesIO(content)) as image:
             has_alpha = "A" in image.getbands() or "transparency" in image.info
             if image.mode.startswith(("I", "F")):  # 16 bits per pixel, which pillow does not scale by itself
-                return np.rint(np.clip(np.asarray(image, dtype=np.float64), 0, 65535) / 257.0).astype(
-                    np.uint8
-                ), None
+                levels = np.clip(np.asarray(image, dtype=np.float64), 0, 65535)
+                return np.rint(levels / 257.0).astype(np.uint8), None
             rgba = np.asarray(image.convert("RGBA"))
     except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
         raise MapError(Problem("the file is not an image; valid is PGM, PNG or BMP", path)) from error
@@ -84,22 +87,9 @@ def _read_pgm(path: Path, content: bytes) -> NDArray[np.uint8]:
 
 
 def _read_header(path: Path, content: bytes) -> tuple[tuple[int, int, int], int]:
-    fields: list[int] = []
-    i = 2
-    while len(fields) < 3 and i < len(content):
-        if content[i : i + 1].isspace():
-            i += 1
-        elif content[i : i + 1] == b"#":
-            end = content.find(b"\n", i)
-            i = len(content) if end < 0 else end + 1
-        else:
-            start = i
-            while i < len(content) and content[i : i + 1].isdigit():
-                i += 1
-            if start == i:
-                break
-            fields.append(int(content[start:i]))
-    if len(fields) < 3 or fields[0] < 1 or fields[1] < 1 or not 1 <= fields[2] <= 65535:
+    found = _HEADER.match(content)
+    width, height, maxval = map(int, found.groups()) if found else (0, 0, 0)
+    if found is None or width < 1 or height < 1 or not 1 <= maxval <= 65535:
         message = "the PGM header is broken; valid is P5 or P2, width, height and maxval (1..65535)"
         raise MapError(Problem(message, path))
-    return (fields[0], fields[1], fields[2]), i + 1
+    return (width, height, maxval), found.end() + 1

@@ -78,20 +78,18 @@ def save_map(occupancy: OccupancyMap, path: Path, parameters: SaveParameters | N
     gray, alpha = _pixels(occupancy.data[::-1], parameters)
     if image.suffix != ".png":
         alpha = None
-    thresholds = _decimal(parameters.occupied_thresh), _decimal(parameters.free_thresh)
+    occupied, free = _decimal(parameters.occupied_thresh), _decimal(parameters.free_thresh)
     if parameters.mode == "trinary":
-        thresholds = _TRINARY_THRESHOLDS
+        occupied, free = _TRINARY_THRESHOLDS
     x, y, yaw = occupancy.origin
     lines = (
         f"image: {image.name}",
         f"mode: {parameters.mode}",
         f"resolution: {_decimal(_shortest(occupancy.resolution))}",
-        f"origin: [{_decimal(x)}, {_decimal(y)}, {yaw!r}]"
-        if yaw
-        else f"origin: [{_decimal(x)}, {_decimal(y)}, 0]",
+        f"origin: [{_decimal(x)}, {_decimal(y)}, {yaw or 0!r}]",
         "negate: 0",
-        f"occupied_thresh: {thresholds[0]}",
-        f"free_thresh: {thresholds[1]}",
+        f"occupied_thresh: {occupied}",
+        f"free_thresh: {free}",
     )
     try:
         with replaced(image) as new:

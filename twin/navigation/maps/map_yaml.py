@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import yaml
 
@@ -18,7 +18,7 @@ from twin.geometry import Pose2
 Mode = Literal["trinary", "scale", "raw"]
 
 REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
-MODES: tuple[Mode, ...] = ("trinary", "scale", "raw")
+MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,27 +59,16 @@ class _MetadataReader:
                 close = difflib.get_close_matches(key, self.values, n=1, cutoff=0.7)
                 hint = f"; did you mean it by '{close[0]}'?" if close else ""
                 self._report(f"the key '{key}' is missing{hint}", close[0] if close else None)
-        image = self._get("image", self._image)
-        resolution = self._get("resolution", lambda v: _number(v, above=0.0))
-        origin = self._get("origin", _origin)
-        negate = self._get("negate", _flag)
-        occupied = self._get("occupied_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
-        free = self._get("free_thresh", lambda v: _number(v, at_least=0.0, at_most=1.0))
-        mode: Any = self._get("mode", _mode) if "mode" in self.values else "trinary"
+        self.values.setdefault("mode", "trinary")
+        readers = {"image": self._image, **_READERS}
+        found = {key: self._get(key, convert) for key, convert in readers.items()}
+        occupied, free = found["occupied_thresh"], found["free_thresh"]
         if occupied is not None and free is not None and free > occupied:
             message = f"is {free}; valid is at most occupied_thresh ({occupied})"
             self._report(message, "free_thresh", name=True)
         if self.problems:
             raise MapError(self.problems)
-        return MapMetadata(
-            image=image,
-            resolution=resolution,
-            origin=origin,
-            negate=negate,
-            occupied_thresh=occupied,
-            free_thresh=free,
-            mode=mode,
-        )
+        return MapMetadata(**found)
 
     def _parse(self) -> None:
         try:
@@ -96,9 +85,8 @@ class _MetadataReader:
             line = mark.line + 1 if mark else None
             raise MapError(Problem(f"the file is not YAML: {reason}", self.path, line)) from error
         if not isinstance(root, yaml.MappingNode):
-            raise MapError(
-                Problem(f"the file holds no keys; valid keys: {', '.join(REQUIRED)}", self.path, 1)
-            )
+            message = f"the file holds no keys; valid keys: {', '.join(REQUIRED)}"
+            raise MapError(Problem(message, self.path, 1))
         for key_node, _ in root.value:
             key, line = str(key_node.value), key_node.start_mark.line + 1
             if key in self.lines:
@@ -161,3 +149,17 @@ def _mode(value: Any) -> str:
     if value not in MODES:
         raise ValueError(f"is {value!r}; valid is one of {', '.join(MODES)}")
     return str(value)
+
+
+def _share(value: Any) -> float:
+    return _number(value, at_least=0.0, at_most=1.0)
+
+
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "resolution": lambda value: _number(value, above=0.0),
+    "origin": _origin,
+    "negate": _flag,
+    "occupied_thresh": _share,
+    "free_thresh": _share,
+    "mode": _mode,
+}

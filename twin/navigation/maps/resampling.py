@@ -32,9 +32,8 @@ def resampled(occupancy: OccupancyMap, resolution: float) -> OccupancyMap:
             f"resolution {resolution:g}; valid is a positive number of metres up to {LARGEST_CELL:g}"
         )
     ratio = resolution / occupancy.resolution
-    if (
-        occupancy.width * occupancy.height > MOST_CELLS * ratio**2
-    ):  # and not a ratio, of which the square is 0
+    # Compared as a product: the square of a ratio may be 0.
+    if occupancy.width * occupancy.height > MOST_CELLS * ratio**2:
         raise MapError(
             f"resolution {resolution:g} m makes more than {MOST_CELLS} cells; valid is a coarser one"
         )

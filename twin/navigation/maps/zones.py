@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import MapError
-from twin.geometry import Array, Pose2
+from twin.geometry import Array
 from twin.navigation.maps.map_saver import LOSSLESS_SCALE, SaveParameters
 from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, OccupancyMap
 
@@ -61,15 +60,15 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> Array:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=np.float64)
 
 
-def circle(x: float, y: float, radius: float, *, corners: int = 64) -> Array:
-    """Return a polygon, shape (corners, 2) [m], about a circle.
+def circle(x: float, y: float, radius: float) -> Array:
+    """Return a polygon, shape (64, 2) [m], about a circle.
 
     Raises:
         MapError: the radius is not positive.
     """
     if not radius > 0.0:
         raise MapError(f"a zone's radius is {radius:g} m; valid is a positive number")
-    angles = np.arange(corners) * (2.0 * math.pi / corners)
+    angles = np.arange(64) * (2.0 * math.pi / 64)
     return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
 
 
@@ -78,13 +77,8 @@ def same_cells(a: OccupancyMap, b: OccupancyMap) -> bool:
     return (
         a.data.shape == b.data.shape
         and math.isclose(a.resolution, b.resolution, rel_tol=1e-6)
-        and _close(a.origin, b.origin)
+        and np.allclose(a.origin, b.origin, rtol=1e-9, atol=1e-6)
     )
-
-
-def _close(a: Pose2, b: Pose2) -> bool:
-    pairs: Sequence[tuple[float, float]] = list(zip(a, b, strict=True))
-    return all(math.isclose(p, q, abs_tol=1e-6) for p, q in pairs)
 
 
 def _inside(mask: OccupancyMap, corners: Array) -> NDArray[np.bool_]:

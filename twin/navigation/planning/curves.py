@@ -67,9 +67,8 @@ def _dubins(kind: int, x: float, y: float, phi: float) -> tuple[bool, float, flo
         return True, t, radius, _forward(phi - t)
     if radius > 4.0 + _ZERO:
         return False, 0.0, 0.0, 0.0
-    back = 2.0 * math.asin(
-        min(1.0, 0.25 * radius)
-    )  # left, right, left: round the far side of the middle circle
+    # left, right, left: round the far side of the middle circle
+    back = 2.0 * math.asin(min(1.0, 0.25 * radius))
     t = _forward(theta - 0.5 * back + math.pi)
     return True, t, 2.0 * math.pi - back, _forward(phi - t - back)
 

@@ -91,10 +91,8 @@ class GoalAccess:
         """Whether somebody who is seen, and not on the map, is too near for the robot to turn there."""
         around = self._around(costmap, goal, self._turning_radius)
         # A wall is seen a cell beside where the map has it.
-        seen = (costmap.costs[around] == LETHAL_OBSTACLE) & (
-            known.costs[around] < INSCRIBED_INFLATED_OBSTACLE
-        )
-        rows, columns = np.nonzero(seen)
+        unmapped = known.costs[around] < INSCRIBED_INFLATED_OBSTACLE
+        rows, columns = np.nonzero((costmap.costs[around] == LETHAL_OBSTACLE) & unmapped)
         corner = np.array([around[1].start, around[0].start])
         away = costmap.cell_to_world(np.column_stack([columns, rows]) + corner) - goal[:2]
         return bool((np.hypot(away[:, 0], away[:, 1]) < self._turning_radius).any())

@@ -18,7 +18,7 @@ class GridSearch:
     """
 
     def __init__(self) -> None:
-        self._shape = (0, 0)
+        self._shape: tuple[int, ...] = ()
         self._generation = 0
         self._start = 0
         self.expanded = 0
@@ -45,7 +45,10 @@ class GridSearch:
             slack: If not 0, go on in all directions up to so many times the cost of the goal.
         """
         if costs.shape != self._shape or self._generation == _LAST_GENERATION:
-            self._reserve(costs.shape)
+            self._shape, self._generation = costs.shape, 0
+            self._g = np.empty(costs.size)
+            self._mark = np.zeros(costs.size, dtype=np.int32)
+            self._parent = np.empty(costs.size, dtype=np.int32)
         self._generation += 1
         self._start = start
         self.expanded = search(
@@ -79,11 +82,3 @@ class GridSearch:
     def path(self, cell: int) -> Ints:
         """Return the way to a cell that was reached: its cells (A*) or corners (Theta*), shape (n,)."""
         return trace(self._parent, self._start, cell)
-
-    def _reserve(self, shape: tuple[int, ...]) -> None:
-        self._shape = (shape[0], shape[1])
-        size = shape[0] * shape[1]
-        self._generation = 0
-        self._g = np.empty(size)
-        self._mark = np.zeros(size, dtype=np.int32)
-        self._parent = np.empty(size, dtype=np.int32)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
@@ -19,11 +17,12 @@ from twin.navigation.costmaps.costmap import (
 )
 from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
 from twin.navigation.planning.config import HybridConfig
-from twin.navigation.planning.curves import advance
+from twin.navigation.planning.curves import Turns, advance
 from twin.navigation.planning.grid_search import GridSearch
 from twin.navigation.planning.hybrid_kernel import (
     FOUND,
     OUT_OF_NODES,
+    Drive,
     Ints,
     curve_cost,
     expand,
@@ -33,20 +32,6 @@ from twin.navigation.planning.planner import GlobalPlanner, check_inside
 
 _SLACK = 1.3
 """The cost to the goal is known for cells of so many times the start's; the others cost more."""
-
-
-@dataclass(frozen=True)
-class _Frame:
-    """The problem in cells, as the kernels take it."""
-
-    costmap: Costmap
-    corners: Array
-    radius: float
-    clear_below: int
-
-    def pose(self, pose: Pose2) -> Array:
-        x, y, resolution = self.costmap.frame
-        return np.array([(pose.x - x) / resolution, (pose.y - y) / resolution, pose.yaw])
 
 
 class HybridPlanner(GlobalPlanner):
@@ -76,62 +61,47 @@ class HybridPlanner(GlobalPlanner):
             PlanningTimeout: none was found within `max_iterations`.
         """
         check_inside(costmap, start, goal)
-        frame = self._frame(costmap)
-        first = frame.pose(start)
-        if not self._is_free(frame, first):
+        drive, first = self._drive(costmap), _in_cells(costmap, start)
+        if pose_cost(drive, *first.tolist()) < 0:
             raise StartOccupied(f"the robot collides at the start ({start.x:.2f}, {start.y:.2f})")
-        last = frame.pose(self._reachable(frame, goal))
-        anchors, moves, g = self._expanded(frame, first, last)
-        pieces = self._pieces(frame, anchors, moves, g)
-        poses = _driven(first, pieces, frame.radius)
+        last = _in_cells(costmap, self._reachable(drive, costmap, goal))
+        anchors, moves, g = self._expanded(drive, costmap.resolution, first, last)
+        pieces = self._pieces(drive, anchors, moves, g)
+        poses = _driven(first, pieces, drive.radius)
         poses[-1] = last
         x, y, resolution = costmap.frame
         poses[:, :2] = poses[:, :2] * resolution + (x, y)
         poses[:, 2] = (poses[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
         return poses
 
-    @property
-    def _reverse(self) -> bool:
-        return self.config.motion_model_for_search == "REEDS_SHEPP"
-
-    @property
-    def _penalties(self) -> Array:
-        config = self.config
-        return np.array(
-            [
-                config.cost_penalty,
-                config.non_straight_penalty,
-                config.change_penalty,
-                config.reverse_penalty,
-            ]
-        )
-
-    def _frame(self, costmap: Costmap) -> _Frame:
-        corners = self.footprint
+    def _drive(self, costmap: Costmap) -> Drive:
+        config, corners = self.config, self.footprint
         reach = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+        reach += costmap.resolution  # for costs are those of the cells' centres
         clear_below = 0
         if self.inflation_radius >= reach:
-            # One cell more, for costs are those of the cells' centres.
             cost = inflation_costs(
-                reach + costmap.resolution,
+                reach,
                 inscribed_radius=costmap.inscribed_radius,
                 inflation_radius=math.inf,
                 cost_scaling_factor=costmap.cost_scaling_factor,
             )
-            within = self.inflation_radius >= reach + costmap.resolution
-            clear_below = int(cost) if within else 0
-        radius = max(self.config.minimum_turning_radius / costmap.resolution, 1.0)
-        return _Frame(costmap, corners / costmap.resolution, radius, clear_below)
+            clear_below = int(cost)
+        turning = (config.non_straight_penalty, config.change_penalty)
+        return Drive(
+            costs=costmap.costs,
+            corners=corners / costmap.resolution,
+            radius=max(config.minimum_turning_radius / costmap.resolution, 1.0),
+            reverse=config.motion_model_for_search == "REEDS_SHEPP",
+            clear_below=clear_below,
+            allow_unknown=config.allow_unknown,
+            penalties=np.array([config.cost_penalty, *turning, config.reverse_penalty]),
+        )
 
-    def _is_free(self, frame: _Frame, pose: Array) -> bool:
-        costs, unknown = frame.costmap.costs, self.config.allow_unknown
-        x, y, yaw = map(float, pose)
-        return pose_cost(costs, frame.corners, x, y, yaw, frame.clear_below, unknown) >= 0
-
-    def _reachable(self, frame: _Frame, goal: Pose2) -> Pose2:
+    def _reachable(self, drive: Drive, costmap: Costmap, goal: Pose2) -> Pose2:
         """Return the goal, or the nearest pose of its heading at a cell's centre where the robot fits."""
-        costmap, tolerance = frame.costmap, self.config.tolerance
-        if self._is_free(frame, frame.pose(goal)):
+        tolerance = self.config.tolerance
+        if pose_cost(drive, *_in_cells(costmap, goal).tolist()) >= 0:
             return goal
         r = math.ceil(tolerance / costmap.resolution)
         column, row = costmap.world_to_cell(goal.x, goal.y)
@@ -140,37 +110,32 @@ class HybridPlanner(GlobalPlanner):
         away = np.hypot(*(centres - (goal.x, goal.y)).T)
         for i in np.argsort(away, kind="stable"):
             near = Pose2(float(centres[i, 0]), float(centres[i, 1]), goal.yaw)
-            if away[i] <= tolerance and self._is_free(frame, frame.pose(near)):
+            if away[i] <= tolerance and pose_cost(drive, *_in_cells(costmap, near).tolist()) >= 0:
                 return near
         message = f"the robot fits nowhere within {tolerance:g} m of the goal"
         raise GoalOccupied(f"{message} ({goal.x:.2f}, {goal.y:.2f})")
 
-    def _expanded(self, frame: _Frame, first: Array, last: Array) -> tuple[Array, Ints, Array]:
+    def _expanded(
+        self, drive: Drive, resolution: float, first: Array, last: Array
+    ) -> tuple[Array, Ints, Array]:
         """Return the nodes of the way: poses, moves into them, costs."""
-        config, costs, price = self.config, frame.costmap.costs, self._prices()
-        width = costs.shape[1]
+        config, width = self.config, drive.costs.shape[1]
         here, there = (math.floor(pose[1]) * width + math.floor(pose[0]) for pose in (first, last))
-        if not self._search.run(costs, price, there, here, slack=_SLACK):
+        if not self._search.run(drive.costs, self._prices(), there, here, slack=_SLACK):
             raise NoValidPath("start and goal are not connected")
         bins = config.angle_quantization_bins
         # A move leaves its cell, and turns by a whole number of bins (nav2_smac_planner, node_hybrid.cpp).
-        turn = 2.0 * math.asin(min(1.0, math.sqrt(2.0) / (2.0 * frame.radius)))
+        turn = 2.0 * math.asin(min(1.0, math.sqrt(2.0) / (2.0 * drive.radius)))
         arc = max(1, math.ceil(turn / (2.0 * math.pi / bins))) * 2.0 * math.pi / bins
-        longest = max(config.analytic_expansion_max_length / frame.costmap.resolution, 4.0 * frame.radius)
+        longest = max(config.analytic_expansion_max_length / resolution, 4.0 * drive.radius)
         outcome, node, poses, g, parent, move = expand(
-            costs,
-            frame.corners,
+            drive,
             first,
             last,
             *self._search.field,
             _SLACK * self._search.cost(here),
             bins,
             arc,
-            frame.radius,
-            self._reverse,
-            frame.clear_below,
-            config.allow_unknown,
-            self._penalties,
             float(config.analytic_expansion_ratio),
             longest,
             config.max_iterations,
@@ -194,7 +159,7 @@ class HybridPlanner(GlobalPlanner):
         price[:, NO_INFORMATION] = 1.0 + config.cost_penalty if config.allow_unknown else math.inf
         return price
 
-    def _pieces(self, frame: _Frame, anchors: Array, moves: Ints, g: Array) -> list[tuple[int, float]]:
+    def _pieces(self, drive: Drive, anchors: Array, moves: Ints, g: Array) -> list[tuple[int, float]]:
         """Return the path as turns and lengths [radii], with cheaper curves in place of parts if smoothed."""
         pieces: list[tuple[int, float]] = []
         i, count = 0, len(anchors) - 1
@@ -204,12 +169,12 @@ class HybridPlanner(GlobalPlanner):
             j = i + 1
             for ahead in _aheads(count - i) if self.config.smooth_path else ():
                 saved = float(g[i + ahead] - g[i]) - 1e-6
-                cost, curve = self._curve(frame, anchors[i], anchors[i + ahead], last)
+                cost, curve = _curve(drive, anchors[i], anchors[i + ahead], last)
                 if cost < saved:
                     j, found = i + ahead, curve
                     break
             if not found and moves[j] == 6:
-                found = self._curve(frame, anchors[i], anchors[j], last)[1]
+                found = _curve(drive, anchors[i], anchors[j], last)[1]
             elif not found:
                 found = [(int(moves[j]) % 3 - 1, self._arc if moves[j] < 3 else -self._arc)]
             pieces += found
@@ -218,28 +183,21 @@ class HybridPlanner(GlobalPlanner):
             i = j
         return pieces
 
-    def _curve(
-        self, frame: _Frame, start: Array, goal: Array, last: tuple[int, int]
-    ) -> tuple[float, list[tuple[int, float]]]:
-        """Return the cost [cells] and the pieces of the shortest curve between two poses."""
-        turns: NDArray[np.int64] = np.zeros(5, np.int64)
-        lengths = np.zeros(5)
-        cost, _, count = curve_cost(
-            frame.costmap.costs,
-            frame.corners,
-            start,
-            goal,
-            frame.radius,
-            self._reverse,
-            frame.clear_below,
-            self.config.allow_unknown,
-            self._penalties,
-            *last,
-            turns,
-            lengths,
-        )
-        drawn = zip(turns[:count].tolist(), lengths[:count].tolist(), strict=True)
-        return cost, [(turn, length) for turn, length in drawn if abs(length) > 1e-9]
+
+def _in_cells(costmap: Costmap, pose: Pose2) -> Array:
+    x, y, resolution = costmap.frame
+    return np.array([(pose.x - x) / resolution, (pose.y - y) / resolution, pose.yaw])
+
+
+def _curve(
+    drive: Drive, start: Array, goal: Array, last: tuple[int, int]
+) -> tuple[float, list[tuple[int, float]]]:
+    """Return the cost [cells] and the pieces of the shortest curve between two poses."""
+    turns: Turns = np.zeros(5, np.int64)
+    lengths = np.zeros(5)
+    cost, _, count = curve_cost(drive, start, goal, *last, turns, lengths)
+    drawn = zip(turns[:count].tolist(), lengths[:count].tolist(), strict=True)
+    return cost, [(turn, length) for turn, length in drawn if abs(length) > 1e-9]
 
 
 def _aheads(most: int) -> list[int]:
@@ -252,11 +210,9 @@ def _aheads(most: int) -> list[int]:
 
 def _driven(first: Array, pieces: list[tuple[int, float]], radius: float) -> Array:
     """Return the poses along pieces, shape (n, 3), at most a cell apart."""
-    poses = [(float(first[0]), float(first[1]), float(first[2]))]
+    poses = [tuple(first.tolist())]
     for turn, length in pieces:
         count = max(1, math.ceil(abs(length) * radius))
         x, y, yaw = poses[-1]
         poses += [advance(x, y, yaw, turn, length * i / count, radius) for i in range(1, count + 1)]
-    if len(poses) == 1:
-        poses.append(poses[0])
-    return np.array(poses)
+    return np.array(poses if len(poses) > 1 else 2 * poses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from twin.geometry import Array
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.kernels import outline_cost
-from twin.navigation.planning.curves import advance, shortest_curve
+from twin.navigation.planning.curves import Turns, advance, shortest_curve
 
 Ints = NDArray[np.int32]
-Cells = NDArray[np.uint8]
 
 _MORE = 1000
 """Poses that are expanded after a first way is found, to find a better one."""
@@ -22,104 +21,86 @@ _MORE = 1000
 FOUND, UNREACHABLE, OUT_OF_NODES = 0, 1, 2
 
 
-@jit
-def pose_cost(
-    costs: Cells, corners: Array, x: float, y: float, yaw: float, clear_below: int, allow_unknown: bool
-) -> int:
-    """Return the cost under the centre of a pose, -1 if the robot collides there.
+class Drive(NamedTuple):
+    """What drives where; all in cells."""
 
-    Args:
-        costs: Of the grid, shape (h, w); poses are in cells.
-        corners: Of the footprint, shape (n, 2) [cells]; a single one leaves it to the inscribed zone.
-        x: Column.
-        y: Row.
-        yaw: Heading [rad].
-        clear_below: A centre of less cost has no obstacle within reach of the footprint.
-        allow_unknown: Whether the footprint may lie on unknown cells.
-    """
+    costs: NDArray[np.uint8]
+    """Of the grid, shape (h, w)."""
+    corners: Array
+    """Of the footprint, shape (n, 2); a single one leaves it to the inscribed zone."""
+    radius: float
+    """Of the tightest turn."""
+    reverse: bool
+    """Whether moves and the curve to the goal may go backwards."""
+    clear_below: int
+    """A centre of less cost has no obstacle within reach of the footprint."""
+    allow_unknown: bool
+    """Whether the footprint may lie on unknown cells."""
+    penalties: Array
+    """Of costs, of turning, of turning otherwise, of reversing, shape (4,)."""
+
+
+@jit
+def pose_cost(drive: Drive, x: float, y: float, yaw: float) -> int:
+    """Return the cost under the centre of a pose: column, row, heading [rad]; -1 if the robot collides."""
+    costs = drive.costs
     column, row = math.floor(x), math.floor(y)
     if column < 0 or row < 0 or column >= costs.shape[1] or row >= costs.shape[0]:
         return -1
     cost = int(costs[row, column])
     if cost == 255:
-        if not allow_unknown:
+        if not drive.allow_unknown:
             return -1
         cost = 252
     elif cost >= 253:
         return -1
-    if cost < clear_below or corners.shape[0] < 2:
+    if cost < drive.clear_below or drive.corners.shape[0] < 2:
         return cost
-    worst = outline_cost(costs, corners, x, y, yaw, 0.0, 0.0, 1.0)
-    if worst == 254 or (worst == 255 and not allow_unknown):
+    worst = outline_cost(costs, drive.corners, x, y, yaw, 0.0, 0.0, 1.0)
+    if worst == 254 or (worst == 255 and not drive.allow_unknown):
         return -1
     return cost
 
 
 @jit
-def piece_cost(
-    costs: Cells,
-    corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    turn: int,
-    length: float,
-    radius: float,
-    clear_below: int,
-    allow_unknown: bool,
-    cost_penalty: float,
-) -> float:
+def piece_cost(drive: Drive, x: float, y: float, yaw: float, turn: int, length: float) -> float:
     """Return the length [cells] of a piece weighted by the costs under it; inf if it collides.
 
     Poses are tested at most a cell apart, the first one not.
     """
-    distance = abs(length) * radius
+    distance = abs(length) * drive.radius
     count = max(1, math.ceil(distance))
     total = 0.0
     for i in range(1, count + 1):
-        px, py, pyaw = advance(x, y, yaw, turn, length * i / count, radius)
-        cost = pose_cost(costs, corners, px, py, pyaw, clear_below, allow_unknown)
+        px, py, pyaw = advance(x, y, yaw, turn, length * i / count, drive.radius)
+        cost = pose_cost(drive, px, py, pyaw)
         if cost < 0:
             return math.inf
-        total += 1.0 + cost_penalty * cost / 252.0
+        total += 1.0 + drive.penalties[0] * cost / 252.0
     return total * distance / count
 
 
 @jit
 def curve_cost(
-    costs: Cells,
-    corners: Array,
-    start: Array,
-    goal: Array,
-    radius: float,
-    reverse: bool,
-    clear_below: int,
-    allow_unknown: bool,
-    penalties: Array,
-    last_turn: int,
-    last_way: int,
-    turns: NDArray[np.int64],
-    lengths: Array,
+    drive: Drive, start: Array, goal: Array, last_turn: int, last_way: int, turns: Turns, lengths: Array
 ) -> tuple[float, float, int]:
     """Return the cost and length [cells] of the shortest curve between two poses, and its count of pieces."""
+    radius = drive.radius
     dx, dy = (goal[0] - start[0]) / radius, (goal[1] - start[1]) / radius
     c, s = math.cos(start[2]), math.sin(start[2])
-    shortest, count = shortest_curve(
-        c * dx + s * dy, c * dy - s * dx, goal[2] - start[2], reverse, turns, lengths
-    )
+    px, py, turned = c * dx + s * dy, c * dy - s * dx, goal[2] - start[2]
+    shortest, count = shortest_curve(px, py, turned, drive.reverse, turns, lengths)
     x, y, yaw = start[0], start[1], start[2]
     total = 0.0
     for i in range(count):
         if lengths[i] == 0.0:
             continue
         turn, length = turns[i], lengths[i]
-        cost = piece_cost(
-            costs, corners, x, y, yaw, turn, length, radius, clear_below, allow_unknown, penalties[0]
-        )
+        cost = piece_cost(drive, x, y, yaw, turn, length)
         if cost == math.inf:
             return math.inf, shortest * radius, count
         way = 1 if length > 0.0 else -1
-        total += cost * move_factor(turn, way, last_turn, last_way, penalties)
+        total += cost * move_factor(turn, way, last_turn, last_way, drive.penalties)
         last_turn, last_way = turn, way
         x, y, yaw = advance(x, y, yaw, turn, length, radius)
     return total, shortest * radius, count
@@ -194,28 +175,21 @@ def _rehashed(table: Ints, bin_of: NDArray[np.int64]) -> Ints:
 
 @jit
 def _curve_length(
-    x: float,
-    y: float,
-    yaw: float,
-    goal: Array,
-    radius: float,
-    reverse: bool,
-    turns: NDArray[np.int64],
-    lengths: Array,
+    drive: Drive, x: float, y: float, yaw: float, goal: Array, turns: Turns, lengths: Array
 ) -> float:
     """Return the length [cells] of the shortest curve to the goal; 0 where that hardly tells anything."""
-    dx, dy = (goal[0] - x) / radius, (goal[1] - y) / radius
+    dx, dy = (goal[0] - x) / drive.radius, (goal[1] - y) / drive.radius
     if dx * dx + dy * dy >= 100.0:  # so far away the turns at both ends hardly matter
         return 0.0
     c, s = math.cos(yaw), math.sin(yaw)
-    shortest, _ = shortest_curve(c * dx + s * dy, c * dy - s * dx, goal[2] - yaw, reverse, turns, lengths)
-    return shortest * radius
+    px, py, turned = c * dx + s * dy, c * dy - s * dx, goal[2] - yaw
+    shortest, _ = shortest_curve(px, py, turned, drive.reverse, turns, lengths)
+    return shortest * drive.radius
 
 
 @jit
 def expand(
-    costs: Cells,
-    corners: Array,
+    drive: Drive,
     start: Array,
     goal: Array,
     to_go: Array,
@@ -224,11 +198,6 @@ def expand(
     beyond: float,
     bins: int,
     arc: float,
-    radius: float,
-    reverse: bool,
-    clear_below: int,
-    allow_unknown: bool,
-    penalties: Array,
     expansion_ratio: float,
     expansion_length: float,
     most: int,
@@ -236,8 +205,7 @@ def expand(
     """Search from a pose to a pose; all in cells.
 
     Args:
-        costs: Of the grid, shape (h, w).
-        corners: Of the footprint, shape (n, 2).
+        drive: What drives where.
         start: x, y, yaw.
         goal: x, y, yaw.
         to_go: Cost from each cell to the goal, shape (h * w,); known where `to_go_mark` is the generation.
@@ -246,11 +214,6 @@ def expand(
         beyond: Cost to the goal from the cells where it is not known, at least.
         bins: Headings that are told apart.
         arc: Of a move, in turning radii.
-        radius: Of the tightest turn.
-        reverse: Whether moves and the curve to the goal may go backwards.
-        clear_below: See `pose_cost`.
-        allow_unknown: See `pose_cost`.
-        penalties: Of costs, of turning, of turning otherwise, of reversing.
         expansion_ratio: The curve to the goal is tried the more often the larger, and the nearer the goal.
         expansion_length: It is no longer than this.
         most: Poses to expand at most.
@@ -259,7 +222,7 @@ def expand(
         An outcome, the last node, and per node its pose (n, 3), its cost, the one before and its move: turn
         + 1, plus 3 backwards; 6 for the curve to the goal.
     """
-    height, width = costs.shape
+    height, width = drive.costs.shape
     capacity = 1024
     poses, g = np.empty((capacity, 3)), np.empty(capacity)
     parent, move = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
@@ -297,21 +260,7 @@ def expand(
                 if until_curve > 0 or away > expansion_length:
                     continue
                 until_curve = max(1, int(away / expansion_ratio))
-                cost, length, _ = curve_cost(
-                    costs,
-                    corners,
-                    poses[node],
-                    goal,
-                    radius,
-                    reverse,
-                    clear_below,
-                    allow_unknown,
-                    penalties,
-                    last_turn,
-                    last_way,
-                    turns,
-                    lengths,
-                )
+                cost, length, _ = curve_cost(drive, poses[node], goal, last_turn, last_way, turns, lengths)
                 if cost == math.inf or length > expansion_length or g[node] + cost >= best_g:
                     continue
                 best, best_g = nodes, g[node] + cost
@@ -319,10 +268,10 @@ def expand(
                 new_x, new_y, new_yaw, left = goal[0], goal[1], goal[2], 0.0
                 code = np.int64(-1 - node)
             else:
-                if option >= 3 and not reverse:
+                if option >= 3 and not drive.reverse:
                     continue
                 turn, way = option % 3 - 1, 1 if option < 3 else -1
-                new_x, new_y, new_yaw = advance(x, y, yaw, turn, way * arc, radius)
+                new_x, new_y, new_yaw = advance(x, y, yaw, turn, way * arc, drive.radius)
                 column, row = math.floor(new_x), math.floor(new_y)
                 if column < 0 or row < 0 or column >= width or row >= height:
                     continue
@@ -332,35 +281,25 @@ def expand(
                 known = table[slot]
                 if known >= 0 and closed[known]:
                     continue
-                cost = piece_cost(
-                    costs,
-                    corners,
-                    x,
-                    y,
-                    yaw,
-                    turn,
-                    way * arc,
-                    radius,
-                    clear_below,
-                    allow_unknown,
-                    penalties[0],
-                )
+                cost = piece_cost(drive, x, y, yaw, turn, way * arc)
                 if cost == math.inf:
                     continue
-                cost *= move_factor(turn, way, last_turn, last_way, penalties)
+                cost *= move_factor(turn, way, last_turn, last_way, drive.penalties)
                 if known >= 0 and g[known] <= g[node] + cost:
                     continue
                 flat = row * width + column
                 left = to_go[flat] if to_go_mark[flat] == to_go_generation else beyond
-                curve = _curve_length(new_x, new_y, new_yaw, goal, radius, reverse, turns, lengths)
-                left = max(left, curve)
+                left = max(left, _curve_length(drive, new_x, new_y, new_yaw, goal, turns, lengths))
             if nodes == capacity or waiting == capacity:
-                more = 2 * capacity
-                poses, g = _longer2(poses, more), _longer(g, more)
-                parent, move, items = _longer(parent, more), _longer(move, more), _longer(items, more)
-                bin_of, keys, closed = _longer(bin_of, more), _longer(keys, more), _longer(closed, more)
+                poses, g, parent, move = _doubled(poses), _doubled(g), _doubled(parent), _doubled(move)
+                items, bin_of, keys, closed = (
+                    _doubled(items),
+                    _doubled(bin_of),
+                    _doubled(keys),
+                    _doubled(closed),
+                )
                 closed[capacity:] = False
-                capacity = more
+                capacity *= 2
             # A pose reached better becomes a node of its own: what came from the worse one keeps its way.
             fresh = nodes
             nodes += 1
@@ -379,14 +318,6 @@ def expand(
 
 
 @jit
-def _longer(values: Any, size: int) -> Any:
-    more = np.empty(size, values.dtype)
-    more[: values.shape[0]] = values
-    return more
-
-
-@jit
-def _longer2(values: Array, size: int) -> Array:
-    more = np.empty((size, values.shape[1]))
-    more[: values.shape[0]] = values
-    return more
+def _doubled(values: Any) -> Any:
+    """Return an array with as many rows more, whose values are arbitrary."""
+    return np.concatenate((values, np.empty_like(values)))

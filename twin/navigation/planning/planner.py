@@ -18,13 +18,7 @@ from twin.navigation.costmaps.costmap import (
     NO_INFORMATION,
     Costmap,
 )
-from twin.navigation.failures import (
-    GoalOccupied,
-    GoalOutsideMap,
-    NoValidPath,
-    StartOccupied,
-    StartOutsideMap,
-)
+from twin.navigation.failures import GoalOccupied, GoalOutsideMap, NoValidPath, StartOccupied, StartOutsideMap
 from twin.navigation.planning.config import PlannerConfig, ThetaStarConfig
 from twin.navigation.planning.grid_search import GridSearch
 

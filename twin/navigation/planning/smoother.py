@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -37,31 +36,44 @@ class Smoother(Configured, ABC):
         """
 
 
-class SimpleSmoother(Smoother):
-    """Smooths a path; no point moves into the inscribed zone, an obstacle, or dearer unknown space."""
+class _PieceWise(Smoother):
+    """Smooths the pieces between cusps one by one."""
 
-    Config: ClassVar = SmootherConfig
+    LEAST: ClassVar[int]
+    """Paths of fewer poses stay as they are."""
 
     def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
         """Return the path, smoother; see `Smoother.smooth`."""
-        if len(path) < 3:
-            return path.copy()
-        return _smoothed(path, lambda points: self._relaxed(points, costmap))
+        result = np.array(path, dtype=np.float64)
+        if len(path) < self.LEAST:
+            return result
+        for first, last, backwards in one_way_pieces(path):
+            rows = slice(first, last + 1)
+            result[rows] = with_headings(self.smooth_piece(np.ascontiguousarray(result[rows, :2]), costmap))
+            if backwards:
+                result[rows, 2] = wrap_angles(result[rows, 2] + math.pi)
+        result[-1, 2] = path[-1, 2]
+        return result
 
-    def _relaxed(self, points: Array, costmap: Costmap | None) -> Array:
+    @abstractmethod
+    def smooth_piece(self, points: Array, costmap: Costmap | None) -> Array:
+        """Return the points of a piece, shape (n, 2), smoother."""
+
+
+class SimpleSmoother(_PieceWise):
+    """Smooths a path; no point moves into the inscribed zone, an obstacle, or dearer unknown space."""
+
+    Config: ClassVar = SmootherConfig
+    LEAST = 3
+
+    def smooth_piece(self, points: Array, costmap: Costmap | None) -> Array:
+        """Pull points at each other, again and again."""
         config = self.config
         costs = np.zeros((0, 0), dtype=np.uint8) if costmap is None else costmap.costs
         frame = (0.0, 0.0, 1.0) if costmap is None else costmap.frame
         for _ in range(1 + config.refinement_num):
-            points = _relax(
-                points,
-                costs,
-                config.w_data,
-                config.w_smooth,
-                config.tolerance,
-                config.max_its,
-                *frame,
-            )
+            weights = (config.w_data, config.w_smooth)
+            points = _relax(points, costs, *weights, config.tolerance, config.max_its, *frame)
         return points
 
 
@@ -69,30 +81,21 @@ _WINDOW = np.array([-2.0, 3.0, 6.0, 7.0, 6.0, 3.0, -2.0]) / 21.0
 """Value in the middle of the parabola through seven points (Savitzky and Golay 1964)."""
 
 
-class SavitzkyGolaySmoother(Smoother):
+class SavitzkyGolaySmoother(_PieceWise):
     """Takes the noise out of a path and keeps its shape; points that would run into an obstacle stay."""
 
     Config: ClassVar = SavitzkyGolayConfig
+    LEAST = len(_WINDOW)
 
-    def smooth(self, path: Array, costmap: Costmap | None = None) -> Array:
-        """Return the path, smoother; see `Smoother.smooth`."""
-        if len(path) < len(_WINDOW):
-            return path.copy()
-        return _smoothed(path, lambda points: self._filtered(points, costmap))
-
-    def _filtered(self, points: Array, costmap: Costmap | None) -> Array:
+    def smooth_piece(self, points: Array, costmap: Costmap | None) -> Array:
+        """Put each point on the parabola through its neighbours."""
         half = len(_WINDOW) // 2
         if len(points) <= 2 * half:
             return points
         for _ in range(1 + self.config.refinement_num * self.config.do_refinement):
             # Beyond the ends the path goes on mirrored at them, so that the ends stay.
-            padded = np.concatenate(
-                [
-                    2.0 * points[0] - points[half:0:-1],
-                    points,
-                    2.0 * points[-1] - points[-2 : -half - 2 : -1],
-                ]
-            )
+            before, behind = points[half:0:-1], points[-2 : -half - 2 : -1]
+            padded = np.concatenate([2.0 * points[0] - before, points, 2.0 * points[-1] - behind])
             moved = np.column_stack([np.convolve(column, _WINDOW, mode="valid") for column in padded.T])
             moved[0], moved[-1] = points[0], points[-1]
             if costmap is not None:
@@ -106,18 +109,6 @@ class SavitzkyGolaySmoother(Smoother):
 def _cost_from(costmap: Costmap, x: float, y: float) -> int:
     """Return the cost that a point at (x, y) [m] may keep: off the map, where nothing is known, none."""
     return costmap.cost_at(x, y) if costmap.contains(x, y) else FREE_SPACE
-
-
-def _smoothed(path: Array, smooth: Callable[[Array], Array]) -> Array:
-    """Return a path, shape (n, 3), whose pieces between cusps are smoothed: points of shape (m, 2)."""
-    result = np.array(path, dtype=np.float64)
-    for first, last, backwards in one_way_pieces(path):
-        rows = slice(first, last + 1)
-        result[rows] = with_headings(smooth(np.ascontiguousarray(result[rows, :2])))
-        if backwards:
-            result[rows, 2] = wrap_angles(result[rows, 2] + math.pi)
-    result[-1, 2] = path[-1, 2]
-    return result
 
 
 @jit
@@ -139,12 +130,10 @@ def _relax(
         change = 0.0
         for i in range(1, points.shape[0] - 1):
             x, y = result[i, 0], result[i, 1]
-            new_x = (
-                x + w_data * (points[i, 0] - x) + w_smooth * (result[i - 1, 0] + result[i + 1, 0] - 2.0 * x)
-            )
-            new_y = (
-                y + w_data * (points[i, 1] - y) + w_smooth * (result[i - 1, 1] + result[i + 1, 1] - 2.0 * y)
-            )
+            bend_x = result[i - 1, 0] + result[i + 1, 0] - 2.0 * x
+            bend_y = result[i - 1, 1] + result[i + 1, 1] - 2.0 * y
+            new_x = x + w_data * (points[i, 0] - x) + w_smooth * bend_x
+            new_y = y + w_data * (points[i, 1] - y) + w_smooth * bend_y
             if height > 0:
                 column = math.floor((new_x - origin_x) / resolution)
                 row = math.floor((new_y - origin_y) / resolution)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from twin.bridge.bus import Bus
-from twin.nodes.missions.mission_node import MissionNode
+from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 
 
 class ExploreMissionNode(MissionNode):
     """Tells what `/explore` does as the mission's state, and ends with it."""
 
-    def __init__(
-        self, bus: Bus, explorer: ExplorerNode, *, period_ns: int = 100_000_000, namespace: str = ""
-    ) -> None:
+    def __init__(self, bus: Bus, explorer: ExplorerNode, *, namespace: str = "") -> None:
         super().__init__(bus, namespace=namespace)
         self._explorer = explorer
-        self.node.create_timer(period_ns, self._update)
+        self.node.create_timer(PERIOD_NS, self._update)
 
     def _update(self) -> None:
         if self.done:

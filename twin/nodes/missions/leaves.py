@@ -107,10 +107,8 @@ class CallAction(MissionLeaf):
         if not self._goal.done:
             return Status.RUNNING
         if not self._goal.succeeded:
-            text = getattr(self._goal.result, "error_msg", "") or getattr(
-                self._goal.result, "error_string", ""
-            )
-            return self.fail(text or f"{self._client.name} was aborted")
+            texts = (getattr(self._goal.result, name, "") for name in ("error_msg", "error_string"))
+            return self.fail(next(filter(None, texts), f"{self._client.name} was aborted"))
         reason = self._on_result(self._goal.result) if self._on_result else None
         return Status.SUCCESS if reason is None else self.fail(reason)
 
@@ -159,25 +157,21 @@ class CallService(MissionLeaf):
 class Condition(MissionLeaf):
     """Succeeds while `test` holds."""
 
+    OTHERWISE = Status.FAILURE
+
     def __init__(self, name: str, test: Callable[[], bool]) -> None:
         super().__init__(name)
         self._test = test
 
     def update(self) -> Status:
         """Ask."""
-        return Status.SUCCESS if self._test() else Status.FAILURE
+        return Status.SUCCESS if self._test() else self.OTHERWISE
 
 
-class WaitUntil(MissionLeaf):
+class WaitUntil(Condition):
     """Runs until `test` holds."""
 
-    def __init__(self, name: str, test: Callable[[], bool]) -> None:
-        super().__init__(name)
-        self._test = test
-
-    def update(self) -> Status:
-        """Ask."""
-        return Status.SUCCESS if self._test() else Status.RUNNING
+    OTHERWISE = Status.RUNNING
 
 
 class Do(MissionLeaf):

@@ -7,6 +7,9 @@ from twin.bridge.msgs import String
 from twin.bridge.qos import LATCHED
 from twin.navigation.behavior_trees.node import Status, TreeNode
 
+PERIOD_NS = 100_000_000
+"""Of missions that need no other [ns]."""
+
 
 class MissionNode:
     """`/mission`: publishes `mission/state`, and knows whether the mission is over and how it ended.

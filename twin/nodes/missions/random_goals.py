@@ -15,7 +15,7 @@ from twin.bridge.qos import LATCHED
 from twin.geometry import Array, Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.messages import pose_stamped
-from twin.nodes.missions.mission_node import MissionNode
+from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
 from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -31,7 +31,6 @@ class RandomGoalsNode(MissionNode):
         config: RandomGoalsConfig,
         *,
         seed: int,
-        period_ns: int = 100_000_000,
         namespace: str = "",
     ) -> None:
         super().__init__(bus, namespace=namespace)
@@ -57,7 +56,7 @@ class RandomGoalsNode(MissionNode):
         self._navigate = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
         self.node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
         self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
-        self.node.create_timer(period_ns, self._tick)
+        self.node.create_timer(PERIOD_NS, self._tick)
 
     def _on_map(self, message: OccupancyGrid) -> None:
         self._map = occupancy_map(message)

@@ -14,8 +14,11 @@ from twin.bridge.msgs import Twist
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.missions.leaves import CallAction, Do, WaitUntil, sequence
-from twin.nodes.missions.mission_node import MissionNode
+from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
 from twin.periods import next_due
+
+_SETTLE_NS = 1_000_000_000
+"""After the last velocity, until the robot stands [ns]."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +39,7 @@ class ActionStep:
 class ActionSequenceNode(MissionNode):
     """Calls actions one after the other; the first that fails ends the mission."""
 
-    def __init__(
-        self, bus: Bus, steps: Sequence[ActionStep], *, period_ns: int = 100_000_000, namespace: str = ""
-    ) -> None:
+    def __init__(self, bus: Bus, steps: Sequence[ActionStep], *, namespace: str = "") -> None:
         super().__init__(bus, namespace=namespace)
         clients: dict[str, ActionClient] = {}
         leaves: list[TreeNode] = []
@@ -48,10 +49,8 @@ class ActionSequenceNode(MissionNode):
             leaves.append(Do(f"State[{step.label}]", partial(self.enter, step.label)))
             if step.ready is not None:
                 leaves.append(WaitUntil(f"Ready[{step.label}]", step.ready))
-            leaves += [
-                CallAction(step.name, clients[step.name], step.goal, on_failure=self.note),
-            ]
-        self.run(sequence("Behaviors", leaves), period_ns)
+            leaves.append(CallAction(step.name, clients[step.name], step.goal, on_failure=self.note))
+        self.run(sequence("Behaviors", leaves), PERIOD_NS)
 
 
 class VelocityProfileNode(MissionNode):
@@ -66,8 +65,6 @@ class VelocityProfileNode(MissionNode):
         steps: Sequence[tuple[float, float, float]],
         *,
         control_period_ns: int = 20_000_000,
-        period_ns: int = 100_000_000,
-        settle_ns: int = 1_000_000_000,
         namespace: str = "",
     ) -> None:
         super().__init__(bus, namespace=namespace)
@@ -76,9 +73,7 @@ class VelocityProfileNode(MissionNode):
         for duration, linear, angular in steps:
             end += round(duration * 1e9)
             self._ends.append((end, linear, angular))
-        self._settle_ns = settle_ns
-        self._period_ns = period_ns
-        self._start = self._due_ns = next_due(period_ns, self.node.now_ns)
+        self._start = self._due_ns = next_due(PERIOD_NS, self.node.now_ns)
         self._step = -1
         self._commands = self.node.create_publisher(Twist, "cmd_vel", 10)
         self.node.create_timer(control_period_ns, self._update)
@@ -92,10 +87,10 @@ class VelocityProfileNode(MissionNode):
         begins = step != self._step
         if not begins and now < self._due_ns:
             return
-        self._due_ns, self._step = next_due(self._period_ns, now), step
+        self._due_ns, self._step = next_due(PERIOD_NS, now), step
         if step == len(self._ends):
             self._commands.publish(twist_from_planar(0.0, 0.0))
-            if elapsed >= self._ends[-1][0] + self._settle_ns:
+            if elapsed >= self._ends[-1][0] + _SETTLE_NS:
                 self.finish(succeeded=True)
             return
         _, linear, angular = self._ends[step]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from twin.bridge.actions import ClientGoal
@@ -10,7 +10,7 @@ from twin.bridge.msgs import GoalStatus
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import NodeSetup, Status, TreeNode
 from twin.navigation.behavior_trees.ports import inputs, outputs
-from twin.nodes.navigation.behavior_trees.context import NavigatorContext
+from twin.nodes.navigation.behavior_trees.context import NavigatorContext, fill, seconds
 
 ACTION_PORTS = inputs(server_name="string", server_timeout="unsigned")
 ERROR_PORTS = outputs(error_code_id="unsigned", error_msg="string")
@@ -23,6 +23,24 @@ class NavigatorNode(TreeNode):
     """A node that needs what the navigator has."""
 
     context: NavigatorContext
+    FIELDS: ClassVar[Mapping[str, str]] = {}
+    """Port -> field of the message that is sent or comes back, where their names differ."""
+
+    def filled(self, cls: type, **values: Any) -> Any:
+        """Return a message with these values, and those of the ports for which it has fields."""
+        given: dict[str, Any] = {}
+        for port in self.PORTS:
+            value = None if port.is_output else self.get(port.name)
+            if value is not None:
+                name = self.FIELDS.get(port.name, port.name)
+                given[name] = seconds(value) if port.type == "seconds" else value
+        return fill(cls, **{**given, **values})
+
+    def is_late(self, since_ns: int) -> bool:
+        """Whether a server, asked at a time [ns], should have answered by now."""
+        timeout = self.get("server_timeout")
+        timeout_ns = self.context.server_timeout_ns if timeout is None else timeout * 1_000_000
+        return bool(self.context.now_ns() - since_ns > timeout_ns)
 
     def count_recovery(self) -> None:
         """Count one more recovery, as Nav2 counts them for its feedback."""
@@ -36,27 +54,28 @@ class ActionNode(NavigatorNode):
     ACTION: ClassVar[ActionType]
     SERVER: ClassVar[str]
     """Name of the action, unless `server_name` gives another."""
-    RESULTS: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Field of the result -> output port, set after success."""
+
+    _sent: ClientGoal | None = None
+    _sent_ns = 0
 
     def __init__(self, setup: NodeSetup) -> None:
         super().__init__(setup)
         self._client = self.context.action_client(self.ACTION, self.get("server_name") or self.SERVER)
-        self._sent: ClientGoal | None = None
-        self._sent_ns = 0
 
-    @abstractmethod
-    def make_goal(self) -> Any | None:
-        """Return the goal; None if there is nothing to do, and the node fails."""
+    def make_goal(self, **values: Any) -> Any | None:
+        """Return the goal, of the ports and of values; None if there is nothing to do, and the node fails."""
+        return self.filled(self.ACTION.Goal, **values)
 
     def updated_goal(self) -> Any | None:
         """Return a goal to go on with instead, while the last one is being executed."""
         return None
 
     def on_success(self, result: Any) -> Status:
-        """Write the outputs."""
-        for field, port in self.RESULTS:
-            self.put(port, getattr(result, field, None))
+        """Write the outputs that the result has fields for."""
+        for port in self.PORTS:
+            field = self.FIELDS.get(port.name, port.name)
+            if port.is_output and hasattr(result, field):
+                self.put(port.name, getattr(result, field))
         self._put_error(0, "")
         return Status.SUCCESS
 
@@ -84,14 +103,9 @@ class ActionNode(NavigatorNode):
         if sent is None:
             return Status.FAILURE
         if sent.accepted is None:
-            timeout = self.get("server_timeout")
-            timeout_ns = self.context.server_timeout_ns if timeout is None else timeout * 1_000_000
-            late = self.context.now_ns() - self._sent_ns > timeout_ns
-            return (
-                self._fail(SEND_GOAL_FAILURE, f"{self._client.name} does not answer")
-                if late
-                else Status.RUNNING
-            )
+            if self.is_late(self._sent_ns):
+                return self._fail(SEND_GOAL_FAILURE, f"{self._client.name} does not answer")
+            return Status.RUNNING
         if not sent.done:
             following = self.updated_goal()
             if following is not None:

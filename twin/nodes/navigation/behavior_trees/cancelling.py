@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from twin.bridge import action_types
 from twin.bridge.services import Future
 from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import NodeSetup, Status
 from twin.navigation.behavior_trees.ports import Port
-from twin.nodes.navigation.behavior_trees.action_node import ACTION_PORTS, NavigatorNode
+from twin.nodes.navigation.behavior_trees import actions
+from twin.nodes.navigation.behavior_trees.action_node import ACTION_PORTS, ActionNode, NavigatorNode
 
 
 class CancelNode(NavigatorNode):
@@ -18,11 +18,11 @@ class CancelNode(NavigatorNode):
     ACTION: ClassVar[ActionType]
     SERVER: ClassVar[str]
     PORTS: ClassVar[tuple[Port, ...]] = ACTION_PORTS
+    _asked: Future | None = None
 
     def __init__(self, setup: NodeSetup) -> None:
         super().__init__(setup)
         self._client = self.context.action_client(self.ACTION, self.get("server_name") or self.SERVER)
-        self._asked: Future | None = None
 
     def tick(self) -> Status:
         """Ask, and wait for the answer."""
@@ -39,22 +39,22 @@ class CancelNode(NavigatorNode):
         self._asked = None
 
 
-def _cancel(name: str, action: ActionType, server: str) -> type[CancelNode]:
-    doc = f"Cancels `{server}`."
-    return type(name, (CancelNode,), {"ACTION": action, "SERVER": server, "__doc__": doc})
+def _cancel(name: str, of: type[ActionNode]) -> type[CancelNode]:
+    doc = f"Cancels `{of.SERVER}`."
+    return type(name, (CancelNode,), {"ACTION": of.ACTION, "SERVER": of.SERVER, "__doc__": doc})
 
 
 CANCEL_NODES = {
-    name: _cancel(name, action, server)
-    for name, action, server in (
-        ("CancelControl", action_types.FollowPath, "follow_path"),
-        ("CancelBackUp", action_types.BackUp, "backup"),
-        ("CancelSpin", action_types.Spin, "spin"),
-        ("CancelWait", action_types.Wait, "wait"),
-        ("CancelDriveOnHeading", action_types.DriveOnHeading, "drive_on_heading"),
-        ("CancelAssistedTeleop", action_types.AssistedTeleop, "assisted_teleop"),
-        ("CancelDock", action_types.DockRobot, "dock_robot"),
-        ("CancelUndock", action_types.UndockRobot, "undock_robot"),
+    name: _cancel(name, of)
+    for name, of in (
+        ("CancelControl", actions.FollowPath),
+        ("CancelBackUp", actions.BackUp),
+        ("CancelSpin", actions.Spin),
+        ("CancelWait", actions.Wait),
+        ("CancelDriveOnHeading", actions.DriveOnHeading),
+        ("CancelAssistedTeleop", actions.AssistedTeleop),
+        ("CancelDock", actions.DockRobot),
+        ("CancelUndock", actions.UndockRobot),
     )
 }
 """By their names in the XML."""

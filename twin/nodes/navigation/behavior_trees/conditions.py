@@ -1,4 +1,4 @@
-"""Nav2's conditions on errors, goals, poses and paths (plugins/condition)."""
+"""Nav2's conditions on errors, goals, poses and paths, and on the robot's state (plugins/condition)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import math
 from typing import Any, ClassVar
 
 from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import Path, new
+from twin.bridge.msgs import BatteryState, Path, new
 from twin.geometry import Pose2
 from twin.navigation.behavior_trees import paths
 from twin.navigation.behavior_trees.node import ConditionNode, NodeSetup
-from twin.navigation.behavior_trees.ports import inputs
+from twin.navigation.behavior_trees.ports import Port, inputs
 from twin.nodes.messages import path_array
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 
-_GOAL = inputs(goal="message", goals="message")
 _FRAMES = inputs(global_frame="string", robot_base_frame="string")
+_BRAKE_LIMIT = -10.0
+"""IsStuck's, fixed in Nav2 too [m/s²]."""
 
 
 class NavigatorCondition(ConditionNode):
@@ -58,33 +59,24 @@ class WouldASmootherRecoveryHelp(AreErrorCodesPresent):
     CODES = (500, 502, 504, 503)
 
 
-class GoalUpdated(NavigatorCondition):
-    """Whether the goal has changed since this node began to be ticked."""
+class GlobalUpdatedGoal(NavigatorCondition):
+    """Whether the goal has changed since the last tick; true at the first one."""
 
-    PORTS = _GOAL
+    PORTS = inputs(goal="message", goals="message")
     _goal: Any = None
 
     def holds(self) -> bool:
         """Compare."""
-        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
-        before, self._goal = self._goal, present
-        return self.status.is_active and before != present
+        before, self._goal = self._goal, (self.get_or_entry("goal"), self.get_or_entry("goals"))
+        return bool(before != self._goal)
 
 
-class GlobalUpdatedGoal(NavigatorCondition):
-    """Whether the goal has changed since the last tick; true at the first one."""
-
-    PORTS = _GOAL
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._goal: Any = None
+class GoalUpdated(GlobalUpdatedGoal):
+    """Whether the goal has changed since this node began to be ticked."""
 
     def holds(self) -> bool:
         """Compare."""
-        present = (self.get_or_entry("goal"), self.get_or_entry("goals"))
-        before, self._goal = self._goal, present
-        return bool(before is None or before != present)
+        return super().holds() and self.status.is_active
 
 
 class GoalReached(NavigatorCondition):
@@ -213,3 +205,74 @@ class IsWithinPathTrackingBounds(NavigatorCondition):
         limit = abs(self.get("max_error_left" if aside >= 0.0 else "max_error_right"))
         turned = abs(feedback.heading_tracking_error)
         return bool(abs(aside) <= limit and turned <= abs(self.get("max_error_heading")))
+
+
+class InitialPoseReceived(NavigatorCondition):
+    """Whether the blackboard says that an initial pose was received."""
+
+    PORTS = inputs(initial_pose_received="bool")
+
+    def holds(self) -> bool:
+        """Look."""
+        return bool(self.get_or_entry("initial_pose_received"))
+
+
+class TransformAvailable(NavigatorCondition):
+    """Whether two frames are connected; once they were, for ever."""
+
+    PORTS = (Port("child", required=True), Port("parent", required=True))
+    _was_found = False
+
+    def holds(self) -> bool:
+        """Look it up."""
+        if not self._was_found:
+            found = self.context.robot_pose.relative(self.get("parent"), self.get("child"))
+            self._was_found = found is not None
+        return self._was_found
+
+
+class _Battery(NavigatorCondition):
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._battery = self.context.latest(BatteryState, self.get("battery_topic"))
+
+
+class IsBatteryLow(_Battery):
+    """Whether the battery's percentage (0 to 1), or voltage, is as low as `min_battery`."""
+
+    PORTS = (
+        Port("min_battery", "double", required=True),
+        *inputs(battery_topic=("string", "battery_status"), is_voltage=("bool", False)),
+    )
+
+    def holds(self) -> bool:
+        """Look; false before the first message."""
+        state = self._battery.message
+        if state is None:
+            return False
+        level = state.voltage if self.get("is_voltage") else state.percentage
+        return bool(level <= self.get("min_battery"))
+
+
+class IsBatteryCharging(_Battery):
+    """Whether the battery is being charged."""
+
+    PORTS = inputs(battery_topic=("string", "battery_status"))
+
+    def holds(self) -> bool:
+        """Look; false before the first message."""
+        state = self._battery.message
+        charging = BatteryState.POWER_SUPPLY_STATUS_CHARGING
+        return state is not None and state.power_supply_status == charging
+
+
+class IsStuck(NavigatorCondition):
+    """Whether the robot has just lost speed as it can only by a bump."""
+
+    def __init__(self, setup: NodeSetup) -> None:
+        super().__init__(setup)
+        self._odometer = self.context.odometer
+
+    def holds(self) -> bool:
+        """Look at odometry."""
+        return self._odometer.acceleration < _BRAKE_LIMIT

@@ -11,7 +11,7 @@ from typing import Any
 
 from twin.bridge.actions import ActionClient
 from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import Odometry, PoseStamped, ns
+from twin.bridge.msgs import Duration, Odometry, PoseStamped, duration, ns
 from twin.bridge.node import Node
 from twin.bridge.qos import SENSOR_DATA, QoS
 from twin.bridge.services import Client
@@ -22,6 +22,9 @@ from twin.navigation.behavior_trees.factory import Registry
 from twin.navigation.behavior_trees.node import TreeContext
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.robot_pose import RobotPose
+
+_LONGEST = 2.0**31 - 1.0
+"""What a Duration message can hold [s]: 68 years."""
 
 
 class Odometer:
@@ -43,10 +46,8 @@ class Odometer:
         """Mean speed [m/s]; 0 before the first odometry."""
         if not self._readings:
             return 0.0
-        count = len(self._readings)
-        return math.hypot(
-            sum(r[1] for r in self._readings) / count, sum(r[2] for r in self._readings) / count
-        )
+        _, xs, ys = zip(*self._readings, strict=True)
+        return math.hypot(sum(xs) / len(xs), sum(ys) / len(ys))
 
     @property
     def acceleration(self) -> float:
@@ -96,7 +97,8 @@ class NavigatorContext(TreeContext):
         """[m]"""
         self.tree_nodes = tree_nodes
         """What trees may be made of."""
-        self._clients: dict[tuple[str, str], ActionClient | Client] = {}
+        self._actions: dict[tuple[str, str], ActionClient] = {}
+        self._services: dict[tuple[str, str], Client] = {}
         self._topics: dict[str, Latest] = {}
 
     @cached_property
@@ -106,19 +108,17 @@ class NavigatorContext(TreeContext):
 
     def action_client(self, type_: ActionType, name: str) -> ActionClient:
         """Return the client of an action."""
-        client = self._clients.get((type_.name, name))
-        if client is None:
-            client = self._clients[type_.name, name] = ActionClient(self.node, type_, name)
-        assert isinstance(client, ActionClient)
-        return client
+        key = type_.name, name
+        if key not in self._actions:
+            self._actions[key] = ActionClient(self.node, type_, name)
+        return self._actions[key]
 
     def service_client(self, type_: ServiceType, name: str) -> Client:
         """Return the client of a service."""
-        client = self._clients.get((type_.name, name))
-        if client is None:
-            client = self._clients[type_.name, name] = self.node.create_client(type_, name)
-        assert isinstance(client, Client)
-        return client
+        key = type_.name, name
+        if key not in self._services:
+            self._services[key] = self.node.create_client(type_, name)
+        return self._services[key]
 
     def latest(self, message_type: type, topic: str, qos: QoS | int = 10) -> Latest:
         """Return what holds the latest message of a topic from now on."""
@@ -148,3 +148,8 @@ def fill(cls: type, **values: Any) -> Any:
     """Return a message; values for fields that this version of it does not have are left out."""
     known = {field.name for field in fields(cls)}
     return new(cls, **{name: value for name, value in values.items() if name in known and value is not None})
+
+
+def seconds(value: float) -> Duration:
+    """Return seconds as a Duration message, the longest there is if they are more."""
+    return duration(round(min(max(value, -_LONGEST), _LONGEST) * 1e9))

@@ -6,7 +6,6 @@ import math
 from typing import ClassVar
 
 from twin.bridge.conversions import pose2_from_pose
-from twin.bridge.msgs import new
 from twin.bridge.services import Future
 from twin.bridge.types import ServiceType
 from twin.navigation.behavior_trees.node import NodeSetup, Status
@@ -16,10 +15,7 @@ from twin.nodes.navigation.behavior_trees.services import SERVICE_PORTS
 
 _GetCost = ServiceType("nav2_msgs/srv/GetCost")
 _NO_INFORMATION = 255
-_STATUSES = (
-    *inputs(input_waypoint_statuses="message"),
-    *outputs(output_waypoint_statuses="message"),
-)
+_STATUSES = inputs(input_waypoint_statuses="message") + outputs(output_waypoint_statuses="message")
 
 
 class RemovePassedGoals(NavigatorNode):
@@ -71,10 +67,8 @@ class RemoveInCollisionGoals(NavigatorNode):
             self.put("output_goals", goals)
             return Status.FAILURE
         if not self._asked:
-            for goal in goals:
-                x, y, yaw = pose2_from_pose(goal.pose)
-                use = self.get("use_footprint")
-                request = new(_GetCost.Request, use_footprint=use, x=x, y=y, theta=yaw)
+            for x, y, yaw in (pose2_from_pose(goal.pose) for goal in goals):
+                request = self.filled(_GetCost.Request, x=x, y=y, theta=yaw)
                 self._asked.append(self._client.call_async(request))
         if not all(future.done for future in self._asked):
             return Status.RUNNING

@@ -12,7 +12,7 @@ from twin.bridge.conversions import pose2_from_pose, quaternion_from_yaw
 from twin.bridge.msgs import Path, new
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.behavior_trees import paths
-from twin.navigation.behavior_trees.node import NodeSetup, Status
+from twin.navigation.behavior_trees.node import Status
 from twin.navigation.behavior_trees.ports import inputs, outputs
 from twin.nodes.messages import path_array, pose_stamped
 from twin.nodes.navigation.behavior_trees.action_node import NavigatorNode
@@ -53,11 +53,8 @@ class TruncatePathLocal(NavigatorNode):
         *inputs(max_robot_pose_search_dist=("limit", math.inf)),
         *outputs(output_path="message"),
     )
-
-    def __init__(self, setup: NodeSetup) -> None:
-        super().__init__(setup)
-        self._path: Any = None
-        self._nearest = 0
+    _path: Any = None
+    _nearest = 0
 
     def tick(self) -> Status:
         """Cut before and behind the pose nearest to the robot."""
@@ -65,14 +62,8 @@ class TruncatePathLocal(NavigatorNode):
         window = self.get("max_robot_pose_search_dist")
         if math.isinf(window) or path is not self._path:
             self._path, self._nearest = path, 0
-        given = self.get("pose")
-        pose = (
-            pose2_from_pose(given.pose)
-            if given is not None
-            else self.context.pose(
-                path.header.frame_id or None, self.get("robot_base_frame") or self.get("robot_frame")
-            )
-        )
+        given, base = self.get("pose"), self.get("robot_base_frame") or self.get("robot_frame")
+        pose = pose2_from_pose(given.pose) if given else self.context.pose(path.header.frame_id or None, base)
         if pose is None:
             return Status.FAILURE
         if not path.poses:

@@ -5,33 +5,31 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from twin.bridge import srvs
-from twin.bridge.msgs import new
 from twin.bridge.services import Future
 from twin.bridge.types import ServiceType
 from twin.navigation.behavior_trees.node import NodeSetup, Status
 from twin.navigation.behavior_trees.ports import Port, inputs, outputs
 from twin.nodes.navigation.behavior_trees.action_node import NavigatorNode
-from twin.nodes.navigation.behavior_trees.context import fill
 
 SERVICE_PORTS = inputs(service_name="string", server_timeout="unsigned")
 
 
-class ServiceNode(NavigatorNode):
+class _Service(NavigatorNode):
     """Calls a service and waits for the answer (Nav2's BtServiceNode)."""
 
     SERVICE: ClassVar[ServiceType]
     NAME: ClassVar[str] = ""
     """Of the service, unless `service_name` gives another."""
+    _asked: Future | None = None
+    _asked_ns = 0
 
     def __init__(self, setup: NodeSetup) -> None:
         super().__init__(setup)
         self._client = self.context.service_client(self.SERVICE, self.get("service_name") or self.NAME)
-        self._asked: Future | None = None
-        self._asked_ns = 0
 
     def make_request(self) -> Any | None:
         """Return the request; None if there is nothing to ask, and the node fails."""
-        return new(self.SERVICE.Request)
+        return self.filled(self.SERVICE.Request)
 
     def on_completion(self, response: Any) -> Status:
         """Judge the answer."""
@@ -46,9 +44,7 @@ class ServiceNode(NavigatorNode):
             self._asked = self._client.call_async(request)
             self._asked_ns = self.context.now_ns()
         if not self._asked.done:
-            timeout = self.get("server_timeout")
-            timeout_ns = self.context.server_timeout_ns if timeout is None else timeout * 1_000_000
-            if self.context.now_ns() - self._asked_ns <= timeout_ns:
+            if not self.is_late(self._asked_ns):
                 return Status.RUNNING
             self._asked.cancel()
         asked, self._asked = self._asked, None
@@ -62,7 +58,7 @@ class ServiceNode(NavigatorNode):
         self._asked = None
 
 
-class _Clear(ServiceNode):
+class _Clear(_Service):
     """Counts as a recovery."""
 
     PORTS = (*SERVICE_PORTS, *inputs(plugins="strings", reset_distance=("double", 1.0), pose="message"))
@@ -70,9 +66,7 @@ class _Clear(ServiceNode):
     def make_request(self) -> Any | None:
         """Return the request with what this service knows of the ports."""
         self.count_recovery()
-        names = ("plugins", "reset_distance", "pose")
-        known = {port.name for port in self.PORTS}
-        return fill(self.SERVICE.Request, **{name: self.get(name) for name in names if name in known})
+        return super().make_request()
 
 
 class ClearEntireCostmap(_Clear):
@@ -102,7 +96,7 @@ class ClearCostmapAroundPose(_Clear):
     SERVICE = ServiceType("nav2_msgs/srv/ClearCostmapAroundPose")
 
 
-class IsPathValid(ServiceNode):
+class IsPathValid(_Service):
     """Succeeds while the rest of a path is free; `ValidatePath` since Nav2 Lyrical."""
 
     SERVICE, NAME = srvs.IsPathValid, "is_path_valid"
@@ -117,8 +111,7 @@ class IsPathValid(ServiceNode):
     def make_request(self) -> Any | None:
         """Return the request, without those ports that this version of the service does not have."""
         self._path = self.get("path")
-        names = (port.name for port in self.PORTS if port not in SERVICE_PORTS and not port.is_output)
-        return fill(self.SERVICE.Request, **{name: self.get(name) for name in names})
+        return super().make_request()
 
     def on_completion(self, response: Any) -> Status:
         """Write the poses in collision, as far as the answer names them."""
@@ -130,19 +123,15 @@ class IsPathValid(ServiceNode):
         return Status.FAILURE
 
 
-class ReinitializeGlobalLocalization(ServiceNode):
+class ReinitializeGlobalLocalization(_Service):
     """Lets localisation look everywhere."""
 
     SERVICE, NAME = srvs.Empty, "reinitialize_global_localization"
     PORTS: ClassVar[tuple[Port, ...]] = SERVICE_PORTS
 
 
-class ToggleCollisionMonitor(ServiceNode):
+class ToggleCollisionMonitor(_Service):
     """Switches the collision monitor."""
 
     SERVICE, NAME = srvs.Toggle, "collision_monitor/toggle"
     PORTS: ClassVar[tuple[Port, ...]] = (*SERVICE_PORTS, *inputs(enable=("bool", True)))
-
-    def make_request(self) -> Any | None:
-        """Return whether it is to be on."""
-        return new(srvs.Toggle.Request, enable=self.get("enable"))

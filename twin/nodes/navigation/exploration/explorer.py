@@ -90,7 +90,8 @@ class ExplorerNode:
         if goal is None or not goal.done:
             return
         self._goal = None
-        self.reason = "" if goal.succeeded else self._why(goal)
+        why = goal.error or getattr(goal.result, "error_msg", "") or "navigation failed"
+        self.reason = "" if goal.succeeded else why
         if self.status == ExploreStatus.RETURNING_TO_ORIGIN:
             self._finish(ExploreStatus.RETURNED_TO_ORIGIN if goal.succeeded else None)
             return
@@ -158,7 +159,3 @@ class ExplorerNode:
         if self._markers.has_subscribers:
             markers = frontier_markers(self.explorer, self._robot_pose.frames.map, self.node.now_ns)
             self._markers.publish(new(MarkerArray, markers=markers))
-
-    @staticmethod
-    def _why(goal: ClientGoal) -> str:
-        return goal.error or getattr(goal.result, "error_msg", "") or "navigation failed"

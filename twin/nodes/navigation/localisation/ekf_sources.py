@@ -92,7 +92,8 @@ class SourceReader:
 
     def _located(self, pose: Pose3, covariance: Array, stamp_ns: int, first: int) -> Iterator[Measurement]:
         """Yield a pose as it is, from the first one on, or as a velocity; from the state `first` on."""
-        source, threshold = self.source, self.source.pose_rejection_threshold
+        source = self.source
+        chosen = [i for i in range(first, 6) if source.config[i]]
         if source.differential:
             before, self._before = self._before, (stamp_ns, pose)
             if before is None or stamp_ns <= before[0]:
@@ -100,15 +101,13 @@ class SourceReader:
             elapsed, step = (stamp_ns - before[0]) * 1e-9, before[1].inverse() @ pose
             R = matrix_from_quat_wxyz(pose.quat_wxyz).T
             values = _vector(step) / elapsed
-            chosen = [i for i in range(first, 6) if source.config[i]]
             spread = _turned(covariance, R) / elapsed
             yield from self._chosen(chosen, 6, values, spread, source.twist_rejection_threshold)
             return
         if source.relative:
             self._first = self._first or pose
             pose = self._first.inverse() @ pose
-        chosen = [i for i in range(first, 6) if source.config[i]]
-        yield from self._chosen(chosen, 0, _vector(pose), covariance, threshold)
+        yield from self._chosen(chosen, 0, _vector(pose), covariance, source.pose_rejection_threshold)
 
     def _twist(self, message: TwistWithCovariance, frame: str) -> Iterator[Measurement]:
         if not any(self.source.config[6:12]) or (T := self._transform(self._base, frame)) is None:
@@ -142,14 +141,10 @@ class SourceReader:
         force = R @ [a.x, a.y, a.z]
         if source.remove_gravitational_acceleration:
             force = force - states.rotation(*attitude).T @ [0.0, 0.0, _GRAVITY]
+        of_rates, of_force = message.angular_velocity_covariance, message.linear_acceleration_covariance
         for first, values, covariance, threshold in (
-            (states.VROLL, R @ rates, message.angular_velocity_covariance, source.twist_rejection_threshold),
-            (
-                states.AX,
-                force,
-                message.linear_acceleration_covariance,
-                source.linear_acceleration_rejection_threshold,
-            ),
+            (states.VROLL, R @ rates, of_rates, source.twist_rejection_threshold),
+            (states.AX, force, of_force, source.linear_acceleration_rejection_threshold),
         ):
             if covariance[0] >= 0.0:
                 chosen = [i for i in range(3) if source.config[first + i]]
@@ -159,9 +154,8 @@ class SourceReader:
         self, chosen: list[int], first: int, values: Array, covariance: Array, threshold: float
     ) -> Iterator[Measurement]:
         if chosen:
-            yield Measurement(
-                [first + i for i in chosen], values[chosen], covariance[np.ix_(chosen, chosen)], threshold
-            )
+            measured = [first + i for i in chosen]
+            yield Measurement(measured, values[chosen], covariance[np.ix_(chosen, chosen)], threshold)
 
     def _transform(self, target: str, source: str) -> Pose3 | None:
         if source in ("", target):

@@ -17,14 +17,13 @@ from twin.bridge.srvs import IsPathValid
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import InvalidPlanner, NoPose, NoViapoints, PlanningFailure
-from twin.navigation.planning.alternatives import AlternativesConfig, other_way
-from twin.navigation.planning.commitment import committed
 from twin.navigation.planning.config import (
     CommitmentConfig,
     GoalAccessConfig,
     SmootherConfig,
     ThetaStarConfig,
 )
+from twin.navigation.planning.earlier_paths import avoiding, committed
 from twin.navigation.planning.goal_access import GoalAccess
 from twin.navigation.planning.path_validity import blocked_poses
 from twin.navigation.planning.planner import GlobalPlanner
@@ -139,9 +138,8 @@ class PlannerServerNode:
 
     def _through_poses(self, handle: GoalHandle) -> Generator[None, None, Any]:
         # The codes of this action are those of the other one, a hundred higher.
-        return (
-            yield from self._compute(handle, ComputePathThroughPoses.Result, list(handle.request.goals), 100)
-        )
+        goals = list(handle.request.goals)
+        return (yield from self._compute(handle, ComputePathThroughPoses.Result, goals, 100))
 
     def _compute(
         self, handle: GoalHandle, result: Any, goals: list[Any], code_offset: int
@@ -154,8 +152,7 @@ class PlannerServerNode:
             here = self._start(request)
             name = request.planner_id or DEFAULT_ID
             if name not in self._planners:
-                valid = ", ".join(self._planners)
-                raise InvalidPlanner(f"{name!r} is no planner; valid: {valid}")
+                raise InvalidPlanner(f"{name!r} is no planner; valid: {', '.join(self._planners)}")
             legs = []
             for goal in goals:
                 yield
@@ -178,7 +175,7 @@ class PlannerServerNode:
         if self._commitment.commitment_cost and self._last is not None and self._last[0] == goal:
             costmap = committed(costmap, self._last[1], self._commitment)
         tried = self._tried_before(start, goal)
-        path = other_way(planner, costmap, start, goal, tried, AlternativesConfig())
+        path = planner.create_plan(avoiding(costmap, tried) if tried else costmap, start, goal)
         self._tried.append(path)
         self._last = (goal, path)
         if planner.drivable:
@@ -214,11 +211,8 @@ class PlannerServerNode:
 
     def _in_map(self, stamped: Any) -> Pose2:
         """Return a stamped pose in the map frame."""
-        pose, frame, map_frame = (
-            pose2_from_pose(stamped.pose),
-            stamped.header.frame_id,
-            self._robot_pose.frames.map,
-        )
+        pose, frame = pose2_from_pose(stamped.pose), stamped.header.frame_id
+        map_frame = self._robot_pose.frames.map
         if frame in ("", map_frame):
             return pose
         T_map_frame = self._robot_pose.relative(map_frame, frame)
