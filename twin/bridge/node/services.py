@@ -64,7 +64,7 @@ def offer(node: Node) -> None:
         node.get_logger().advertise()
     if node.options.start_parameter_services:
         node.advertise_parameter_events()
-        offered |= ParameterServices(node.parameters).offered
+        offered |= ParameterServices(node).offered
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered
     if node.get_parameter("start_type_description_service").value:

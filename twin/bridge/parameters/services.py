@@ -26,8 +26,8 @@ from twin.errors import BridgeError
 class ParameterServices:
     """Callbacks by service name; where one name of a request is not declared, the whole answer is empty."""
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
+    def __init__(self, node: Parameters) -> None:
+        self._node = node
         self.offered: dict[str, tuple[ServiceType, Callable[[Any], Any]]] = {
             "describe_parameters": (DescribeParameters, self._describe),
             "get_parameter_types": (GetParameterTypes, self._types),
@@ -39,18 +39,18 @@ class ParameterServices:
         """Name below the node -> type and callback."""
 
     def _describe(self, request: Any) -> Any:
-        return DescribeParameters.Response(_all_or_none(self._parameters.describe, request.names))
+        return DescribeParameters.Response(_all_or_none(self._node.describe_parameter, request.names))
 
     def _get(self, request: Any) -> Any:
-        found = _all_or_none(self._parameters.get, request.names)
+        found = _all_or_none(self._node.get_parameter, request.names)
         return GetParameters.Response([parameter.get_parameter_value() for parameter in found])
 
     def _types(self, request: Any) -> Any:
-        found = _all_or_none(self._parameters.type_of, request.names)
+        found = _all_or_none(self._node.get_parameter_type, request.names)
         return GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
 
     def _list(self, request: Any) -> Any:
-        return ListParameters.Response(self._parameters.listed(request.prefixes, int(request.depth)))
+        return ListParameters.Response(self._node.list_parameters(request.prefixes, int(request.depth)))
 
     def _set(self, request: Any) -> Any:
         return SetParameters.Response([self._changed([message]) for message in request.parameters])
@@ -60,7 +60,7 @@ class ParameterServices:
 
     def _changed(self, messages: Sequence[Any]) -> SetParametersResult:
         try:
-            return self._parameters.set_atomically([Parameter.from_parameter_msg(m) for m in messages])
+            return self._node.set_parameters_atomically([Parameter.from_parameter_msg(m) for m in messages])
         except ParameterException as error:
             return SetParametersResult(False, error.reason)
         except BridgeError as error:
