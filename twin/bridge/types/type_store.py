@@ -15,9 +15,9 @@ from twin.bridge.types.folders import find_definitions
 from twin.bridge.types.literals import Value
 from twin.bridge.types.parser import Definition, Reference, Structure
 from twin.bridge.types.shipped import shipped, shipped_names
-from twin.bridge.types.text import definition_text
+from twin.bridge.types.text import PADDING, definition_text
 from twin.bridge.types.type_hash import FieldDefs
-from twin.bridge.types.type_names import whole
+from twin.bridge.types.type_names import full_name, whole
 from twin.bridge.types.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
@@ -36,19 +36,19 @@ defaults: dict[str, dict[str, Value]] = {
 """Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from
 the Jazzy branches of common_interfaces and rcl_interfaces."""
 
-_PADDING: Any = ("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))
+_PADDING: Any = (PADDING, (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
 _loading: list[str] = []
 _in_library = frozenset(store.types)
 
 
-def add(definition: Definition) -> None:
-    """Keep a definition until it is used.
+def register(typename: str, text: str) -> None:
+    """Make a type known by its definition, as in a .msg, .srv or .action file; types it uses may come later.
 
     Raises:
-        BridgeError: a fault in its text, or other fields than a definition of this name that is known.
+        BridgeError: the text is no definition, or the name is taken by one with other fields.
     """
-    _add_all([definition])
+    _add_all([Definition(full_name(typename), text)])
 
 
 def add_folder(path: Path | str) -> list[str]:
@@ -103,8 +103,16 @@ def load(name: str) -> None:
         raise BridgeError(f"{owner} has no part {name}")
 
 
-def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
-    """Make types known by their fields; see `types.add_definitions`."""
+def add_definitions(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
+    """Make types known by their fields, in rosbags' form; every type that they use must be among them.
+
+    Args:
+        given: type name -> (constants, fields).
+        values: type name -> field -> default value.
+
+    Raises:
+        BridgeError: a type that is already known with other fields.
+    """
     for name, (_, fields) in given.items():
         if _exists(name):
             load(name)
@@ -119,8 +127,13 @@ def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None
                 defaults[name] = values.get(name, {})
 
 
-def text_of(name: str) -> str | None:
-    """Return the text of a definition; see `types.text_of`."""
+def text_of(typename: str) -> str | None:
+    """Return a definition's text, or None for a part of a service or an action, which has none of its own.
+
+    Raises:
+        BridgeError: an unknown type.
+    """
+    name = full_name(typename)
     definition = _own.get(name) or shipped(name)
     if definition is not None:
         return definition.text
@@ -133,7 +146,7 @@ def text_of(name: str) -> str | None:
 
 
 def names() -> list[str]:
-    """Return the names of all messages, services and actions, sorted."""
+    """Return every message, service and action that has a name here, sorted."""
     messages = (name for name in store.types if "/msg/" in name)
     interfaces = (name for name in derived if name == whole(name))
     return sorted({*messages, *interfaces, *_own, *shipped_names()})
@@ -154,11 +167,8 @@ def _add_all(given: list[Definition]) -> None:
         if definition.file is not None:  # a text's references may still come
             faults += _unknown_references(definition, sections, names)
         other = new.get(name) or _own.get(name) or shipped(name)
-        if (
-            not faults
-            and (other is not None or name in _in_library)
-            and not _same(definition, sections, other)
-        ):
+        is_known = other is not None or name in _in_library
+        if not faults and is_known and not _same(definition, sections, other):
             where = other.where if other is not None else "ROS's own definition"
             faults.append(definition.problem(f"{name} is already known with another definition: {where}", 1))
         problems += sorted(faults, key=lambda fault: fault.line or 0)
@@ -222,9 +232,8 @@ def _register_all(owner: str, sections: tuple[Structure, ...]) -> None:
 
 
 def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
-    plain: Any = {name: (constants, fields)}
     try:
-        store.register(plain)
+        store.register({name: (constants, fields)})
     except TypesysError as error:  # such as fields `from` and `from_`, which Python cannot tell apart
         raise BridgeError(f"{name} cannot be used: {error}") from error
 
