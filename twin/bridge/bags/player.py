@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from twin.bridge import names
@@ -16,7 +17,7 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.graph import Graph
 from twin.bridge.live import LiveBus
-from twin.bridge.msgs import Clock, stamp
+from twin.bridge.msgs import Clock, new, stamp
 from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.bridge.types import ServiceType
 from twin.errors import RecordingError
@@ -151,8 +152,7 @@ class Player:
         return start, min(ends)
 
     def _publisher(self, name: str) -> RawPublisher | None:
-        target = self.config.remap.get(name, name)
-        target = names.expand(target, "/", "rosbag2_player")
+        target = names.expand(self.config.remap.get(name, name), "/", "rosbag2_player")
         topic = complete(self.bag.topics[name])
         if not topic.type_hash:
             self.left_out.append(name)
@@ -201,26 +201,21 @@ class Player:
             self._clock_publisher.publish(Clock(stamp(max(0, self.now_ns))))
 
     def _offer_services(self) -> None:
-        def offer(name: str, kind: str, answer: Callable[[Any], dict[str, Any]]) -> None:
+        answers: dict[str, tuple[str, Callable[[Any], dict[str, Any] | None]]] = {
+            "pause": ("Pause", lambda request: self.pause()),
+            "resume": ("Resume", lambda request: self.resume()),
+            "toggle_paused": (
+                "TogglePaused",
+                lambda request: self.resume() if self._paused else self.pause(),
+            ),
+            "is_paused": ("IsPaused", lambda request: {"paused": self._paused}),
+            "set_rate": ("SetRate", lambda request: {"success": self.set_rate(request.rate)}),
+            "get_rate": ("GetRate", lambda request: {"rate": self._rate}),
+        }
+        for name, (kind, answer) in answers.items():
             service = ServiceType(f"rosbag2_interfaces/srv/{kind}")
+            self._node.create_service(service, f"~/{name}", partial(_respond, service, answer))
 
-            def respond(request: Any) -> Any:
-                given = answer(request)
-                fields = given or {"structure_needs_at_least_one_member": 0}
-                return service.Response(**fields)
 
-            self._node.create_service(service, f"~/{name}", respond)
-
-        def then(action: Callable[[], None]) -> Callable[[Any], dict[str, Any]]:
-            def answer(_request: Any) -> dict[str, Any]:
-                action()
-                return {}
-
-            return answer
-
-        offer("pause", "Pause", then(self.pause))
-        offer("resume", "Resume", then(self.resume))
-        offer("toggle_paused", "TogglePaused", then(lambda: self.resume() if self._paused else self.pause()))
-        offer("is_paused", "IsPaused", lambda request: {"paused": self._paused})
-        offer("set_rate", "SetRate", lambda request: {"success": self.set_rate(request.rate)})
-        offer("get_rate", "GetRate", lambda request: {"rate": self._rate})
+def _respond(service: ServiceType, answer: Callable[[Any], dict[str, Any] | None], request: Any) -> Any:
+    return new(service.Response, **(answer(request) or {}))

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Literal, Protocol, Self, cast, get_args
+from typing import TYPE_CHECKING, Literal, Self, get_args
 
 from twin.bridge.bags import metadata
 from twin.bridge.bags.compression import Compression
 from twin.bridge.bags.definitions import complete
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
-from twin.errors import RecordingError, nearest
+from twin.errors import RecordingError
+
+if TYPE_CHECKING:
+    from twin.bridge.bags.mcap.writer import McapWriter
+    from twin.bridge.bags.sqlite_writer import SqliteWriter
 
 Storage = Literal["mcap", "sqlite3"]
 """What rosbag2 calls a storage identifier."""
-
-
-def as_storage(name: str) -> Storage:
-    """Return the storage of that name.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    if name not in get_args(Storage):
-        raise RecordingError(f"{name!r} is no storage of bags; {nearest(name, get_args(Storage))}")
-    return cast(Storage, name)
+STORAGES: tuple[Storage, ...] = get_args(Storage)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,30 +29,6 @@ class BagConfig:
     compression: Compression = "none"
     """With mcap of chunks; with sqlite3 of messages, none or zstd."""
     ros_distro: str = metadata.ROS_DISTRO
-
-
-class StorageWriter(Protocol):
-    """A file of messages."""
-
-    file: str
-    """Its name in the bag."""
-    compression_mode: str
-    """As in metadata.yaml."""
-
-    def add_topic(self, topic: BagTopic) -> None:
-        """Make a topic known."""
-
-    def write(self, message: BagMessage) -> None:
-        """Append a message of a known topic."""
-
-    def attach(self, log_ns: int, name: str, media_type: str, data: bytes) -> None:
-        """Append a file within the file, where the storage has such."""
-
-    def flush(self) -> None:
-        """Make what was written survive this process, as far as the storage can."""
-
-    def close(self, info: BagInfo) -> None:
-        """Write the end."""
 
 
 class BagWriter:
@@ -147,12 +116,10 @@ class BagWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open_storage(self) -> StorageWriter:
+    def _open_storage(self) -> McapWriter | SqliteWriter:
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError as fault:

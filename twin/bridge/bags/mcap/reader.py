@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from io import BytesIO
 from pathlib import Path
 from struct import Struct
@@ -93,17 +93,13 @@ class McapReader:
             self._file.close()
             raise
 
-    def messages(
-        self, channels: set[int] | None = None, start_ns: int | None = None, end_ns: int | None = None
-    ) -> Iterator[Message]:
-        """Yield messages by log time, from `start_ns` to `end_ns` [ns] inclusive; equal times as in the file.
+    def messages(self, channels: Container[int], first_ns: int, last_ns: int) -> Iterator[Message]:
+        """Yield messages by log time, from `first_ns` to `last_ns` inclusive; equal times as in the file.
 
         Raises:
             RecordingError: a chunk is damaged.
         """
-        first = self.start_ns if start_ns is None else start_ns
-        last = self.end_ns if end_ns is None else end_ns
-        blocks = [b for b in self._blocks if b.start_ns <= last and b.end_ns >= first]
+        blocks = [b for b in self._blocks if b.start_ns <= last_ns and b.end_ns >= first_ns]
         blocks.sort(key=lambda block: (block.start_ns, block.offset))
         waiting: list[tuple[int, int, int, Message]] = []
         for block in blocks:
@@ -111,7 +107,7 @@ class McapReader:
             while waiting and waiting[0][0] < block.start_ns:
                 yield heapq.heappop(waiting)[3]
             for number, message in enumerate(self._messages_of(block)):
-                if (channels is None or message.channel_id in channels) and first <= message.log_time <= last:
+                if message.channel_id in channels and first_ns <= message.log_time <= last_ns:
                     heapq.heappush(waiting, (message.log_time, block.offset, number, message))
         while waiting:
             yield heapq.heappop(waiting)[3]
