@@ -93,8 +93,7 @@ class SimTime:
             return self._now_ns
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        attachment = sample.attachment.to_bytes() if sample.attachment else None
-        if self._admission.source(str(sample.key_expr), attachment) is None:
+        if self._admission.source(sample) is None:
             return
         message = read(self._bus.external, "/clock", self._codec, sample.payload.to_bytes())
         if message is None:

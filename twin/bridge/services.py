@@ -149,9 +149,7 @@ class Service(Endpoint):
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
-        bus = self.node.bus
-        key, attachment = str(query.key_expr), query.attachment
-        source = self._admission.source(key, attachment.to_bytes() if attachment else None)
+        bus, source = self.node.bus, self._admission.source(query)
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
         elif bus.in_own_thread():
