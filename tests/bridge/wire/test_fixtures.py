@@ -14,10 +14,8 @@ from twin.bridge.graph import EndpointInfo, parse_token, parse_tokens
 from twin.bridge.msgs import String
 from twin.bridge.qos import (
     INFINITE_NS,
-    LATCHED,
     SYSTEM_DEFAULT,
     QoS,
-    compatibility,
     parse_qos,
     profile,
     qos_string,
@@ -120,13 +118,6 @@ def test_words_of_rmw_and_their_defaults() -> None:
     ):
         profile(reliability="fast")
     assert parse_qos("0:0:0,:0,0:0,0:0,0,0") == SYSTEM_DEFAULT
-
-
-def test_compatibility_is_as_in_rmw_zenoh() -> None:
-    best_effort, reliable = QoS(reliability="best_effort"), QoS()
-    assert compatibility(best_effort, reliable) == ""  # DDS would refuse
-    assert compatibility(QoS(), LATCHED) == ""
-    assert compatibility(LATCHED, QoS()).startswith("WARNING: Publisher's durability is TRANSIENT_LOCAL")
 
 
 @cases("ros2dds_tokens")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from twin.bridge.bags.compression import Compression
+from twin.bridge.bags.definitions import learn
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
@@ -124,8 +125,6 @@ class _Rosbag1Writer:
 
     def add_topic(self, topic: BagTopic) -> None:
         if topic.definition:
-            from twin.bridge.bags.definitions import learn
-
             learn(topic.type, topic.definition)
         convert_message = self._types.converter(topic.type)
         connection = self._writer.add_connection(

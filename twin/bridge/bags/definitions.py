@@ -55,11 +55,10 @@ def learn(typename: str, full: str) -> None:
         BridgeError: the definition cannot be parsed.
     """
     for name, body in split(typename, full).items():
-        if name not in types.store.types:
-            try:
-                types.get(name)
-            except BridgeError:
-                types.register(name, body)
+        try:
+            types.get(name)
+        except BridgeError:
+            types.register(name, body)
     types.get(typename)
 
 

@@ -72,7 +72,8 @@ class Player:
         """Topics that cannot be published, for want of their type's hash."""
         self._process = process
         self._rate = self.config.rate
-        self._paused = self.config.start_paused
+        self.paused = self.config.start_paused
+        """Whether the bag's time stands still."""
         self._start_ns, self._end_ns = self._window()
         # The bag's time is `_bag_ns` at the wall's `_wall_ns`, and goes on from there.
         self._wall_ns, self._bag_ns = time.monotonic_ns(), self._start_ns
@@ -104,20 +105,15 @@ class Player:
             if stop() or not self.config.loop:
                 return
 
-    @property
-    def paused(self) -> bool:
-        """Whether the bag's time stands still."""
-        return self._paused
-
     def pause(self) -> None:
         """Stop the bag's time."""
         self._anchor(self.now_ns)
-        self._paused = True
+        self.paused = True
 
     def resume(self) -> None:
         """Let the bag's time go on."""
         self._anchor(self.now_ns)
-        self._paused = False
+        self.paused = False
 
     def set_rate(self, rate: float) -> bool:
         """Change the speed; return whether it is valid."""
@@ -130,7 +126,7 @@ class Player:
     @property
     def now_ns(self) -> int:
         """The bag's time [ns]."""
-        if self._paused:
+        if self.paused:
             return self._bag_ns
         return self._bag_ns + int((time.monotonic_ns() - self._wall_ns) * self._rate)
 
@@ -186,7 +182,7 @@ class Player:
         for message in self.bag.messages(self._publishers, self._start_ns, self._end_ns):
             while not stop() and (wait_ns := message.log_ns - self.now_ns) > 0:
                 wall_s = wait_ns / self._rate / _NS
-                self._process.spin_once(_LONGEST_WAIT_S if self._paused else min(wall_s, _LONGEST_WAIT_S))
+                self._process.spin_once(_LONGEST_WAIT_S if self.paused else min(wall_s, _LONGEST_WAIT_S))
             if stop():
                 return
             self._publish(message)
@@ -206,9 +202,9 @@ class Player:
             "resume": ("Resume", lambda request: self.resume()),
             "toggle_paused": (
                 "TogglePaused",
-                lambda request: self.resume() if self._paused else self.pause(),
+                lambda request: self.resume() if self.paused else self.pause(),
             ),
-            "is_paused": ("IsPaused", lambda request: {"paused": self._paused}),
+            "is_paused": ("IsPaused", lambda request: {"paused": self.paused}),
             "set_rate": ("SetRate", lambda request: {"success": self.set_rate(request.rate)}),
             "get_rate": ("GetRate", lambda request: {"rate": self._rate}),
         }

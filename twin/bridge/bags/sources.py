@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from twin.bridge.bags import metadata, offered_qos
+from twin.bridge.bags.definitions import complete
 from twin.bridge.bags.mcap.reader import McapReader
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
@@ -177,7 +178,6 @@ class Rosbag1Source(_RosbagsSource):
         """Open a .bag file."""
         from rosbags.rosbag1 import Reader
 
-        from twin.bridge.bags.definitions import complete
         from twin.bridge.bags.ros1 import FromRos1
 
         super().__init__(path, Reader)

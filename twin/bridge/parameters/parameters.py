@@ -98,7 +98,7 @@ class Parameters(ABC):
             descriptor.type = kind.value
         if not ignore_override and name in self._overrides:
             value = coerced(self._overrides[name], Type(descriptor.type))
-        result = self._change([_of_type(name, value, descriptor)], {name: descriptor}, keep_not_set=True)
+        result = self._change([_of_type(name, value, descriptor)], descriptor)
         self._raise_refusal(result, name, value, Type(descriptor.type))
         return self._parameters[name]
 
@@ -234,16 +234,12 @@ class Parameters(ABC):
         return self._parameters.get(name, parameter)
 
     def _change(
-        self,
-        parameters: list[Parameter],
-        descriptors: dict[str, ParameterDescriptor] | None = None,
-        *,
-        keep_not_set: bool = False,
+        self, parameters: list[Parameter], declared_as: ParameterDescriptor | None = None
     ) -> SetParametersResult:
-        """Check, ask the callbacks, change, tell; with descriptors it is a declaration."""
+        """Check, ask the callbacks, change, tell; with a descriptor it is one declaration."""
         for parameter in parameters:
-            descriptor = (descriptors or self._descriptors).get(parameter.name)
-            reason = descriptor and self._objection(parameter, descriptor, read_only=descriptors is None)
+            descriptor = declared_as or self._descriptors.get(parameter.name)
+            reason = descriptor and self._objection(parameter, descriptor, read_only=declared_as is None)
             if reason:
                 return SetParametersResult(False, reason)
         for callback in self._on_set:
@@ -255,30 +251,23 @@ class Parameters(ABC):
                 return result
         event = self._event()
         for parameter in parameters:
-            self._store(parameter, (descriptors or {}).get(parameter.name), event, keep_not_set)
+            self._store(parameter, declared_as, event)
         self._tell(event)
         for notify in self._post_set:
             notify(parameters)
         return SetParametersResult(True, "")
 
     def _store(
-        self,
-        parameter: Parameter,
-        descriptor: ParameterDescriptor | None,
-        event: ParameterEvent,
-        keep_not_set: bool,
+        self, parameter: Parameter, declared_as: ParameterDescriptor | None, event: ParameterEvent
     ) -> None:
         name = parameter.name
-        if parameter.kind is Type.NOT_SET and not keep_not_set:
+        if parameter.kind is Type.NOT_SET and declared_as is None:
             event.deleted_parameters.append(parameter.to_parameter_msg())
             self._parameters.pop(name, None)
             self._descriptors.pop(name, None)
             return
-        if descriptor is not None:
-            self._descriptors[name] = descriptor
-        elif name not in self._descriptors:
-            self._descriptors[name] = new(ParameterDescriptor, dynamic_typing=True)
-        kept = self._descriptors[name]
+        kept = declared_as or self._descriptors.get(name) or new(ParameterDescriptor, dynamic_typing=True)
+        self._descriptors[name] = kept
         kept.name = name
         if kept.dynamic_typing:
             kept.type = parameter.kind.value
