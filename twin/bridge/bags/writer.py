@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
@@ -44,7 +45,7 @@ class BagWriter:
         self.config = config or BagConfig()
         self.topics: dict[str, BagTopic] = {}
         """With the messages so far as `count`."""
-        self._counts: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
         self._start_ns: int | None = None
         self._end_ns = 0
         self._closed = False
@@ -53,13 +54,12 @@ class BagWriter:
     @property
     def count(self) -> int:
         """Messages written."""
-        return sum(self._counts.values())
+        return self._counts.total()
 
     def add_topic(self, topic: BagTopic) -> None:
         """Make a topic known, before its first message; a repeated name is ignored."""
         if topic.name not in self.topics:
             self.topics[topic.name] = full = complete(topic)
-            self._counts[topic.name] = 0
             self._storage.add_topic(full)
 
     def write(self, message: BagMessage) -> None:

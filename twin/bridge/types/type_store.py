@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Collection, Iterable, Mapping
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,6 @@ from twin.bridge.types.bounds import BASE_TYPES
 from twin.bridge.types.folders import find_definitions
 from twin.bridge.types.literals import Value
 from twin.bridge.types.parser import Definition, Reference, Structure
-from twin.bridge.types.shipped import shipped, shipped_names
 from twin.bridge.types.text import PADDING, definition_text
 from twin.bridge.types.type_hash import FieldDefs
 from twin.bridge.types.type_names import full_name, whole
@@ -40,6 +41,8 @@ _PADDING: Any = (PADDING, (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
 _loading: list[str] = []
 _in_library = frozenset(store.types)
+_SHIPPED = resources.files("twin.bridge") / "interfaces"
+"""The definitions that come with this package, for types that rosbags lacks."""
 
 
 def register(typename: str, text: str) -> None:
@@ -84,7 +87,7 @@ def load(name: str) -> None:
     owner = whole(name)
     if owner in _loading:
         raise BridgeError(f"{owner} contains itself: {' -> '.join([*_loading, owner])}")
-    definition = _own.get(owner) or shipped(owner)
+    definition = _own.get(owner) or _shipped(owner)
     if definition is None:
         raise BridgeError(_unknown(owner))
     _loading.append(owner)
@@ -134,7 +137,7 @@ def text_of(typename: str) -> str | None:
         BridgeError: an unknown type.
     """
     name = full_name(typename)
-    definition = _own.get(name) or shipped(name)
+    definition = _own.get(name) or _shipped(name)
     if definition is not None:
         return definition.text
     load(name)
@@ -149,12 +152,31 @@ def names() -> list[str]:
     """Return every message, service and action that has a name here, sorted."""
     messages = (name for name in store.types if "/msg/" in name)
     interfaces = (name for name in derived if name == whole(name))
-    return sorted({*messages, *interfaces, *_own, *shipped_names()})
+    return sorted({*messages, *interfaces, *_own, *_shipped_names()})
+
+
+@cache
+def _shipped(name: str) -> Definition | None:
+    """Return the definition of 'package/kind/Name', or None."""
+    package, kind, tail = name.split("/")
+    file = _SHIPPED / package / kind / f"{tail}.{kind}"
+    return Definition(name, file.read_text(encoding="utf-8")) if file.is_file() else None
+
+
+@cache
+def _shipped_names() -> tuple[str, ...]:
+    return tuple(
+        f"{package.name}/{kind.name}/{file.name.partition('.')[0]}"
+        for package in _SHIPPED.iterdir()
+        if package.is_dir()
+        for kind in package.iterdir()
+        for file in kind.iterdir()
+    )
 
 
 def _exists(name: str) -> bool:
     owner = whole(name)
-    return name in definitions or owner in _own or shipped(owner) is not None
+    return name in definitions or owner in _own or _shipped(owner) is not None
 
 
 def _add_all(given: list[Definition]) -> None:
@@ -166,7 +188,7 @@ def _add_all(given: list[Definition]) -> None:
         sections, faults = definition.read()
         if definition.file is not None:  # a text's references may still come
             faults += _unknown_references(definition, sections, names)
-        other = new.get(name) or _own.get(name) or shipped(name)
+        other = new.get(name) or _own.get(name) or _shipped(name)
         is_known = other is not None or name in _in_library
         if not faults and is_known and not _same(definition, sections, other):
             where = other.where if other is not None else "ROS's own definition"

@@ -116,8 +116,7 @@ class McapReader:
         """Return the last attachment of that name, None if there is none."""
         if name not in self._attachments:
             return None
-        attachment: Attachment = self._record_at(*self._attachments[name])
-        return attachment.data
+        return self._record_at(*self._attachments[name]).data
 
     def close(self) -> None:
         """Close the file. Harmless when repeated."""
@@ -168,14 +167,8 @@ class McapReader:
         for op, content in _records(summary):
             record = _parse(op, content)
             if isinstance(record, ChunkIndex):
-                self._blocks.append(
-                    _Block(
-                        record.message_start_time,
-                        record.message_end_time,
-                        record.chunk_start_offset,
-                        record.chunk_length,
-                    )
-                )
+                times = record.message_start_time, record.message_end_time
+                self._blocks.append(_Block(*times, record.chunk_start_offset, record.chunk_length))
             elif isinstance(record, Statistics):
                 statistics = record
             elif isinstance(record, MetadataIndex):
@@ -184,20 +177,17 @@ class McapReader:
                 self._attachments[record.name] = (record.offset, record.length)
             else:
                 self._keep(record)
-        if statistics is None or (len(self._blocks), len(self.channels)) != (
-            statistics.chunk_count,
-            statistics.channel_count,
-        ):
+        found = len(self._blocks), len(self.channels)
+        if statistics is None or found != (statistics.chunk_count, statistics.channel_count):
             raise ValueError("has an incomplete summary")
         if statistics.message_count and not self._blocks:
             raise ValueError("")  # written without chunks: no damage, but no index either
-        self.counts.update(statistics.channel_message_counts)
+        self.counts = Counter(statistics.channel_message_counts)
         self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
 
     def _scan(self) -> None:
         """Look through the records up to the first that is not whole."""
         at = len(MAGIC)
-        times: list[int] = []
         while at + _HEAD.size <= self._size:
             op, length = _HEAD.unpack(self._read(at, _HEAD.size))
             whole = _HEAD.size + length
@@ -208,38 +198,38 @@ class McapReader:
                 break
             try:
                 if op != Opcode.MESSAGE_INDEX:
-                    self._scan_record(op, at, whole, times)
+                    self._scan_record(op, at, whole)
             except ValueError as fault:
                 self.damage = f"is damaged at byte {at}: {fault}"
                 break
             at += whole
-        if times:
-            self.start_ns, self.end_ns = min(times), max(times)
 
-    def _scan_record(self, op: int, at: int, whole: int, times: list[int]) -> None:
+    def _scan_record(self, op: int, at: int, whole: int) -> None:
         record = _parse(op, self._read(at + _HEAD.size, whole - _HEAD.size))
         if isinstance(record, Attachment):
             self._attachments[record.name] = (at, whole)
         elif isinstance(record, Chunk):
             for inner, content in _records(_unpacked(record)):
-                self._keep(_parse(inner, content), times)
+                self._keep(_parse(inner, content))
             self._blocks.append(_Block(record.message_start_time, record.message_end_time, at, whole))
         else:
-            self._keep(record, times)
+            self._keep(record)
             if isinstance(record, Message):
                 self._blocks.append(_Block(record.log_time, record.log_time, at, whole))
 
-    def _keep(self, record: McapRecord | None, times: list[int] | None = None) -> None:
-        """Take in what a record tells; `times` gathers those of messages."""
+    def _keep(self, record: McapRecord | None) -> None:
+        """Take in what a record tells."""
         if isinstance(record, Schema):
             self.schemas[record.id] = record
         elif isinstance(record, Channel):
             self.channels[record.id] = record
         elif isinstance(record, Metadata):
             self.metadata[record.name] = record.metadata
-        elif isinstance(record, Message) and times is not None:
+        elif isinstance(record, Message):
+            time = record.log_time
+            self.start_ns = min(self.start_ns, time) if self.counts else time
+            self.end_ns = max(self.end_ns, time) if self.counts else time
             self.counts[record.channel_id] += 1
-            times.append(record.log_time)
 
     def _messages_of(self, block: _Block) -> Iterator[Message]:
         try:
