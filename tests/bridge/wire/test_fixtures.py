@@ -42,7 +42,7 @@ def test_every_fixture_names_its_source() -> None:
 def test_keys(case: dict[str, Any]) -> None:
     dds_name, type_hash = types.dds_name(case["type"]), types.rihs01(case["type"])
     assert topic_key(case["domain"], case["name"], dds_name, type_hash) == case["key"]
-    assert parse_key(case["key"]) == (str(case["domain"]), case["name"], dds_name, type_hash)
+    assert parse_key(case["key"]) == (str(case["domain"]), (case["name"], dds_name, type_hash))
 
 
 @cases("node_tokens")

@@ -32,7 +32,7 @@ _KEEP_ALL = 100_000
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
+    __slots__ = ("_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
     def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
         self.publisher = publisher
@@ -45,14 +45,13 @@ class Sample(Generic[M]):
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
     def payload(self) -> bytes:
         """The message as CDR."""
         if self._payload is None:
-            self._payload = self._codec.encode(self.message)
+            self._payload = self.publisher.codec.encode(self.message)
         return self._payload
 
 

@@ -125,11 +125,11 @@ class RawSubscription:
                 bus.external.refuse("type", topic, "no type, and no bridge announces the topic")
                 return None
             source = source or nameless_source(key, next(self._nameless))
-        elif typed.domain != str(bus.domain_id):
+        elif typed[0] != str(bus.domain_id):
             return None
         else:
-            topic, type_hash = typed.name, typed.type_hash
-            typename = types.from_dds_name(typed.dds_name) or typed.dds_name
+            topic, dds_name, type_hash = typed[1]
+            typename = types.from_dds_name(dds_name) or dds_name
         if source is None:
             bus.external.refuse("attachment", topic, "no rmw_zenoh attachment of 33 bytes")
             return None
