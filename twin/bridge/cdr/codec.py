@@ -17,22 +17,9 @@ from typing import Any, Generic, TypeVar
 from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
+from twin.bridge.cdr import packed
 from twin.bridge.cdr.general import read_cdr
-from twin.bridge.cdr.packed import (
-    MAGIC,
-    POSE,
-    STAMP,
-    U32,
-    decode_imu,
-    decode_joint_state,
-    decode_odometry,
-    encode_imu,
-    encode_joint_state,
-    encode_odometry,
-    read_count,
-    read_header,
-    read_text,
-)
+from twin.bridge.cdr.packed import MAGIC, POSE, STAMP, U32, pack_header, read_count, read_header, read_text
 from twin.bridge.cdr.path import decode_path, encode_path
 from twin.bridge.cdr.scan import decode_scan, encode_scan
 from twin.bridge.cdr.wide import decode_wide, encode_wide, is_wide
@@ -190,14 +177,12 @@ def _decode_tf(payload: bytes) -> tuple[TFMessage, int]:
 
 
 def _encode_poses(message: PoseArray) -> bytes:
-    frame = message.header.frame_id.encode() + b"\0"
-    time, n = message.header.stamp, len(message.poses)
-    to_count = -len(frame) % 4
-    to_poses = -(len(frame) + to_count) % 8 if n else 0  # the other 16 bytes since the header are aligned
+    head, n = pack_header(message.header), len(message.poses)
+    head += b"\0" * (-len(head) % 4) + U32.pack(n)
+    head += b"\0" * (-len(head) % 8 if n else 0)
     values = [(p.position, p.orientation) for p in message.poses]
     numbers = chain.from_iterable((t.x, t.y, t.z, q.x, q.y, q.z, q.w) for t, q in values)
-    layout = f"<4siII{len(frame)}s{to_count}xI{to_poses}x{7 * n}d"
-    return pack(layout, MAGIC, time.sec, time.nanosec, len(frame), frame, n, *numbers)
+    return MAGIC + head + pack(f"<{7 * n}d", *numbers)
 
 
 def _decode_poses(payload: bytes) -> tuple[PoseArray, int]:
@@ -244,9 +229,12 @@ _FAST: dict[str, tuple[Callable[[Any], bytes], _Read[Any]]] = {
     Clock.__msgtype__: (_encode_clock, _little_endian(Clock, _decode_clock)),
     TFMessage.__msgtype__: (_encode_tf, _little_endian(TFMessage, _decode_tf)),
     PoseArray.__msgtype__: (_encode_poses, _little_endian(PoseArray, _decode_poses)),
-    Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
+    Odometry.__msgtype__: (packed.encode_odometry, _little_endian(Odometry, packed.decode_odometry)),
     LaserScan.__msgtype__: (encode_scan, _little_endian(LaserScan, decode_scan)),
-    Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
+    Imu.__msgtype__: (packed.encode_imu, _little_endian(Imu, packed.decode_imu)),
     Path.__msgtype__: (encode_path, _little_endian(Path, decode_path)),
-    JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),
+    JointState.__msgtype__: (
+        packed.encode_joint_state,
+        _little_endian(JointState, packed.decode_joint_state),
+    ),
 }

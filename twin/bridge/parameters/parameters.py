@@ -14,15 +14,7 @@ from twin.bridge.msgs import (
     SetParametersResult,
     stamp,
 )
-from twin.bridge.parameters.errors import (
-    InvalidParameterException,
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-    ParameterAlreadyDeclaredException,
-    ParameterImmutableException,
-    ParameterNotDeclaredException,
-    ParameterUninitializedException,
-)
+from twin.bridge.parameters import errors
 from twin.bridge.parameters.listing import SEPARATOR, listed
 from twin.bridge.parameters.ranges import objection
 from twin.bridge.parameters.values import Parameter, Type, coerced
@@ -83,9 +75,9 @@ class Parameters(ABC):
             BridgeError: declared twice, or a value that is not valid.
         """
         if not name:
-            raise InvalidParameterException(self.fully_qualified_name, name)
+            raise errors.InvalidParameterException(self.fully_qualified_name, name)
         if name in self._parameters:
-            raise ParameterAlreadyDeclaredException(self.fully_qualified_name, name)
+            raise errors.ParameterAlreadyDeclaredException(self.fully_qualified_name, name)
         descriptor = new(ParameterDescriptor) if descriptor is None else replace(descriptor)
         value, kind = (None, value) if isinstance(value, Type) else (value, None)
         if not descriptor.dynamic_typing:
@@ -128,7 +120,7 @@ class Parameters(ABC):
             BridgeError: not declared, or read-only.
         """
         if self._known(name).read_only:
-            raise ParameterImmutableException(self.fully_qualified_name, name)
+            raise errors.ParameterImmutableException(self.fully_qualified_name, name)
         del self._parameters[name], self._descriptors[name]
 
     def get_parameter(self, name: str) -> Parameter:
@@ -142,7 +134,7 @@ class Parameters(ABC):
         self._known(name)
         parameter = self._parameters[name]
         if parameter.kind is Type.NOT_SET and not self._descriptors[name].dynamic_typing:
-            raise ParameterUninitializedException(self.fully_qualified_name, name)
+            raise errors.ParameterUninitializedException(self.fully_qualified_name, name)
         return parameter
 
     def get_parameter_or(self, name: str, alternative: Parameter | None = None) -> Parameter:
@@ -191,7 +183,7 @@ class Parameters(ABC):
         if self._undeclared_is_fine(name):
             return Parameter(name)
         if self._known(name).read_only:
-            raise ParameterImmutableException(self.fully_qualified_name, name)
+            raise errors.ParameterImmutableException(self.fully_qualified_name, name)
         parameter = self.get_parameter(name)
         descriptor = replace(descriptor, name=name)
         reason = self._objection(parameter, descriptor)
@@ -199,7 +191,9 @@ class Parameters(ABC):
             parameter = Parameter(name, value=alternative_value)
             reason = self._objection(parameter, descriptor)
         if reason:
-            raise InvalidParameterValueException(self.fully_qualified_name, name, parameter.value, reason)
+            raise errors.InvalidParameterValueException(
+                self.fully_qualified_name, name, parameter.value, reason
+            )
         if descriptor.dynamic_typing:
             descriptor.type = parameter.kind.value
         self._parameters[name], self._descriptors[name] = parameter, descriptor
@@ -218,7 +212,7 @@ class Parameters(ABC):
                 return SetParametersResult(False, _EMPTIED)
         missing = [parameter.name for parameter in wanted if parameter.name not in self._parameters]
         if missing and not self._allow_undeclared:
-            raise ParameterNotDeclaredException(self.fully_qualified_name, missing, self._parameters)
+            raise errors.ParameterNotDeclaredException(self.fully_qualified_name, missing, self._parameters)
         return self._change(wanted)
 
     def set_parameter(self, name: str, value: Any) -> Parameter:
@@ -282,8 +276,8 @@ class Parameters(ABC):
         if result.successful:
             return
         if result.reason.startswith(_WRONG_TYPE):
-            raise InvalidParameterTypeException(self.fully_qualified_name, name, value, kind.name)
-        raise InvalidParameterValueException(self.fully_qualified_name, name, value, result.reason)
+            raise errors.InvalidParameterTypeException(self.fully_qualified_name, name, value, kind.name)
+        raise errors.InvalidParameterValueException(self.fully_qualified_name, name, value, result.reason)
 
     def _objection(
         self, parameter: Parameter, descriptor: ParameterDescriptor, *, read_only: bool = False
@@ -296,7 +290,7 @@ class Parameters(ABC):
 
     def _known(self, name: str) -> ParameterDescriptor:
         if name not in self._parameters:
-            raise ParameterNotDeclaredException(self.fully_qualified_name, [name], self._parameters)
+            raise errors.ParameterNotDeclaredException(self.fully_qualified_name, [name], self._parameters)
         return self._descriptors[name]
 
 

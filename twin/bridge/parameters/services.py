@@ -7,18 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from twin.bridge import srvs
 from twin.bridge.msgs import SetParametersResult
 from twin.bridge.parameters.errors import ParameterException
 from twin.bridge.parameters.parameters import Parameters
 from twin.bridge.parameters.values import Parameter
-from twin.bridge.srvs import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
 
@@ -30,32 +23,32 @@ def offered(node: Parameters) -> dict[str, tuple[ServiceType, Callable[[Any], An
     """
 
     def describe(request: Any) -> Any:
-        return DescribeParameters.Response(_all_or_none(node.describe_parameter, request.names))
+        return srvs.DescribeParameters.Response(_all_or_none(node.describe_parameter, request.names))
 
     def get(request: Any) -> Any:
         found = _all_or_none(node.get_parameter, request.names)
-        return GetParameters.Response([parameter.get_parameter_value() for parameter in found])
+        return srvs.GetParameters.Response([parameter.get_parameter_value() for parameter in found])
 
     def types(request: Any) -> Any:
         found = _all_or_none(node.get_parameter_type, request.names)
-        return GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
+        return srvs.GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
 
     def listed(request: Any) -> Any:
-        return ListParameters.Response(node.list_parameters(request.prefixes, int(request.depth)))
+        return srvs.ListParameters.Response(node.list_parameters(request.prefixes, int(request.depth)))
 
     def change(request: Any) -> Any:
-        return SetParameters.Response([_changed(node, [message]) for message in request.parameters])
+        return srvs.SetParameters.Response([_changed(node, [message]) for message in request.parameters])
 
     def change_atomically(request: Any) -> Any:
-        return SetParametersAtomically.Response(_changed(node, request.parameters))
+        return srvs.SetParametersAtomically.Response(_changed(node, request.parameters))
 
     return {
-        "describe_parameters": (DescribeParameters, describe),
-        "get_parameter_types": (GetParameterTypes, types),
-        "get_parameters": (GetParameters, get),
-        "list_parameters": (ListParameters, listed),
-        "set_parameters": (SetParameters, change),
-        "set_parameters_atomically": (SetParametersAtomically, change_atomically),
+        "describe_parameters": (srvs.DescribeParameters, describe),
+        "get_parameter_types": (srvs.GetParameterTypes, types),
+        "get_parameters": (srvs.GetParameters, get),
+        "list_parameters": (srvs.ListParameters, listed),
+        "set_parameters": (srvs.SetParameters, change),
+        "set_parameters_atomically": (srvs.SetParametersAtomically, change_atomically),
     }
 
 
