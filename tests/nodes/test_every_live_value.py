@@ -86,7 +86,7 @@ def test_no_live_value_ends_a_run(plugin: str) -> None:
     try:
         for node in [one.fully_qualified_name for one in run.bus.nodes]:
             found = next(one for one in run.bus.nodes if one.fully_qualified_name == node)
-            for name in found.parameters.names:
+            for name in found.list_parameters().names:
                 described = found.describe_parameter(name)
                 if described.read_only or described.type not in (Type.INTEGER.value, Type.DOUBLE.value):
                     continue

@@ -60,7 +60,7 @@ def test_a_config_can_be_read_and_replaced(bus: Bus) -> None:
     bus.create_node("watch").create_subscription(ParameterEvent, "/parameter_events", events.append, 100)
     node, seen = bus.create_node("n"), []
     declare_config(node, Config(), seen.append)
-    values = {p.name: p.value for p in node.get_parameters(node.parameters.names[2:])}
+    values = {p.name: p.value for p in node.get_parameters(node.list_parameters().names[2:])}
     assert values == {
         "FollowPath.speed": 1.0,
         "FollowPath.cap": float("inf"),

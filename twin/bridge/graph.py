@@ -232,9 +232,7 @@ class Graph:
     @property
     def nodes(self) -> tuple[NodeInfo, ...]:
         """Of all nodes, those included of which only endpoints were seen."""
-        known = self._all()
-        found = {item if isinstance(item, NodeInfo) else item.node for item in known}
-        return tuple(sorted(found))
+        return tuple(sorted({item if isinstance(item, NodeInfo) else item.node for item in self._all()}))
 
     @property
     def endpoints(self) -> tuple[EndpointInfo, ...]:
@@ -260,21 +258,17 @@ class Graph:
 
     def topics(self) -> dict[str, tuple[str, ...]]:
         """Return the types of every topic, hidden ones (a part of the name begins with _) included."""
-        return self._types("MP", "MS")
+        return _types_by_name((e.name, e.type) for e in self.endpoints if e.kind in ("MP", "MS"))
 
     def services(self) -> dict[str, tuple[str, ...]]:
         """Return the types of every service that is offered, those of actions and hidden ones included."""
-        return self._types("SS")
+        return _types_by_name((e.name, e.type) for e in self.endpoints if e.kind == "SS")
 
     def actions(self) -> dict[str, tuple[str, ...]]:
         """Return the types of every action that somebody offers or uses."""
         suffix = f"{_ACTION}send_goal"
-        found: dict[str, set[str]] = {}
-        for endpoint in self.endpoints:
-            if endpoint.name.endswith(suffix):
-                types_ = found.setdefault(endpoint.name.removesuffix(suffix), set())
-                types_.add(endpoint.type.removesuffix("_SendGoal"))
-        return {name: tuple(sorted(types_)) for name, types_ in sorted(found.items())}
+        goals = [e for e in self.endpoints if e.name.endswith(suffix)]
+        return _types_by_name((e.name.removesuffix(suffix), e.type.removesuffix("_SendGoal")) for e in goals)
 
     def _all(self) -> list[NodeInfo | EndpointInfo]:
         with self._lock:
@@ -282,13 +276,6 @@ class Graph:
 
     def _of(self, kind: EndpointKind, name: str) -> tuple[EndpointInfo, ...]:
         return tuple(e for e in self.endpoints if e.kind == kind and e.name == name)
-
-    def _types(self, *kinds: EndpointKind) -> dict[str, tuple[str, ...]]:
-        found: dict[str, set[str]] = {}
-        for endpoint in self.endpoints:
-            if endpoint.kind in kinds:
-                found.setdefault(endpoint.name, set()).add(endpoint.type)
-        return {name: tuple(sorted(types_)) for name, types_ in found.items()}
 
     def _add(self, token: str) -> bool:
         """Add what a token declares; return whether it declares something."""
@@ -303,6 +290,13 @@ class Graph:
     def _remove(self, token: str) -> None:
         with self._lock:
             self.changes += self._known.pop(token, None) is not None
+
+
+def _types_by_name(pairs: Iterable[tuple[str, str]]) -> dict[str, tuple[str, ...]]:
+    found: dict[str, set[str]] = {}
+    for name, typename in pairs:
+        found.setdefault(name, set()).add(typename)
+    return {name: tuple(sorted(found[name])) for name in sorted(found)}
 
 
 def starting_key(domain_id: int, session_id: str = "*") -> str:

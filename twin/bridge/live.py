@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -77,8 +76,7 @@ class SimTime:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._codec = codec(ClockMsg)
-        self._lock = threading.Lock()
-        self._now_ns = 0
+        self.now_ns = 0
         name = self._codec.msgtype
         clock = Interface("/clock", types.dds_name(name), types.rihs01(name))
         self._admission = Admission(bus.external, clock)
@@ -86,21 +84,13 @@ class SimTime:
             bus.session.declare_subscriber(key, direct(self._on_sample)) for key in bus.naming.heard(clock)
         ]
 
-    @property
-    def now_ns(self) -> int:
-        """[ns]."""
-        with self._lock:
-            return self._now_ns
-
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        attachment = sample.attachment.to_bytes() if sample.attachment else None
-        if self._admission.source(str(sample.key_expr), attachment) is None:
+        if self._admission.source(sample) is None:
             return
         message = read(self._bus.external, "/clock", self._codec, sample.payload.to_bytes())
         if message is None:
             return
-        with self._lock:
-            self._now_ns = ns(message.clock)
+        self.now_ns = ns(message.clock)
         self._bus.external.wake()
 
 

@@ -1,7 +1,6 @@
 """Quality of service: what a topic promises, and how liveliness tokens spell it.
 
-Source: rmw_zenoh qos.cpp (defaults), liveliness_utils.cpp (spelling), rmw_qos.cpp (compatibility);
-the numbers are rmw/types.h's.
+Source: rmw_zenoh qos.cpp (defaults), liveliness_utils.cpp (spelling); the numbers are rmw/types.h's.
 """
 
 from __future__ import annotations
@@ -105,16 +104,6 @@ def _word(word: str, valid: tuple[W, ...]) -> W:
         if known == word:
             return known
     raise ValueError(f"{word!r} is no QoS policy; valid: {', '.join((*valid, *_DEFAULTS))}")
-
-
-def compatibility(publisher: QoS, subscription: QoS) -> str:
-    """Return why a subscription may miss samples of a publisher, '' if nothing is wrong.
-
-    As in rmw_zenoh nothing is incompatible: samples flow whatever the reliabilities and durabilities are.
-    """
-    if publisher.durability == "transient_local" and subscription.durability == "volatile":
-        return "WARNING: Publisher's durability is TRANSIENT_LOCAL, but subscription's is VOLATILE;"
-    return ""
 
 
 _RELIABILITY = {"0": "reliable", "1": "reliable", "2": "best_effort", "3": "reliable"}

@@ -39,13 +39,9 @@ class Future:
         self.done = False
         self._service = service
         self._response: Any = None
-        self._error: str | None = None
-        self._callbacks: list[Callable[[Future], None]] = []
-
-    @property
-    def error(self) -> str | None:
+        self.error: str | None = None
         """Why there will be no response; None if there is one or it may still come."""
-        return self._error
+        self._callbacks: list[Callable[[Future], None]] = []
 
     @property
     def result(self) -> Any:
@@ -56,8 +52,8 @@ class Future:
         """
         if not self.done:
             raise BridgeError(f"{self._service} has not answered yet; look at `done` first")
-        if self._error is not None:
-            raise BridgeError(self._error)
+        if self.error is not None:
+            raise BridgeError(self.error)
         return self._response
 
     def add_done_callback(self, callback: Callable[[Future], None]) -> None:
@@ -85,7 +81,7 @@ class Future:
         """Set the response, or why there is none; what comes later is ignored."""
         if self.done:
             return
-        self.done, self._response, self._error = True, response, error
+        self.done, self._response, self.error = True, response, error
         for callback in self._callbacks:
             callback(self)
 
@@ -149,9 +145,7 @@ class Service(Endpoint):
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
-        bus = self.node.bus
-        key, attachment = str(query.key_expr), query.attachment
-        source = self._admission.source(key, attachment.to_bytes() if attachment else None)
+        bus, source = self.node.bus, self._admission.source(query)
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
         elif bus.in_own_thread():

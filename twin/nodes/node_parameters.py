@@ -28,7 +28,7 @@ def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = 
     """
     current = config
     found = {name: one for name, one in parameters_of(config).items() if not one.is_nested}
-    node.parameters.declare_together(
+    node.declare_together(
         [
             (name, one.told(config), descriptor_of(one.declaration, read_only=replace is None))
             for name, one in found.items()

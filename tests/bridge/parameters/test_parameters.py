@@ -17,7 +17,7 @@ from twin.bridge.parameters.errors import (
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
-from twin.bridge.parameters.values import Parameter, Type, from_value_msg, value_msg
+from twin.bridge.parameters.values import Parameter, Type, value_to_python
 from twin.bridge.srvs import (
     DescribeParameters,
     GetParameters,
@@ -68,7 +68,7 @@ def test_every_type_survives_the_wire(bus: Bus) -> None:
         assert node.get_parameter_type(kind.name.lower()) is kind
     names = [kind.name.lower() for kind in VALUES]
     values = ask(bus, GetParameters, "/n/get_parameters", names).values
-    assert [from_value_msg("", value) for value in values] == list(VALUES.items())
+    assert [(Type(v.type), value_to_python(v)) for v in values] == list(VALUES.items())
     kinds = ask(bus, GetParameterTypes, "/n/get_parameter_types", names).types
     assert kinds.tolist() == [kind.value for kind in VALUES]
 
@@ -306,7 +306,8 @@ def test_an_empty_list_takes_the_declared_type(bus: Bus) -> None:
     node = bus.create_node("n", parameters={"plugins": []})
     assert node.declare_parameter("plugins", ["a"]).type_ is Type.STRING_ARRAY
     assert node.set_parameter("plugins", []).value == []
-    assert value_msg(Type.DOUBLE_ARRAY, []).double_array_value.size == 0
+    empty = Parameter("p", Type.DOUBLE_ARRAY, [])
+    assert empty.get_parameter_value().double_array_value.size == 0
 
 
 def test_a_node_describes_types(bus: Bus) -> None:

@@ -20,7 +20,7 @@ from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
 from twin.bridge.wire.joining import session_to_join
-from twin.bridge.wire.router import RouterConfig, run_router
+from twin.bridge.wire.router import router_session, run_router
 from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
 
@@ -39,11 +39,10 @@ def _sockets() -> set[str]:
 
 def test_processes_meet_at_a_router(endpoint: str) -> None:
     with (
-        run_router(RouterConfig(listen=(endpoint,))) as router,
+        run_router(router_session([endpoint])),
         live.join([endpoint]) as talking,
         live.join([endpoint]) as listening,
     ):
-        assert router.listen == (endpoint,)
         got: list[str] = []
         talker = talking.bus.create_node("talker").create_publisher(String, "chatter")
         listening.bus.create_node("l").create_subscription(String, "chatter", lambda m: got.append(m.data))
@@ -74,11 +73,11 @@ def test_the_router_command_says_where_it_listens_and_ends_cleanly(endpoint: str
 
 
 def test_a_router_listens_on_this_computer_only_unless_told_otherwise(tmp_path: Path, endpoint: str) -> None:
-    assert RouterConfig().session().listen == ("tcp/127.0.0.1:7447",)
+    assert router_session().listen == ("tcp/127.0.0.1:7447",)
     quiet = _config(tmp_path / "quiet.json5", queries_default_timeout=60000)
-    assert RouterConfig(file=quiet).session().listen == ("tcp/127.0.0.1:7447",)
+    assert router_session(file=quiet).listen == ("tcp/127.0.0.1:7447",)
     told = _config(tmp_path / "told.json5", listen={"endpoints": [endpoint]})
-    assert RouterConfig(file=told).session().listen == (endpoint,)
+    assert router_session(file=told).listen == (endpoint,)
 
 
 def test_a_configuration_opens_nothing_that_it_does_not_mention(tmp_path: Path) -> None:
@@ -182,7 +181,7 @@ def test_tls(tmp_path: Path) -> None:
 def test_a_file_that_is_no_configuration(tmp_path: Path) -> None:
     file = tmp_path / "x.json5"
     file.write_text("{listen: ")
-    for act in (lambda: RouterConfig(file=file).session(), lambda: open_session(SessionConfig(file=file))):
+    for act in (lambda: router_session(file=file), lambda: open_session(SessionConfig(file=file))):
         with pytest.raises(BridgeError, match=r"x\.json5: not a Zenoh configuration"):
             act()
 

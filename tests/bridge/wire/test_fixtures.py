@@ -14,10 +14,8 @@ from twin.bridge.graph import EndpointInfo, parse_token, parse_tokens
 from twin.bridge.msgs import String
 from twin.bridge.qos import (
     INFINITE_NS,
-    LATCHED,
     SYSTEM_DEFAULT,
     QoS,
-    compatibility,
     parse_qos,
     profile,
     qos_string,
@@ -44,7 +42,7 @@ def test_every_fixture_names_its_source() -> None:
 def test_keys(case: dict[str, Any]) -> None:
     dds_name, type_hash = types.dds_name(case["type"]), types.rihs01(case["type"])
     assert topic_key(case["domain"], case["name"], dds_name, type_hash) == case["key"]
-    assert parse_key(case["key"]) == (str(case["domain"]), case["name"], dds_name, type_hash)
+    assert parse_key(case["key"]) == (str(case["domain"]), (case["name"], dds_name, type_hash))
 
 
 @cases("node_tokens")
@@ -120,13 +118,6 @@ def test_words_of_rmw_and_their_defaults() -> None:
     ):
         profile(reliability="fast")
     assert parse_qos("0:0:0,:0,0:0,0:0,0,0") == SYSTEM_DEFAULT
-
-
-def test_compatibility_is_as_in_rmw_zenoh() -> None:
-    best_effort, reliable = QoS(reliability="best_effort"), QoS()
-    assert compatibility(best_effort, reliable) == ""  # DDS would refuse
-    assert compatibility(QoS(), LATCHED) == ""
-    assert compatibility(LATCHED, QoS()).startswith("WARNING: Publisher's durability is TRANSIENT_LOCAL")
 
 
 @cases("ros2dds_tokens")

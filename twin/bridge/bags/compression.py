@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from itertools import islice
-from typing import BinaryIO, Literal, cast, get_args
+from typing import BinaryIO, Literal, TypeVar, cast, get_args
 
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
@@ -13,19 +14,24 @@ from twin.errors import RecordingError, nearest
 
 Compression = Literal["none", "zstd", "lz4"]
 """How a bag is compressed."""
+COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
 _PIECE = 1 << 20
 """What a library takes memory for at once, whatever a file says of its size."""
 
 
-def as_compression(name: str) -> Compression:
-    """Return the compression of that name.
+Choice = TypeVar("Choice", bound=str)
+
+
+def one_of(valid: Sequence[Choice], name: str, what: str) -> Choice:
+    """Return the valid word that a name is.
 
     Raises:
-        RecordingError: there is none.
+        RecordingError: it is none.
     """
-    if name not in get_args(Compression):
-        raise RecordingError(f"{name!r} is no compression; {nearest(name, get_args(Compression))}")
-    return cast(Compression, name)
+    for word in valid:
+        if word == name:
+            return word
+    raise RecordingError(f"{name!r} is no {what}; {nearest(name, valid)}")
 
 
 def decompress(data: bytes, name: str, size: int) -> bytes:

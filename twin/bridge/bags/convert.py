@@ -8,17 +8,19 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol, cast, get_args
+from typing import Any, Literal, get_args
 
 from twin.bridge.bags.compression import Compression
+from twin.bridge.bags.definitions import learn
 from twin.bridge.bags.metadata import BagMessage, BagTopic
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.bags.writer import BagConfig, BagWriter
-from twin.errors import BridgeError, RecordingError, nearest
+from twin.errors import BridgeError, RecordingError
 
 Target = Literal["mcap", "sqlite3", "rosbag1"]
 """What a bag can become."""
+TARGETS: tuple[Target, ...] = get_args(Target)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,25 +31,6 @@ class Converted:
     topics: int
     notices: tuple[str, ...]
     """What was wrong with the bag or had to be left out, one sentence each."""
-
-
-class _Writer(Protocol):
-    def add_topic(self, topic: BagTopic) -> None: ...
-
-    def write(self, message: BagMessage) -> None: ...
-
-    def close(self) -> None: ...
-
-
-def as_target(name: str) -> Target:
-    """Return the target of that name.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    if name not in get_args(Target):
-        raise RecordingError(f"{name!r} is no storage of bags; {nearest(name, get_args(Target))}")
-    return cast(Target, name)
 
 
 def convert(
@@ -73,7 +56,11 @@ def convert(
     with BagReader(source) as bag:
         wanted = (topics or TopicChoice()).of(bag.topics)
         notices = list(bag.notices)
-        writer = _open(target, storage, compression, notices)
+        writer = (
+            _Rosbag1Writer(target, compression, notices)
+            if storage == "rosbag1"
+            else BagWriter(target, BagConfig(storage=storage, compression=compression))
+        )
         try:
             count, usable = _copy(bag, wanted, writer, notices)
         except BaseException:  # Ctrl-C too: half a bag would be in the way of the next attempt
@@ -84,7 +71,9 @@ def convert(
     return Converted(messages=count, topics=usable, notices=tuple(notices))
 
 
-def _copy(bag: BagReader, wanted: Iterable[str], writer: _Writer, notices: list[str]) -> tuple[int, int]:
+def _copy(
+    bag: BagReader, wanted: Iterable[str], writer: BagWriter | _Rosbag1Writer, notices: list[str]
+) -> tuple[int, int]:
     """Write topics and their messages, and the end; return how many messages, and of how many topics."""
     count, usable = 0, set()
     for name in wanted:
@@ -106,13 +95,6 @@ def _remove(target: Path) -> None:
         shutil.rmtree(target, ignore_errors=True)
     else:
         target.unlink(missing_ok=True)
-
-
-def _open(target: Path, storage: Target, compression: Compression, notices: list[str]) -> _Writer:
-    if storage == "rosbag1":
-        return _Rosbag1Writer(target, compression, notices)
-    config = BagConfig(storage=storage, compression=compression)
-    return BagWriter(target, config)
 
 
 class _Rosbag1Writer:
@@ -143,8 +125,6 @@ class _Rosbag1Writer:
 
     def add_topic(self, topic: BagTopic) -> None:
         if topic.definition:
-            from twin.bridge.bags.definitions import learn
-
             learn(topic.type, topic.definition)
         convert_message = self._types.converter(topic.type)
         connection = self._writer.add_connection(

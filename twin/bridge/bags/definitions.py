@@ -13,10 +13,11 @@ from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
 from twin.bridge.bags.metadata import BagTopic
+from twin.bridge.types.text import PADDING, written
+from twin.bridge.types.type_hash import element_of
 from twin.errors import BridgeError
 
 SEPARATOR = "=" * 80
-_PADDING = "structure_needs_at_least_one_member"
 
 
 def definition(typename: str) -> str:
@@ -32,7 +33,9 @@ def text_of(typename: str, definitions: Mapping[str, Any]) -> str:
     """Return the full definition of a type, which with all it uses is in `definitions`."""
     used: dict[str, str] = {}
     own = _text(typename, definitions, used)
-    return own + "".join(f"{SEPARATOR}\nMSG: {_short(name)}\n{body}" for name, body in used.items())
+    return own + "".join(
+        f"{SEPARATOR}\nMSG: {name.replace('/msg/', '/')}\n{body}" for name, body in used.items()
+    )
 
 
 def split(typename: str, full: str) -> dict[str, str]:
@@ -41,7 +44,7 @@ def split(typename: str, full: str) -> dict[str, str]:
     found = {typename: own}
     for part in others:
         head, _, body = part.partition("\n")
-        found["/".join(types.parts(head.removeprefix("MSG:").strip()))] = body
+        found[types.full_name(head.removeprefix("MSG:").strip())] = body
     return found
 
 
@@ -52,49 +55,28 @@ def learn(typename: str, full: str) -> None:
         BridgeError: the definition cannot be parsed.
     """
     for name, body in split(typename, full).items():
-        if name not in types.store.types:
-            try:
-                types.get(name)
-            except BridgeError:
-                types.register(name, body)
+        try:
+            types.get(name)
+        except BridgeError:
+            types.register(name, body)
     types.get(typename)
 
 
 def _text(typename: str, definitions: Mapping[str, Any], used: dict[str, str]) -> str:
     constants, fields = definitions[typename]
-    lines = [f"{kind} {name}={_literal(kind, value)}" for name, kind, value in constants]
+    lines = [
+        f"{kind} {name}={str(bool(value)).lower() if kind == 'bool' else value}"
+        for name, kind, value in constants
+    ]
     for name, description in fields:
-        if name == _PADDING:
+        if name == PADDING:
             continue
-        suffix = ""
-        if description[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-            node, (description, size) = description
-            bound = "<=" if node == Nodetype.SEQUENCE and size else ""
-            suffix = f"[{bound}{size or ''}]"
-        lines.append(f"{_base(description, definitions, used)}{suffix} {name}")
+        node, value = element_of(description)
+        if node == Nodetype.NAME and value not in used:
+            used[value] = ""  # keeps its place before what it uses itself
+            used[value] = _text(value, definitions, used)
+        lines.append(f"{written(description)} {name}")
     return "".join(f"{line}\n" for line in lines)
-
-
-def _base(description: Any, definitions: Mapping[str, Any], used: dict[str, str]) -> str:
-    node, value = description
-    if node == Nodetype.BASE:
-        name, bound = value
-        return f"{name}<={bound}" if bound else str(name)
-    if value not in used:
-        used[value] = ""  # keeps its place before what it uses itself
-        used[value] = _text(value, definitions, used)
-    return _short(value)
-
-
-def _short(typename: str) -> str:
-    """Return pkg/Name of a message; parts of services and actions keep their full name."""
-    return typename.replace("/msg/", "/")
-
-
-def _literal(kind: str, value: Any) -> str:
-    if kind == "bool":
-        return str(bool(value)).lower()
-    return str(value)
 
 
 def complete(topic: BagTopic) -> BagTopic:

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from enum import Enum
 from typing import Any
 
 import yaml
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability
 
 from twin.bridge.qos import QoS
 
-_HISTORY = ("system_default", "keep_last", "keep_all", "unknown")
-_RELIABILITY = ("system_default", "reliable", "best_effort", "unknown", "best_available")
-_DURABILITY = ("system_default", "transient_local", "volatile", "unknown", "best_available")
-_LIVELINESS = (
-    "system_default", "automatic", "manual_by_node", "manual_by_topic", "unknown", "best_available",
-)  # fmt: skip
+_POLICIES: dict[str, type[Enum]] = {
+    "history": QosHistory,
+    "reliability": QosReliability,
+    "durability": QosDurability,
+    "liveliness": QosLiveliness,
+}
+_PERIODS = ("deadline", "lifespan", "liveliness_lease_duration")
 _UNKNOWN_DEPTH = 10
 """rosbag2 plays with this depth what was recorded over DDS, which does not tell depths."""
 
@@ -98,6 +101,13 @@ def parse(value: Any) -> tuple[OfferedQoS, ...]:
         return ()
 
 
+def from_rosbags(qos: Qos) -> OfferedQoS:
+    """Return rosbags' form of a profile as ours."""
+    item = qos._asdict()
+    policies = {name: item[name].name.lower() for name in _POLICIES}
+    return _profile(item | policies | {name: item[name]._asdict() for name in _PERIODS})
+
+
 def publisher_qos(profiles: Sequence[OfferedQoS]) -> QoS:
     """Return the QoS to play a topic with: latched if a publisher was, reliable unless none was.
 
@@ -119,23 +129,19 @@ def publisher_qos(profiles: Sequence[OfferedQoS]) -> QoS:
 
 
 def _profile(item: dict[str, Any]) -> OfferedQoS:
+    values: dict[str, Any] = {name: _name(item[name], policy) for name, policy in _POLICIES.items()}
+    values |= {name: _period(item[name]) for name in _PERIODS}
     return OfferedQoS(
-        history=_name(item["history"], _HISTORY),
+        **values,
         depth=int(item["depth"]),
-        reliability=_name(item["reliability"], _RELIABILITY),
-        durability=_name(item["durability"], _DURABILITY),
-        deadline=_period(item["deadline"]),
-        lifespan=_period(item["lifespan"]),
-        liveliness=_name(item["liveliness"], _LIVELINESS),
-        liveliness_lease_duration=_period(item["liveliness_lease_duration"]),
         avoid_ros_namespace_conventions=bool(item["avoid_ros_namespace_conventions"]),
     )
 
 
-def _name(value: str | int, names: Sequence[str]) -> str:
+def _name(value: str | int, policy: type[Enum]) -> str:
     if isinstance(value, int):
-        return names[value]
-    return value if value in names else "unknown"
+        return policy(value).name.lower()
+    return value if value in [each.name.lower() for each in policy] else "unknown"
 
 
 def _period(item: dict[str, int]) -> Period:

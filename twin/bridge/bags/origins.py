@@ -11,6 +11,8 @@ import zlib
 from array import array
 from dataclasses import dataclass
 
+import numpy as np
+
 NAME, MEDIA_TYPE = "twin/origins", "application/x-twin-origins"
 
 
@@ -25,7 +27,7 @@ class Origins:
 
     def pack(self) -> bytes:
         """Return the attachment: one line of JSON, then 16 bits per message, little endian, deflated."""
-        numbers = b"".join(number.to_bytes(2, "little") for number in self.of_message)
+        numbers = np.asarray(self.of_message, "<u2").tobytes()
         return json.dumps(self.nodes).encode() + b"\n" + zlib.compress(numbers)
 
     @classmethod
@@ -37,8 +39,7 @@ class Origins:
         """
         head, _, packed = data.partition(b"\n")
         try:
-            raw = zlib.decompress(packed)
+            numbers = np.frombuffer(zlib.decompress(packed), "<u2")
         except zlib.error as fault:
             raise ValueError(str(fault)) from fault
-        pairs = zip(raw[::2], raw[1::2], strict=True)
-        return cls(tuple(json.loads(head)), array("H", [low + 256 * high for low, high in pairs]))
+        return cls(tuple(json.loads(head)), array("H", numbers.tolist()))

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from twin.bridge import names
@@ -16,7 +17,7 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.topic_choice import TopicChoice
 from twin.bridge.graph import Graph
 from twin.bridge.live import LiveBus
-from twin.bridge.msgs import Clock, stamp
+from twin.bridge.msgs import Clock, new, stamp
 from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.bridge.types import ServiceType
 from twin.errors import RecordingError
@@ -71,7 +72,8 @@ class Player:
         """Topics that cannot be published, for want of their type's hash."""
         self._process = process
         self._rate = self.config.rate
-        self._paused = self.config.start_paused
+        self.paused = self.config.start_paused
+        """Whether the bag's time stands still."""
         self._start_ns, self._end_ns = self._window()
         # The bag's time is `_bag_ns` at the wall's `_wall_ns`, and goes on from there.
         self._wall_ns, self._bag_ns = time.monotonic_ns(), self._start_ns
@@ -103,20 +105,15 @@ class Player:
             if stop() or not self.config.loop:
                 return
 
-    @property
-    def paused(self) -> bool:
-        """Whether the bag's time stands still."""
-        return self._paused
-
     def pause(self) -> None:
         """Stop the bag's time."""
         self._anchor(self.now_ns)
-        self._paused = True
+        self.paused = True
 
     def resume(self) -> None:
         """Let the bag's time go on."""
         self._anchor(self.now_ns)
-        self._paused = False
+        self.paused = False
 
     def set_rate(self, rate: float) -> bool:
         """Change the speed; return whether it is valid."""
@@ -129,7 +126,7 @@ class Player:
     @property
     def now_ns(self) -> int:
         """The bag's time [ns]."""
-        if self._paused:
+        if self.paused:
             return self._bag_ns
         return self._bag_ns + int((time.monotonic_ns() - self._wall_ns) * self._rate)
 
@@ -151,8 +148,7 @@ class Player:
         return start, min(ends)
 
     def _publisher(self, name: str) -> RawPublisher | None:
-        target = self.config.remap.get(name, name)
-        target = names.expand(target, "/", "rosbag2_player")
+        target = names.expand(self.config.remap.get(name, name), "/", "rosbag2_player")
         topic = complete(self.bag.topics[name])
         if not topic.type_hash:
             self.left_out.append(name)
@@ -186,7 +182,7 @@ class Player:
         for message in self.bag.messages(self._publishers, self._start_ns, self._end_ns):
             while not stop() and (wait_ns := message.log_ns - self.now_ns) > 0:
                 wall_s = wait_ns / self._rate / _NS
-                self._process.spin_once(_LONGEST_WAIT_S if self._paused else min(wall_s, _LONGEST_WAIT_S))
+                self._process.spin_once(_LONGEST_WAIT_S if self.paused else min(wall_s, _LONGEST_WAIT_S))
             if stop():
                 return
             self._publish(message)
@@ -201,26 +197,21 @@ class Player:
             self._clock_publisher.publish(Clock(stamp(max(0, self.now_ns))))
 
     def _offer_services(self) -> None:
-        def offer(name: str, kind: str, answer: Callable[[Any], dict[str, Any]]) -> None:
+        answers: dict[str, tuple[str, Callable[[Any], dict[str, Any] | None]]] = {
+            "pause": ("Pause", lambda request: self.pause()),
+            "resume": ("Resume", lambda request: self.resume()),
+            "toggle_paused": (
+                "TogglePaused",
+                lambda request: self.resume() if self.paused else self.pause(),
+            ),
+            "is_paused": ("IsPaused", lambda request: {"paused": self.paused}),
+            "set_rate": ("SetRate", lambda request: {"success": self.set_rate(request.rate)}),
+            "get_rate": ("GetRate", lambda request: {"rate": self._rate}),
+        }
+        for name, (kind, answer) in answers.items():
             service = ServiceType(f"rosbag2_interfaces/srv/{kind}")
+            self._node.create_service(service, f"~/{name}", partial(_respond, service, answer))
 
-            def respond(request: Any) -> Any:
-                given = answer(request)
-                fields = given or {"structure_needs_at_least_one_member": 0}
-                return service.Response(**fields)
 
-            self._node.create_service(service, f"~/{name}", respond)
-
-        def then(action: Callable[[], None]) -> Callable[[Any], dict[str, Any]]:
-            def answer(_request: Any) -> dict[str, Any]:
-                action()
-                return {}
-
-            return answer
-
-        offer("pause", "Pause", then(self.pause))
-        offer("resume", "Resume", then(self.resume))
-        offer("toggle_paused", "TogglePaused", then(lambda: self.resume() if self._paused else self.pause()))
-        offer("is_paused", "IsPaused", lambda request: {"paused": self._paused})
-        offer("set_rate", "SetRate", lambda request: {"success": self.set_rate(request.rate)})
-        offer("get_rate", "GetRate", lambda request: {"rate": self._rate})
+def _respond(service: ServiceType, answer: Callable[[Any], dict[str, Any] | None], request: Any) -> Any:
+    return new(service.Response, **(answer(request) or {}))

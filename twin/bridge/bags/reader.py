@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from twin.bridge.bags import metadata
@@ -14,6 +13,7 @@ from twin.errors import RecordingError, nearest
 from twin.files.reading import open_file
 
 _MAGIC = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V2.0\n": "rosbag1"}
+_NO_BAG = f"is not a bag; valid: a folder with {metadata.FILE}, a .mcap, .db3 or .bag file"
 _FOREVER = 2**63 - 2
 
 
@@ -81,9 +81,7 @@ class BagReader:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -101,9 +99,7 @@ def _open_folder(path: Path) -> Source:
         files = sorted(file.name for file in path.glob("*.mcap"))
         databases = sorted(path.glob("*.db3"))
         if not files and len(databases) != 1:
-            raise RecordingError(
-                f"{path}: is not a bag; valid: a folder with {metadata.FILE}, a .mcap, .db3 or .bag file"
-            )
+            raise RecordingError(f"{path}: {_NO_BAG}")
         source: Source = McapSource(path, files, None) if files else Rosbag2Source(databases[0])
         source.notices.insert(0, f"{path}: has no {metadata.FILE}, its recorder was stopped")
         return source
@@ -129,6 +125,4 @@ def _kind(path: Path) -> str:
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
             return kind
-    raise RecordingError(
-        f"{path}: is not a bag; valid: a folder with {metadata.FILE}, a .mcap, .db3 or .bag file"
-    )
+    raise RecordingError(f"{path}: {_NO_BAG}")

@@ -7,7 +7,6 @@ import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from twin.bridge.bags.asked_definitions import AskedDefinitions, Kind
 from twin.bridge.bags.metadata import BagMessage, BagTopic
@@ -39,14 +38,6 @@ class RecorderConfig:
     """So much may wait to be written, rosbag2's default; what comes then is dropped and counted."""
 
 
-class Received(NamedTuple):
-    """A sample that waits to be written."""
-
-    sample: RawSample
-    time_ns: int
-    """When it was received; 0 if simulated time had not begun."""
-
-
 class Recorder:
     """Records from its making to `close`; call `update` after every spin of the bus."""
 
@@ -64,7 +55,8 @@ class Recorder:
         self._bus = bus
         self._writer = BagWriter(folder, self.config.bag)
         self._lock = threading.Lock()
-        self._waiting: deque[Received] = deque()
+        self._waiting: deque[tuple[RawSample, int]] = deque()
+        """Samples, and when they were received [ns]; 0 if simulated time had not begun."""
         self._waiting_bytes = 0
         self._types: dict[str, Kind] = {}
         self._ears: dict[str, _Ear] = {}
@@ -115,7 +107,7 @@ class Recorder:
                 self.dropped += 1
                 return
             self._waiting_bytes += len(sample.payload)
-            self._waiting.append(Received(sample, self._now_ns()))
+            self._waiting.append((sample, self._now_ns()))
         self._bus.external.wake()
 
     def close(self) -> None:

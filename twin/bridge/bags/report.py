@@ -6,6 +6,7 @@ Source: rosbag2_py/src/rosbag2_py/format_bag_metadata.cpp.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from twin.bridge.bags.metadata import BagTopic
 from twin.bridge.bags.reader import BagReader
@@ -17,8 +18,13 @@ _INDENT = " " * 19
 def report(bag: BagReader) -> str:
     """Return the report, times in the local time zone."""
     info = bag.info
-    topics = sorted((topic for topic in info.topics if not _is_service(topic)), key=lambda topic: topic.name)
-    services = sorted((topic for topic in info.topics if _is_service(topic)), key=lambda topic: topic.name)
+    named = sorted(info.topics, key=lambda topic: topic.name)
+    topics = [topic for topic in named if not _is_service(topic)]
+    services = [
+        replace(each, name=each.name.removesuffix("/_service_event"), type=each.type.removesuffix("_Event"))
+        for each in named
+        if _is_service(each)
+    ]
     lines = [
         "",
         f"Files:             {_below(list(info.files))}",
@@ -29,9 +35,9 @@ def report(bag: BagReader) -> str:
         f"Start:             {_time(info.start_ns)}",
         f"End:               {_time(info.end_ns)}",
         f"Messages:          {sum(topic.count for topic in topics)}",
-        f"Topic information: {_below([_topic(topic) for topic in topics])}",
+        f"Topic information: {_below([_entry('Topic', 'Count', topic) for topic in topics])}",
         f"Service:           {len(services)}",
-        f"Service information: {_below([_service(topic) for topic in services], '  ')}",
+        f"Service information: {_below([_entry('Service', 'Event Count', each) for each in services], '  ')}",
     ]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -40,18 +46,10 @@ def _is_service(topic: BagTopic) -> bool:
     return topic.name.endswith("/_service_event") and topic.type.endswith("_Event")
 
 
-def _topic(topic: BagTopic) -> str:
+def _entry(what: str, count: str, topic: BagTopic) -> str:
     return (
-        f"Topic: {topic.name} | Type: {topic.type} | Count: {topic.count} | "
+        f"{what}: {topic.name} | Type: {topic.type} | {count}: {topic.count} | "
         f"Serialization Format: {topic.serialization_format}"
-    )
-
-
-def _service(topic: BagTopic) -> str:
-    name, kind = topic.name.removesuffix("/_service_event"), topic.type.removesuffix("_Event")
-    return (
-        f"Service: {name} | Type: {kind} | "
-        f"Event Count: {topic.count} | Serialization Format: {topic.serialization_format}"
     )
 
 

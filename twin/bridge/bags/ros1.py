@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
@@ -41,16 +42,7 @@ class FromRos1:
             types.get(target)
         except BridgeError:
             definitions.learn(target, definitions.text_of(typename, self._store.fielddefs))
-        source, store, cache = self._store, types.store, self._cache
-        if is_same_wireformat(source, store, typename, target):
-            return target, lambda data: bytes(store.ros1_to_cdr(data, target))
-
-        def migrate(data: bytes) -> bytes:
-            return bytes(
-                migrate_bytes(source, store, typename, target, cache, data, src_is2=False, dst_is2=True)
-            )
-
-        return target, migrate
+        return target, _conversion(self._store, types.store, typename, target, self._cache, to_ros2=True)
 
 
 class ToRos1:
@@ -79,16 +71,19 @@ class ToRos1:
         return of_any
 
     def _of_whole(self, typename: str) -> Convert:
-        source, store, cache = types.store, self.store, self._cache
+        source, store = types.store, self.store
         if typename not in store.fielddefs:
             copies = get_types_from_msg(definitions.definition(typename), typename)
             store.register({name: fields for name, fields in copies.items() if name not in store.fielddefs})
-        if is_same_wireformat(source, store, typename, typename):
-            return lambda data: bytes(source.cdr_to_ros1(data, typename))
+        return _conversion(source, store, typename, typename, self._cache, to_ros2=False)
 
-        def migrate(data: bytes) -> bytes:
-            return bytes(
-                migrate_bytes(source, store, typename, typename, cache, data, src_is2=True, dst_is2=False)
-            )
 
-        return migrate
+def _conversion(
+    source: Any, store: Any, typename: str, target: str, cache: dict[str, object], *, to_ros2: bool
+) -> Convert:
+    """Return what converts a type of `source` to one of `store`."""
+    if is_same_wireformat(source, store, typename, target):
+        same = store.ros1_to_cdr if to_ros2 else source.cdr_to_ros1
+        return lambda data: bytes(same(data, target))
+    migrate = partial(migrate_bytes, source, store, typename, target, cache)
+    return lambda data: bytes(migrate(data, src_is2=not to_ros2, dst_is2=to_ros2))

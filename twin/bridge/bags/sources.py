@@ -3,43 +3,50 @@
 from __future__ import annotations
 
 import sqlite3
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 from twin.bridge.bags import metadata, offered_qos
+from twin.bridge.bags.definitions import complete
 from twin.bridge.bags.mcap.reader import McapReader
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
 from twin.bridge.bags.offered_qos import OfferedQoS
 from twin.errors import BridgeError, RecordingError
 
 
-class Source(Protocol):
+class Source(ABC):
     """An open bag."""
 
     info: BagInfo
-    notices: list[str]
-    """What a user should know, one sentence each."""
 
+    def __init__(self) -> None:
+        self.notices: list[str] = []
+        """What a user should know, one sentence each."""
+
+    @abstractmethod
     def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
         """Yield the messages of topics, by log time from `start_ns` to `end_ns`, both inclusive."""
 
     def attachment(self, name: str) -> bytes | None:
-        """Return a file within the bag."""
+        """Return a file within the bag, None if there is none of this name."""
+        return None
 
+    @abstractmethod
     def close(self) -> None:
         """Close the files."""
 
 
-class McapSource:
+class McapSource(Source):
     """One or more MCAP files, in their order."""
 
     def __init__(self, folder: Path, files: Collection[str], known: BagInfo | None) -> None:
         """Open the files; `known` is what metadata.yaml says, None without it."""
-        self.notices: list[str] = []
+        super().__init__()
         with ExitStack() as stack:
             self._files = [McapReader(folder / name) for name in files]
             for file in self._files:
@@ -52,7 +59,7 @@ class McapSource:
         """Yield messages by log time; files follow one another."""
         for file in self._files:
             names = {c.id: c.topic for c in file.channels.values() if _usable(c) and c.topic in topics}
-            for m in file.messages(set(names), start_ns, end_ns):
+            for m in file.messages(names, start_ns, end_ns):
                 yield BagMessage(names[m.channel_id], m.data, m.log_time, m.publish_time, m.sequence)
 
     def attachment(self, name: str) -> bytes | None:
@@ -100,133 +107,92 @@ class McapSource:
         )
 
 
-class Rosbag2Source:
-    """A SQLite bag, or one with compressed files or messages, read by rosbags."""
+class _RosbagsSource(Source):
+    """A bag that rosbags reads; the storage knows no other time than that of the log."""
 
-    def __init__(self, path: Path) -> None:
-        """Open a folder with metadata.yaml, or one .db3 file."""
-        from rosbags.rosbag2 import Reader
+    _what: ClassVar[str]
 
-        self.notices: list[str] = []
+    def __init__(self, path: Path, reader: Callable[[Path], Any]) -> None:
+        super().__init__()
         self._path = path
-        for log in sorted(path.glob("*.db3-wal")) if path.is_dir() else [path.with_name(f"{path.name}-wal")]:
-            self._recover(log)
-        with _foreign(path, "a ROS 2 bag"):
-            self._reader: Any = Reader(path)
+        with _foreign(path, self._what):
+            self._reader = reader(path)
             self._reader.open()
-        self.info = self._read_info()
+        self._converters: dict[int, Callable[[bytes], bytes]] = {}
+        """By connection; what has none is left out."""
 
     def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
-        """Yield messages by log time; the storage knows no other time."""
-        with _foreign(self._path, "a ROS 2 bag"):
-            wanted = [c for c in self._reader.connections if c.topic in topics]
+        """Yield messages by log time."""
+        with _foreign(self._path, self._what):
+            wanted = [c for c in self._reader.connections if c.topic in topics and c.id in self._converters]
             if wanted:
                 for connection, time, data in self._reader.messages(wanted, start_ns, end_ns + 1):
-                    yield BagMessage(connection.topic, bytes(data), time, time)
-
-    def attachment(self, name: str) -> bytes | None:
-        """Return None: the storage has none."""
-        return None
+                    yield BagMessage(connection.topic, self._converters[connection.id](data), time, time)
 
     def close(self) -> None:
         """Close the files."""
         self._reader.close()
 
-    def _read_info(self) -> BagInfo:
-        reader = self._reader
+    def _filled(self, info: BagInfo, topics: dict[str, BagTopic]) -> BagInfo:
+        """Return `info` with the topics, and with the reader's times."""
+        reader, filled = self._reader, self._reader.message_count > 0
+        start, end = (reader.start_time, reader.end_time - 1) if filled else (0, 0)
+        return replace(info, start_ns=start, end_ns=end, topics=tuple(topics.values()))
+
+
+class Rosbag2Source(_RosbagsSource):
+    """A SQLite bag, or one with compressed files or messages."""
+
+    _what = "a ROS 2 bag"
+
+    def __init__(self, path: Path) -> None:
+        """Open a folder with metadata.yaml, or one .db3 file."""
+        from rosbags.rosbag2 import Reader
+
+        logs = sorted(path.glob("*.db3-wal")) if path.is_dir() else [path.with_name(f"{path.name}-wal")]
+        recovered = [notice for log in logs for notice in _recover(log)]
+        super().__init__(path, Reader)
+        self.notices += recovered
         topics: dict[str, BagTopic] = {}
-        for c in reader.connections:
+        for c in self._reader.connections:
+            self._converters[c.id] = bytes
             topic = BagTopic(
                 name=c.topic,
                 type=c.msgtype,
                 type_hash=c.digest,
                 definition=c.msgdef.data,
                 definition_format="ros2idl" if c.msgdef.format.name == "IDL" else "ros2msg",
-                qos=tuple(map(_from_rosbags, c.ext.offered_qos_profiles)),
+                qos=tuple(map(offered_qos.from_rosbags, c.ext.offered_qos_profiles)),
             )
             _count(topics, topic, c.msgcount)
-        filled = reader.message_count > 0
-        base = (
-            metadata.read(self._path)
-            if self._path.is_dir()
-            else BagInfo(storage="sqlite3", files=(self._path.name,))
-        )
-        return replace(
-            base,
-            start_ns=reader.start_time if filled else 0,
-            end_ns=reader.end_time - 1 if filled else 0,
-            topics=tuple(topics.values()),
-        )
-
-    def _recover(self, log: Path) -> None:
-        """Take over what a recorder that was killed had flushed."""
-        if not log.exists():
-            return
-        database = log.with_name(log.name.removesuffix("-wal"))
-        try:
-            connection = sqlite3.connect(database)
-            connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-            connection.close()
-        except sqlite3.Error as fault:
-            raise RecordingError(f"{database}: cannot be recovered: {fault}") from fault
-        self.notices.append(f"{database}: its writer was stopped; what it had flushed was recovered")
+        alone = BagInfo(storage="sqlite3", files=(path.name,))
+        self.info = self._filled(metadata.read(path) if path.is_dir() else alone, topics)
 
 
-class Rosbag1Source:
+class Rosbag1Source(_RosbagsSource):
     """A ROS 1 bag, its messages converted to ROS 2's types."""
+
+    _what = "a ROS 1 bag"
 
     def __init__(self, path: Path) -> None:
         """Open a .bag file."""
         from rosbags.rosbag1 import Reader
 
-        self.notices: list[str] = []
-        self._path = path
-        with _foreign(path, "a ROS 1 bag"):
-            self._reader: Any = Reader(path)
-            self._reader.open()
-        self._converters: dict[int, Any] = {}
-        self.info = self._read_info()
-
-    def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
-        """Yield messages by log time."""
-        wanted = [c for c in self._reader.connections if c.topic in topics and c.id in self._converters]
-        with _foreign(self._path, "a ROS 1 bag"):
-            if wanted:
-                for connection, time, data in self._reader.messages(wanted, start_ns, end_ns + 1):
-                    converted = self._converters[connection.id](data)
-                    yield BagMessage(connection.topic, converted, time, time)
-
-    def attachment(self, name: str) -> bytes | None:
-        """Return None: the storage has none."""
-        return None
-
-    def close(self) -> None:
-        """Close the file."""
-        self._reader.close()
-
-    def _read_info(self) -> BagInfo:
-        from twin.bridge.bags.definitions import complete
         from twin.bridge.bags.ros1 import FromRos1
 
+        super().__init__(path, Reader)
         types_of_bag = FromRos1()
         topics: dict[str, BagTopic] = {}
         for c in self._reader.connections:
             try:
                 typename, self._converters[c.id] = types_of_bag.converter(c.msgtype, c.msgdef.data)
             except BridgeError as fault:
-                self.notices.append(f"{self._path}: {c.msgcount} messages on {c.topic} are left out: {fault}")
+                self.notices.append(f"{path}: {c.msgcount} messages on {c.topic} are left out: {fault}")
                 continue
             latched = OfferedQoS(history="keep_last", depth=1, durability="transient_local")
             qos = (latched if c.ext.latching else OfferedQoS(history="keep_last", depth=10),)
             _count(topics, complete(BagTopic(name=c.topic, type=typename, qos=qos)), c.msgcount)
-        reader, filled = self._reader, self._reader.message_count > 0
-        return BagInfo(
-            storage="rosbag1",
-            files=(self._path.name,),
-            start_ns=reader.start_time if filled else 0,
-            end_ns=reader.end_time - 1 if filled else 0,
-            topics=tuple(topics.values()),
-        )
+        self.info = self._filled(BagInfo(storage="rosbag1", files=(path.name,)), topics)
 
 
 @contextmanager
@@ -239,6 +205,20 @@ def _foreign(path: Path, what: str) -> Iterator[None]:
     except Exception as fault:  # rosbags' readers raise many kinds on damaged files
         words = " ".join(str(fault).split()).rstrip(".") or type(fault).__name__
         raise RecordingError(f"{path}: cannot be read as {what}: {words}") from fault
+
+
+def _recover(log: Path) -> Iterator[str]:
+    """Take over what a recorder that was killed had flushed, and yield a notice of it."""
+    if not log.exists():
+        return
+    database = log.with_name(log.name.removesuffix("-wal"))
+    try:
+        connection = sqlite3.connect(database)
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        connection.close()
+    except sqlite3.Error as fault:
+        raise RecordingError(f"{database}: cannot be recovered: {fault}") from fault
+    yield f"{database}: its writer was stopped; what it had flushed was recovered"
 
 
 def _usable(channel: Any) -> bool:
@@ -263,17 +243,3 @@ def _count(topics: dict[str, BagTopic], topic: BagTopic, count: int) -> None:
     """Add a topic, or the messages of another publisher or file to it."""
     known = topics.get(topic.name, topic)
     topics[topic.name] = replace(known, count=known.count + count)
-
-
-def _from_rosbags(qos: Any) -> OfferedQoS:
-    """Return rosbags' form of a profile as ours."""
-    names = {
-        name: getattr(qos, name).name.lower()
-        for name in ("history", "reliability", "durability", "liveliness")
-    }
-    periods = {
-        name: {"sec": getattr(qos, name).sec, "nsec": getattr(qos, name).nsec}
-        for name in ("deadline", "lifespan", "liveliness_lease_duration")
-    }
-    flag = "avoid_ros_namespace_conventions"
-    return offered_qos.parse([{**names, **periods, "depth": qos.depth, flag: getattr(qos, flag)}])[0]

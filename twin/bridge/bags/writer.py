@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Literal, Protocol, Self, cast, get_args
+from typing import TYPE_CHECKING, Literal, Self, get_args
 
 from twin.bridge.bags import metadata
 from twin.bridge.bags.compression import Compression
 from twin.bridge.bags.definitions import complete
 from twin.bridge.bags.metadata import BagInfo, BagMessage, BagTopic
-from twin.errors import RecordingError, nearest
+from twin.errors import RecordingError
+
+if TYPE_CHECKING:
+    from twin.bridge.bags.mcap.writer import McapWriter
+    from twin.bridge.bags.sqlite_writer import SqliteWriter
 
 Storage = Literal["mcap", "sqlite3"]
 """What rosbag2 calls a storage identifier."""
-
-
-def as_storage(name: str) -> Storage:
-    """Return the storage of that name.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    if name not in get_args(Storage):
-        raise RecordingError(f"{name!r} is no storage of bags; {nearest(name, get_args(Storage))}")
-    return cast(Storage, name)
+STORAGES: tuple[Storage, ...] = get_args(Storage)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,30 +30,6 @@ class BagConfig:
     compression: Compression = "none"
     """With mcap of chunks; with sqlite3 of messages, none or zstd."""
     ros_distro: str = metadata.ROS_DISTRO
-
-
-class StorageWriter(Protocol):
-    """A file of messages."""
-
-    file: str
-    """Its name in the bag."""
-    compression_mode: str
-    """As in metadata.yaml."""
-
-    def add_topic(self, topic: BagTopic) -> None:
-        """Make a topic known."""
-
-    def write(self, message: BagMessage) -> None:
-        """Append a message of a known topic."""
-
-    def attach(self, log_ns: int, name: str, media_type: str, data: bytes) -> None:
-        """Append a file within the file, where the storage has such."""
-
-    def flush(self) -> None:
-        """Make what was written survive this process, as far as the storage can."""
-
-    def close(self, info: BagInfo) -> None:
-        """Write the end."""
 
 
 class BagWriter:
@@ -75,7 +45,7 @@ class BagWriter:
         self.config = config or BagConfig()
         self.topics: dict[str, BagTopic] = {}
         """With the messages so far as `count`."""
-        self._counts: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
         self._start_ns: int | None = None
         self._end_ns = 0
         self._closed = False
@@ -84,13 +54,12 @@ class BagWriter:
     @property
     def count(self) -> int:
         """Messages written."""
-        return sum(self._counts.values())
+        return self._counts.total()
 
     def add_topic(self, topic: BagTopic) -> None:
         """Make a topic known, before its first message; a repeated name is ignored."""
         if topic.name not in self.topics:
             self.topics[topic.name] = full = complete(topic)
-            self._counts[topic.name] = 0
             self._storage.add_topic(full)
 
     def write(self, message: BagMessage) -> None:
@@ -147,12 +116,10 @@ class BagWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open_storage(self) -> StorageWriter:
+    def _open_storage(self) -> McapWriter | SqliteWriter:
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError as fault:

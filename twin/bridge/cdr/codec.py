@@ -17,16 +17,9 @@ from typing import Any, Generic, TypeVar
 from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
+from twin.bridge.cdr import packed
 from twin.bridge.cdr.general import read_cdr
-from twin.bridge.cdr.packed import (
-    decode_imu,
-    decode_joint_state,
-    decode_odometry,
-    encode_imu,
-    encode_joint_state,
-    encode_odometry,
-    read_text,
-)
+from twin.bridge.cdr.packed import MAGIC, POSE, STAMP, U32, pack_header, read_count, read_header, read_text
 from twin.bridge.cdr.path import decode_path, encode_path
 from twin.bridge.cdr.scan import decode_scan, encode_scan
 from twin.bridge.cdr.wide import decode_wide, encode_wide, is_wide
@@ -55,14 +48,8 @@ from twin.bridge.types.fields import array_types
 M = TypeVar("M")
 _Read = Callable[[bytes], tuple[M, int]]
 
-LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-"""The encapsulation header of plain CDR, little endian."""
-
 _TWIST = Struct("<4s6d")
 _CLOCK = Struct("<4siI")
-_STAMP = Struct("<iI")
-_TEXT_LENGTH = Struct("<I")
-_POSE = Struct("<7d")
 
 
 @dataclass(frozen=True)
@@ -91,14 +78,7 @@ def codec(cls: type[M]) -> Codec[M]:
     if fast is None:
         return general
     encode, read = fast
-
-    def explained(message: M) -> bytes:
-        try:
-            return encode(message)
-        except Exception:
-            return general.encode(checked(message))
-
-    return Codec(general.msgtype, cls, explained, read)
+    return Codec(general.msgtype, cls, _explained(encode), read)
 
 
 def general_codec(cls: type[M]) -> Codec[M]:
@@ -134,7 +114,7 @@ def _explained(encode: Callable[[M], bytes]) -> Callable[[M], bytes]:
 
 def _encode_twist(message: Twist) -> bytes:
     v, w = message.linear, message.angular
-    return _TWIST.pack(LITTLE_ENDIAN, v.x, v.y, v.z, w.x, w.y, w.z)
+    return _TWIST.pack(MAGIC, v.x, v.y, v.z, w.x, w.y, w.z)
 
 
 def _decode_twist(payload: bytes) -> tuple[Twist, int]:
@@ -143,7 +123,7 @@ def _decode_twist(payload: bytes) -> tuple[Twist, int]:
 
 
 def _encode_clock(message: Clock) -> bytes:
-    return _CLOCK.pack(LITTLE_ENDIAN, message.clock.sec, message.clock.nanosec)
+    return _CLOCK.pack(MAGIC, message.clock.sec, message.clock.nanosec)
 
 
 def _decode_clock(payload: bytes) -> tuple[Clock, int]:
@@ -164,7 +144,7 @@ def _transform_struct(phase: int, frame_id: str, child_frame_id: str) -> tuple[S
 
 
 def _encode_tf(message: TFMessage) -> bytes:
-    chunks = [LITTLE_ENDIAN + _TEXT_LENGTH.pack(len(message.transforms))]
+    chunks = [MAGIC + U32.pack(len(message.transforms))]
     at = 4
     for item in message.transforms:
         head, t, q = item.header, item.transform.translation, item.transform.rotation
@@ -172,76 +152,59 @@ def _encode_tf(message: TFMessage) -> bytes:
         time = head.stamp
         chunks.append(
             layout.pack(
-                time.sec,
-                time.nanosec,
-                len(frame),
-                frame,
-                len(child),
-                child,
-                t.x,
-                t.y,
-                t.z,
-                q.x,
-                q.y,
-                q.z,
-                q.w,
+                time.sec, time.nanosec, len(frame), frame, len(child), child,
+                t.x, t.y, t.z, q.x, q.y, q.z, q.w,
             )
-        )
+        )  # fmt: skip
         at += layout.size
     return b"".join(chunks)
 
 
 def _decode_tf(payload: bytes) -> tuple[TFMessage, int]:
-    (count,) = _TEXT_LENGTH.unpack_from(payload, 4)
-    at = 8
+    count, at = read_count(payload, 4)
     transforms = []
     for _ in range(count):
         at += -at % 4
-        sec, nanosec = _STAMP.unpack_from(payload, at)
+        stamp = Time(*STAMP.unpack_from(payload, at))
         frame, at = read_text(payload, at + 8)
         child, at = read_text(payload, at)
         at += (4 - at) % 8  # the header's 4 bytes do not count for alignment
-        x, y, z, qx, qy, qz, qw = _POSE.unpack_from(payload, at)
-        at += _POSE.size
+        x, y, z, qx, qy, qz, qw = POSE.unpack_from(payload, at)
+        at += POSE.size
         transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
-        transforms.append(TransformStamped(Header(Time(sec, nanosec), frame), child, transform))
+        transforms.append(TransformStamped(Header(stamp, frame), child, transform))
     return TFMessage(transforms), at
 
 
 def _encode_poses(message: PoseArray) -> bytes:
-    frame = message.header.frame_id.encode() + b"\0"
-    time, n = message.header.stamp, len(message.poses)
-    to_count = -len(frame) % 4
-    to_poses = -(len(frame) + to_count) % 8 if n else 0  # the other 16 bytes since the header are aligned
+    head, n = pack_header(message.header), len(message.poses)
+    head += b"\0" * (-len(head) % 4) + U32.pack(n)
+    head += b"\0" * (-len(head) % 8 if n else 0)
     values = [(p.position, p.orientation) for p in message.poses]
     numbers = chain.from_iterable((t.x, t.y, t.z, q.x, q.y, q.z, q.w) for t, q in values)
-    layout = f"<4siII{len(frame)}s{to_count}xI{to_poses}x{7 * n}d"
-    return pack(layout, LITTLE_ENDIAN, time.sec, time.nanosec, len(frame), frame, n, *numbers)
+    return MAGIC + head + pack(f"<{7 * n}d", *numbers)
 
 
 def _decode_poses(payload: bytes) -> tuple[PoseArray, int]:
-    sec, nanosec = _STAMP.unpack_from(payload, 4)
-    frame, at = read_text(payload, 12)
-    at += -at % 4
-    (n,) = _TEXT_LENGTH.unpack_from(payload, at)
-    at += 4
+    header, at = read_header(payload)
+    n, at = read_count(payload, at)
     if n:
         at += (4 - at) % 8
-    if n * _POSE.size > len(payload) - at:
+    if n * POSE.size > len(payload) - at:
         raise ValueError(f"{n} poses do not fit")
     values = unpack_from(f"<{7 * n}d", payload, at)
     poses = [
         Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
         for x, y, z, qx, qy, qz, qw in zip(*[iter(values)] * 7, strict=True)
     ]
-    return PoseArray(Header(Time(sec, nanosec), frame), poses), at + n * _POSE.size
+    return PoseArray(header, poses), at + n * POSE.size
 
 
 def _little_endian(cls: type[M], read: _Read[M]) -> _Read[M]:
     """Return a decoder that leaves big-endian payloads to the general codec."""
 
     def either(payload: bytes) -> tuple[M, int]:
-        return read(payload) if payload[:4] == LITTLE_ENDIAN else general_codec(cls).read(payload)
+        return read(payload) if payload[:4] == MAGIC else general_codec(cls).read(payload)
 
     return either
 
@@ -266,9 +229,12 @@ _FAST: dict[str, tuple[Callable[[Any], bytes], _Read[Any]]] = {
     Clock.__msgtype__: (_encode_clock, _little_endian(Clock, _decode_clock)),
     TFMessage.__msgtype__: (_encode_tf, _little_endian(TFMessage, _decode_tf)),
     PoseArray.__msgtype__: (_encode_poses, _little_endian(PoseArray, _decode_poses)),
-    Odometry.__msgtype__: (encode_odometry, _little_endian(Odometry, decode_odometry)),
+    Odometry.__msgtype__: (packed.encode_odometry, _little_endian(Odometry, packed.decode_odometry)),
     LaserScan.__msgtype__: (encode_scan, _little_endian(LaserScan, decode_scan)),
-    Imu.__msgtype__: (encode_imu, _little_endian(Imu, decode_imu)),
+    Imu.__msgtype__: (packed.encode_imu, _little_endian(Imu, packed.decode_imu)),
     Path.__msgtype__: (encode_path, _little_endian(Path, decode_path)),
-    JointState.__msgtype__: (encode_joint_state, _little_endian(JointState, decode_joint_state)),
+    JointState.__msgtype__: (
+        packed.encode_joint_state,
+        _little_endian(JointState, packed.decode_joint_state),
+    ),
 }

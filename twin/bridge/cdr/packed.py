@@ -26,9 +26,11 @@ from twin.bridge.msgs import (
     Vector3,
 )
 
-_MAGIC = b"\x00\x01\x00\x00"
-_U32 = Struct("<I")
-_STAMP = Struct("<iI")
+MAGIC = b"\x00\x01\x00\x00"
+"""The encapsulation header of plain CDR, little endian."""
+U32 = Struct("<I")
+STAMP = Struct("<iI")
+POSE = Struct("<7d")
 _ODOMETRY_NUMBERS = Struct("<7d288s6d288s")
 _IMU_NUMBERS = Struct("<4d72s3d72s3d72s")
 
@@ -38,10 +40,37 @@ def _texts(*texts: str) -> bytes:
     """Return texts as CDR strings, padded for doubles to follow; they come after a stamp, so aligned to 8."""
     block = b""
     for text in texts:
-        block += b"\0" * (-len(block) % 4)
-        raw = text.encode() + b"\0"
-        block += _U32.pack(len(raw)) + raw
+        block += b"\0" * (-len(block) % 4) + _text(text)
     return block + b"\0" * (-len(block) % 8)
+
+
+def _text(text: str) -> bytes:
+    raw = text.encode() + b"\0"
+    return U32.pack(len(raw)) + raw
+
+
+def pack_header(header: Header) -> bytes:
+    """Return a header as CDR, without the padding after it."""
+    return STAMP.pack(header.stamp.sec, header.stamp.nanosec) + _text(header.frame_id)
+
+
+def read_header(payload: bytes) -> tuple[Header, int]:
+    """Read the header that a payload begins with; return it and where it ends."""
+    frame, at = read_text(payload, 12)
+    return Header(Time(*STAMP.unpack_from(payload, 4)), frame), at
+
+
+def read_count(payload: bytes, at: int) -> tuple[int, int]:
+    """Read how many elements a sequence at `at` has; return it and where they begin, if they need no padding.
+
+    Raises:
+        ValueError: more than the payload has bytes.
+    """
+    at += -at % 4
+    (count,) = U32.unpack_from(payload, at)
+    if count > len(payload):
+        raise ValueError(f"{count} elements do not fit")
+    return count, at + 4
 
 
 def encode_odometry(message: Odometry) -> bytes:
@@ -49,8 +78,8 @@ def encode_odometry(message: Odometry) -> bytes:
     stamp, pose, twist = message.header.stamp, message.pose, message.twist
     p, q, v, w = pose.pose.position, pose.pose.orientation, twist.twist.linear, twist.twist.angular
     return (
-        _MAGIC
-        + _STAMP.pack(stamp.sec, stamp.nanosec)
+        MAGIC
+        + STAMP.pack(stamp.sec, stamp.nanosec)
         + _texts(message.header.frame_id, message.child_frame_id)
         + _ODOMETRY_NUMBERS.pack(
             p.x, p.y, p.z, q.x, q.y, q.z, q.w,
@@ -86,8 +115,8 @@ def encode_imu(message: Imu) -> bytes:
     stamp, q = message.header.stamp, message.orientation
     w, a = message.angular_velocity, message.linear_acceleration
     return (
-        _MAGIC
-        + _STAMP.pack(stamp.sec, stamp.nanosec)
+        MAGIC
+        + STAMP.pack(stamp.sec, stamp.nanosec)
         + _texts(message.header.frame_id)
         + _IMU_NUMBERS.pack(
             q.x, q.y, q.z, q.w,
@@ -119,29 +148,27 @@ def decode_imu(payload: bytes) -> tuple[Imu, int]:
 @lru_cache(maxsize=64)
 def _names(frame: str, names: tuple[str, ...]) -> bytes:
     """Return a JointState from its frame to its names; it starts 8 bytes after the stamp's start."""
-    raw = frame.encode() + b"\0"
-    block = _U32.pack(len(raw)) + raw
-    block += b"\0" * (-len(block) % 4) + _U32.pack(len(names))
+    block = _text(frame)
+    block += b"\0" * (-len(block) % 4) + U32.pack(len(names))
     for name in names:
-        raw = name.encode() + b"\0"
-        block += b"\0" * (-len(block) % 4) + _U32.pack(len(raw)) + raw
+        block += b"\0" * (-len(block) % 4) + _text(name)
     return block
 
 
 def encode_joint_state(message: JointState) -> bytes:
     """Return a JointState as CDR."""
     stamp = message.header.stamp
-    block = _STAMP.pack(stamp.sec, stamp.nanosec) + _names(message.header.frame_id, tuple(message.name))
+    block = STAMP.pack(stamp.sec, stamp.nanosec) + _names(message.header.frame_id, tuple(message.name))
     for values in (message.position, message.velocity, message.effort):
-        block += b"\0" * (-len(block) % 4) + _U32.pack(len(values))
+        block += b"\0" * (-len(block) % 4) + U32.pack(len(values))
         if len(values):
             block += b"\0" * (-len(block) % 8) + _doubles(values, len(values))
-    return _MAGIC + block
+    return MAGIC + block
 
 
 def decode_joint_state(payload: bytes) -> tuple[JointState, int]:
     """Return a JointState from little-endian CDR, and where it ends."""
-    stamp = Time(*_STAMP.unpack_from(payload, 4))
+    stamp = Time(*STAMP.unpack_from(payload, 4))
     # A robot's joints do not change: the names are read once for all payloads that begin alike.
     known = _joint_names.get(len(payload))
     if known is not None and payload.startswith(known[0], 12):
@@ -163,11 +190,7 @@ _joint_names: dict[int, tuple[bytes, str, list[str]]] = {}
 
 def _read_names(payload: bytes) -> tuple[str, list[str], int]:
     frame, at = read_text(payload, 12)
-    at += -at % 4
-    (count,) = _U32.unpack_from(payload, at)
-    at += 4
-    if count > len(payload):
-        raise ValueError(f"{count} names do not fit")
+    count, at = read_count(payload, at)
     names = []
     for _ in range(count):
         name, at = read_text(payload, at)
@@ -178,9 +201,7 @@ def _read_names(payload: bytes) -> tuple[str, list[str], int]:
 def _read_arrays(payload: bytes, at: int) -> tuple[list[NDArray[np.float64]], int]:
     arrays = []
     for _ in range(3):
-        at += -at % 4
-        (count,) = _U32.unpack_from(payload, at)
-        at += 4
+        count, at = read_count(payload, at)
         if count:
             at += (4 - at) % 8
         if count * 8 > len(payload) - at:
@@ -200,7 +221,7 @@ def _doubles(values: NDArray[np.float64], count: int) -> bytes:
 def read_text(payload: bytes, at: int) -> tuple[str, int]:
     """Read a string at `at`; return it and where it ends."""
     at += -at % 4
-    (length,) = _U32.unpack_from(payload, at)
+    (length,) = U32.unpack_from(payload, at)
     end = at + 4 + length
     if length == 0 or end > len(payload) or payload[end - 1]:
         raise ValueError(f"a string of {length} bytes does not fit, or has no end")
@@ -209,7 +230,7 @@ def read_text(payload: bytes, at: int) -> tuple[str, int]:
 
 def _read_head(payload: bytes, texts: int, after: int) -> tuple[Time, tuple[str, ...], int]:
     """Read stamp and texts, which `after` bytes follow; return them and where the doubles start."""
-    stamp, at = Time(*_STAMP.unpack_from(payload, 4)), len(payload) - after
+    stamp, at = Time(*STAMP.unpack_from(payload, 4)), len(payload) - after
     if 0 < at - 12 <= _LONGEST_KNOWN:  # a publisher's texts do not change: they are read once
         found, end = _known_texts(payload[12:at], texts)
         if end == at:

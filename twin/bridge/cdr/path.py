@@ -5,13 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from struct import Struct
 
-from twin.bridge.cdr.packed import read_text
+from twin.bridge.cdr.packed import MAGIC, POSE, STAMP, U32, pack_header, read_count, read_header, read_text
 from twin.bridge.msgs import Header, Path, Point, Pose, PoseStamped, Quaternion, Time
-
-_MAGIC = b"\x00\x01\x00\x00"
-_U32 = Struct("<I")
-_STAMP = Struct("<iI")
-_POSE = Struct("<7d")
 
 
 @lru_cache(maxsize=256)
@@ -25,10 +20,9 @@ def _pose_struct(phase: int, frame: str) -> tuple[Struct, bytes]:
 
 def encode_path(message: Path) -> bytes:
     """Return a Path as CDR."""
-    stamp, raw = message.header.stamp, message.header.frame_id.encode() + b"\0"
-    head = _STAMP.pack(stamp.sec, stamp.nanosec) + _U32.pack(len(raw)) + raw
-    head += b"\0" * (-len(head) % 4) + _U32.pack(len(message.poses))
-    chunks, at = [_MAGIC, head], len(head)
+    head = pack_header(message.header)
+    head += b"\0" * (-len(head) % 4) + U32.pack(len(message.poses))
+    chunks, at = [MAGIC, head], len(head)
     for item in message.poses:
         header, p, q = item.header, item.pose.position, item.pose.orientation
         layout, raw = _pose_struct(at % 8, header.frame_id)
@@ -40,21 +34,16 @@ def encode_path(message: Path) -> bytes:
 
 def decode_path(payload: bytes) -> tuple[Path, int]:
     """Return a Path from little-endian CDR, and where it ends."""
-    stamp = Time(*_STAMP.unpack_from(payload, 4))
-    frame, at = read_text(payload, 12)
-    at += -at % 4
-    (count,) = _U32.unpack_from(payload, at)
-    at += 4
-    if count > len(payload):
-        raise ValueError(f"{count} poses do not fit")
+    header, at = read_header(payload)
+    count, at = read_count(payload, at)
     poses = []
     for _ in range(count):
         at += -at % 4
-        time = Time(*_STAMP.unpack_from(payload, at))
-        pose_frame, at = read_text(payload, at + 8)
+        stamp = Time(*STAMP.unpack_from(payload, at))
+        frame, at = read_text(payload, at + 8)
         at += (4 - at) % 8  # the encapsulation's 4 bytes do not count for alignment
-        x, y, z, qx, qy, qz, qw = _POSE.unpack_from(payload, at)
-        at += _POSE.size
+        x, y, z, qx, qy, qz, qw = POSE.unpack_from(payload, at)
+        at += POSE.size
         pose = Pose(Point(x, y, z), Quaternion(qx, qy, qz, qw))
-        poses.append(PoseStamped(Header(time, pose_frame), pose))
-    return Path(Header(stamp, frame), poses), at
+        poses.append(PoseStamped(Header(stamp, frame), pose))
+    return Path(header, poses), at

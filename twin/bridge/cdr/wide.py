@@ -7,7 +7,7 @@ messages are encoded in a wire form in which every wstring is an uint32[].
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -82,13 +82,10 @@ def _to_wire(message: Any, name: str) -> Any:
 
 def _field_to_wire(value: Any, field: Field) -> Any:
     if field.base == "wstring":
-        if not field.many:
-            return _units(value)
-        return [_wire.types[_UNITS](_units(item)) for item in value]
+        return [_wire.types[_UNITS](_units(item)) for item in value] if field.many else _units(value)
     if field.message and is_wide(field.message):
-        if not field.many:
-            return _to_wire(value, field.message)
-        return [_to_wire(item, field.message) for item in value]
+        wire = partial(_to_wire, name=field.message)
+        return [*map(wire, value)] if field.many else wire(value)
     return value
 
 
@@ -101,11 +98,8 @@ def _field_from_wire(value: Any, field: Field) -> Any:
     if field.base == "wstring":
         return [_text(item.units) for item in value] if field.many else _text(value)
     if field.message:
-        return (
-            [_from_wire(item, field.message) for item in value]
-            if field.many
-            else _from_wire(value, field.message)
-        )
+        plain = partial(_from_wire, name=field.message)
+        return [*map(plain, value)] if field.many else plain(value)
     return value
 
 

@@ -6,7 +6,9 @@ The forms are those of rosidl_runtime_py (convert.py); the way back is `from_val
 from __future__ import annotations
 
 import sys
-from typing import Any
+from collections.abc import Iterable
+from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -14,9 +16,6 @@ import yaml
 from twin.bridge import types
 from twin.bridge.types.default_values import new
 from twin.bridge.types.fields import Field, fields_of
-
-TRUNCATE_LENGTH = 128
-"""The default of `ros2 topic echo --truncate-length`."""
 
 _IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 _PROTOTYPES = {"msg": "", "srv": "_Request", "action": "_Goal"}
@@ -33,7 +32,7 @@ def message_to_dict(
         no_arr: say only type and length of sequences.
         no_str: say only the length of strings.
     """
-    options = (truncate_length, no_arr, no_str)
+    options = _Options(truncate_length, no_arr, no_str)
     return {
         field.name: _plain(getattr(message, field.attribute), field, options)
         for field in fields_of(message.__msgtype__)
@@ -77,15 +76,15 @@ def message_to_csv(
     message: Any, *, truncate_length: int | None = None, no_arr: bool = False, no_str: bool = False
 ) -> str:
     """Return a message as one line of values, as `ros2 topic echo --csv`; arguments of `message_to_dict`."""
-    options = (truncate_length, no_arr, no_str)
-    line = ""
-    for field in fields_of(message.__msgtype__):
-        text = _csv(getattr(message, field.attribute), field, options)
-        line += f",{text}" if line else text
-    return line
+    options = _Options(truncate_length, no_arr, no_str)
+    fields = fields_of(message.__msgtype__)
+    return _line(_csv(getattr(message, field.attribute), field, options) for field in fields)
 
 
-_Options = tuple[int | None, bool, bool]
+class _Options(NamedTuple):
+    truncate_length: int | None
+    no_arr: bool
+    no_str: bool
 
 
 class _Dumper(yaml.SafeDumper):
@@ -103,10 +102,10 @@ _Dumper.add_representer(dict, _Dumper.represent_block)
 
 
 def _plain(value: Any, field: Field, options: _Options) -> Any:
-    length, no_arr, _ = options
+    length = options.truncate_length
     if not field.many:
         return _plain_item(value, field, options)
-    if no_arr:
+    if options.no_arr:
         return _abbreviated(value, field)
     if length is not None and len(value) > length:
         return [*(_plain_item(item, field, options) for item in value[:length]), "..."]
@@ -116,35 +115,36 @@ def _plain(value: Any, field: Field, options: _Options) -> Any:
 
 
 def _plain_item(value: Any, field: Field, options: _Options) -> Any:
-    length, no_arr, no_str = options
     if field.message:
-        return message_to_dict(value, truncate_length=length, no_arr=no_arr, no_str=no_str)
+        return message_to_dict(value, **options._asdict())
     if field.base in ("byte", "octet"):
         return chr(int(value) & 255)  # rclpy has bytes there, which the tool shows as text
     if isinstance(value, str):
-        if no_str:
+        if options.no_str:
             return f"<string length: <{len(value)}>>"
+        length = options.truncate_length
         return value if length is None or len(value) <= length else value[:length] + "..."
     return value.item() if isinstance(value, np.generic) else value
 
 
 def _csv(value: Any, field: Field, options: _Options) -> str:
-    length, no_arr, _ = options
+    length = options.truncate_length
     if not field.many:
         return _csv_item(value, field, options)
-    if no_arr:
+    if options.no_arr:
         return _abbreviated(value, field)
-    items = [_csv_item(item, field, options) for item in (value if length is None else value[:length])]
-    text = ""
-    for item in items if length is None or len(value) <= length else [*items, "..."]:
-        text += f",{item}" if text else item
-    return text
+    items = [_csv_item(item, field, options) for item in value[:length]]
+    return _line(items if length is None or len(value) <= length else [*items, "..."])
+
+
+def _line(texts: Iterable[str]) -> str:
+    """Join with commas, of which there is none after empty texts at the beginning, as in rosidl."""
+    return reduce(lambda line, text: f"{line},{text}" if line else text, texts, "")
 
 
 def _csv_item(value: Any, field: Field, options: _Options) -> str:
-    length, no_arr, no_str = options
     if field.message:
-        return message_to_csv(value, truncate_length=length, no_arr=no_arr, no_str=no_str)
+        return message_to_csv(value, **options._asdict())
     if field.base in ("byte", "octet"):
         return str(bytes([int(value) & 255]))
     if isinstance(value, str):

@@ -14,7 +14,7 @@ from twin.bridge.node.logger import Logger, Rosout, logger_name
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.tasks import Execution, Task
 from twin.bridge.node.timers import Rate, Timer
-from twin.bridge.parameters.node_parameters import NodeParameters, start_parameters
+from twin.bridge.parameters.node_parameters import NodeParameters
 from twin.bridge.qos import PARAMETER_EVENTS, QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
 from twin.bridge.topics import Publisher, Subscription
@@ -71,7 +71,7 @@ class Node(NodeParameters, NodeGraph):
         self._logger = Logger(Rosout(self), logger_name(self))
         self._logger.levels.start(self._logger.name, self.options.arguments.log_levels)
         self._parameter_events: Publisher[ParameterEvent] | None = None
-        self._parameters = start_parameters(self, parameters)
+        self._start_parameters(parameters, lambda event: self.advertise_parameter_events().publish(event))
         bus.standard_services.added(self)
 
     @property
@@ -226,10 +226,6 @@ class Node(NodeParameters, NodeGraph):
                 ParameterEvent, "/parameter_events", PARAMETER_EVENTS
             )
         return self._parameter_events
-
-    def publish_parameter_event(self, event: ParameterEvent) -> None:
-        """Tell /parameter_events of a change."""
-        self.advertise_parameter_events().publish(event)
 
     def spin(self) -> None:
         """Handle what was in the inbox when called, then timers due, then one step of every execution.

@@ -109,9 +109,7 @@ class Logger:
         """Log what may go wrong."""
         return self._log(Log.WARN, message, **filters)
 
-    def warning(self, message: str, **filters: Any) -> bool:
-        """Log what may go wrong."""
-        return self._log(Log.WARN, message, **filters)
+    warning = warn
 
     def error(self, message: str, **filters: Any) -> bool:
         """Log what went wrong."""

@@ -12,14 +12,8 @@ from twin.errors import BridgeError
 
 UNSET = 0
 DEFAULT_LEVEL: int = Log.INFO
-LEVELS: dict[str, int] = {
-    "UNSET": UNSET,
-    "DEBUG": Log.DEBUG,
-    "INFO": Log.INFO,
-    "WARN": Log.WARN,
-    "ERROR": Log.ERROR,
-    "FATAL": Log.FATAL,
-}
+LEVELS: dict[str, int] = {"UNSET": UNSET}
+LEVELS |= {word: getattr(Log, word) for word in ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")}
 
 _GetLoggerLevels = ServiceType("rcl_interfaces/srv/GetLoggerLevels")
 _SetLoggerLevels = ServiceType("rcl_interfaces/srv/SetLoggerLevels")
@@ -66,13 +60,10 @@ class LoggerLevels:
 
     def effective(self, name: str) -> int:
         """Return the level that holds for a name."""
-        level = self._effective.get(name)
-        if level is None:
-            own = self._levels.get(name, UNSET)
+        if name not in self._effective:
             inherited = self.effective(name.rpartition(".")[0]) if name else DEFAULT_LEVEL
-            level = own or inherited
-            self._effective[name] = level
-        return level
+            self._effective[name] = self.get(name) or inherited
+        return self._effective[name]
 
     def _on_get(self, request: Any) -> Any:
         entry = types.get("rcl_interfaces/msg/LoggerLevel")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from twin.bridge.parameters.services import ParameterServices
+from twin.bridge.parameters import services as parameter_services
 from twin.bridge.types import ServiceType
 from twin.bridge.types import description_service as type_description_service
 
@@ -64,7 +64,7 @@ def offer(node: Node) -> None:
         node.get_logger().advertise()
     if node.options.start_parameter_services:
         node.advertise_parameter_events()
-        offered |= ParameterServices(node.parameters).offered
+        offered |= parameter_services.offered(node)
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered
     if node.get_parameter("start_type_description_service").value:

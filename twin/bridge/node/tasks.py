@@ -43,9 +43,7 @@ class Task:
         self.done = True
         close(self._generator)
 
-    def close(self) -> None:
-        """End it where it waits."""
-        self.cancel()
+    close = cancel
 
 
 def close(generator: Generator[None, None, Any]) -> None:

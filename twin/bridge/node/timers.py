@@ -24,35 +24,31 @@ class Timer:
         self._callback = callback
         self._clock = clock
         self.reset()
-        self._cancelled = not autostart
+        self.is_canceled = not autostart
+        """Whether it fires no more, until reset."""
 
     def reset(self) -> None:
         """Fire next at the first multiple of the period after now; also after `cancel`."""
         self._schedule(self._clock.now_ns)
-        self._cancelled = False
+        self.is_canceled = False
 
     def cancel(self) -> None:
         """Fire no more, until reset."""
-        self._cancelled = True
-
-    @property
-    def is_canceled(self) -> bool:
-        """Whether it fires no more, until reset."""
-        return self._cancelled
+        self.is_canceled = True
 
     @property
     def is_ready(self) -> bool:
         """Whether it is due."""
-        return not self._cancelled and self._clock.now_ns >= self.next_ns
+        return not self.is_canceled and self._clock.now_ns >= self.next_ns
 
     @property
     def time_until_next_call(self) -> int | None:
         """How long until it is due [ns], negative if it is late; None if cancelled."""
-        return None if self._cancelled else self.next_ns - self._clock.now_ns
+        return None if self.is_canceled else self.next_ns - self._clock.now_ns
 
     def run(self, now_ns: int) -> None:
         """Call back if due."""
-        if self._cancelled:
+        if self.is_canceled:
             return
         if now_ns >= self.next_ns:
             self._schedule(now_ns)
@@ -69,8 +65,6 @@ class Rate:
     """Sleeps to the next multiple of a period in executions: `yield from rate.sleep()`."""
 
     def __init__(self, period_ns: Period, clock: Clock) -> None:
-        if period_ns <= 0:
-            raise BridgeError(f"a rate with a period of {period_ns} ns; valid is more than zero")
         self.period_ns = period_ns
         self._clock = clock
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import operator
 
-from twin.bridge.msgs import ParameterDescriptor
+from twin.bridge.msgs import FloatingPointRange, IntegerRange, ParameterDescriptor
 from twin.bridge.parameters.values import Parameter, Type
 
 _RELATIVE_TOLERANCE = 1e-6  # rclpy's Node.PARAM_REL_TOL
@@ -31,45 +32,30 @@ def objection(
             return f"Wrong parameter type, expected '{Type(descriptor.type)}' got '{kind}'"
     reason = ""
     if kind is Type.INTEGER and descriptor.integer_range:
-        reason = _outside_integers(name, parameter.value, descriptor.integer_range[0])
+        reason = _outside(name, parameter.value, descriptor.integer_range[0])
     elif kind is Type.DOUBLE and descriptor.floating_point_range:
-        reason = _outside_doubles(name, parameter.value, descriptor.floating_point_range[0])
+        reason = _outside(name, parameter.value, descriptor.floating_point_range[0])
     # Ranges of ROS have an end on each side, and both are valid; the words may say it better.
     words = descriptor.additional_constraints
     return f"{name} {words}, not {parameter.value!r}" if reason and words else reason
 
 
-def _outside_integers(name: str, value: int, valid: object) -> str:
-    low, high, step = _limits(valid)
-    if value in (low, high):  # the edges are valid whatever the step
+def _outside(name: str, value: float, valid: IntegerRange | FloatingPointRange) -> str:
+    low, high = sorted((valid.from_value, valid.to_value))
+    step, whole = valid.step, isinstance(value, int)
+    same = operator.eq if whole else _near
+    if same(value, low) or same(value, high):  # the edges are valid whatever the step
         return ""
     if not low < value < high:
-        return f"Parameter {name} out of range. Min: {low}, Max: {high}, value: {value}"
-    if step and (value - low) % step:
-        return (
-            f"The parameter value for {name} is not a valid step. "
-            f"Min: {low}, max: {high}, value: {value}, step: {step}"
-        )
-    return ""
-
-
-def _outside_doubles(name: str, value: float, valid: object) -> str:
-    low, high, step = _limits(valid)
-    if _near(value, low) or _near(value, high):
+        return f"Parameter {name} out of range{'.' if whole else ''} Min: {low}, Max: {high}, value: {value}"
+    if not step:
         return ""
-    if not low < value < high:
-        return f"Parameter {name} out of range Min: {low}, Max: {high}, value: {value}"
-    if step and not _near(low + round((value - low) / step) * step, value):
-        return (
-            f"The parameter value for {name} is not close enough to a valid step. "
-            f"Min: {low}, max: {high}, value: {value}, step: {step}"
-        )
-    return ""
-
-
-def _limits(valid: object) -> tuple[float, float, float]:
-    first, last, step = valid.from_value, valid.to_value, valid.step  # type: ignore[attr-defined]
-    return min(first, last), max(first, last), step
+    if (value - low) % step == 0 if whole else _near(low + round((value - low) / step) * step, value):
+        return ""
+    return (
+        f"The parameter value for {name} is not {'a' if whole else 'close enough to a'} valid step. "
+        f"Min: {low}, max: {high}, value: {value}, step: {step}"
+    )
 
 
 def _near(a: float, b: float) -> bool:

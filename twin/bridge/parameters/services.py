@@ -7,64 +7,58 @@ from typing import Any
 
 import numpy as np
 
+from twin.bridge import srvs
 from twin.bridge.msgs import SetParametersResult
 from twin.bridge.parameters.errors import ParameterException
 from twin.bridge.parameters.parameters import Parameters
 from twin.bridge.parameters.values import Parameter
-from twin.bridge.srvs import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
 from twin.bridge.types import ServiceType
 from twin.errors import BridgeError
 
 
-class ParameterServices:
-    """Callbacks by service name; where one name of a request is not declared, the whole answer is empty."""
+def offered(node: Parameters) -> dict[str, tuple[ServiceType, Callable[[Any], Any]]]:
+    """Return the services: name below the node -> type and callback.
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self.offered: dict[str, tuple[ServiceType, Callable[[Any], Any]]] = {
-            "describe_parameters": (DescribeParameters, self._describe),
-            "get_parameter_types": (GetParameterTypes, self._types),
-            "get_parameters": (GetParameters, self._get),
-            "list_parameters": (ListParameters, self._list),
-            "set_parameters": (SetParameters, self._set),
-            "set_parameters_atomically": (SetParametersAtomically, self._set_atomically),
-        }
-        """Name below the node -> type and callback."""
+    Where one name of a request is not declared, the whole answer is empty.
+    """
 
-    def _describe(self, request: Any) -> Any:
-        return DescribeParameters.Response(_all_or_none(self._parameters.describe, request.names))
+    def describe(request: Any) -> Any:
+        return srvs.DescribeParameters.Response(_all_or_none(node.describe_parameter, request.names))
 
-    def _get(self, request: Any) -> Any:
-        found = _all_or_none(self._parameters.get, request.names)
-        return GetParameters.Response([parameter.get_parameter_value() for parameter in found])
+    def get(request: Any) -> Any:
+        found = _all_or_none(node.get_parameter, request.names)
+        return srvs.GetParameters.Response([parameter.get_parameter_value() for parameter in found])
 
-    def _types(self, request: Any) -> Any:
-        found = _all_or_none(self._parameters.type_of, request.names)
-        return GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
+    def types(request: Any) -> Any:
+        found = _all_or_none(node.get_parameter_type, request.names)
+        return srvs.GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
 
-    def _list(self, request: Any) -> Any:
-        return ListParameters.Response(self._parameters.listed(request.prefixes, int(request.depth)))
+    def listed(request: Any) -> Any:
+        return srvs.ListParameters.Response(node.list_parameters(request.prefixes, int(request.depth)))
 
-    def _set(self, request: Any) -> Any:
-        return SetParameters.Response([self._changed([message]) for message in request.parameters])
+    def change(request: Any) -> Any:
+        return srvs.SetParameters.Response([_changed(node, [message]) for message in request.parameters])
 
-    def _set_atomically(self, request: Any) -> Any:
-        return SetParametersAtomically.Response(self._changed(request.parameters))
+    def change_atomically(request: Any) -> Any:
+        return srvs.SetParametersAtomically.Response(_changed(node, request.parameters))
 
-    def _changed(self, messages: Sequence[Any]) -> SetParametersResult:
-        try:
-            return self._parameters.set_atomically([Parameter.from_parameter_msg(m) for m in messages])
-        except ParameterException as error:
-            return SetParametersResult(False, error.reason)
-        except BridgeError as error:
-            return SetParametersResult(False, str(error))
+    return {
+        "describe_parameters": (srvs.DescribeParameters, describe),
+        "get_parameter_types": (srvs.GetParameterTypes, types),
+        "get_parameters": (srvs.GetParameters, get),
+        "list_parameters": (srvs.ListParameters, listed),
+        "set_parameters": (srvs.SetParameters, change),
+        "set_parameters_atomically": (srvs.SetParametersAtomically, change_atomically),
+    }
+
+
+def _changed(node: Parameters, messages: Sequence[Any]) -> SetParametersResult:
+    try:
+        return node.set_parameters_atomically([Parameter.from_parameter_msg(m) for m in messages])
+    except BridgeError as error:
+        return SetParametersResult(
+            False, error.reason if isinstance(error, ParameterException) else str(error)
+        )
 
 
 def _all_or_none(read: Callable[[str], Any], names: Sequence[str]) -> list[Any]:

@@ -36,9 +36,8 @@ class Type(Enum):
         return self.value >= Type.BYTE_ARRAY.value
 
 
-_FIELDS = {
-    kind: f"{kind.name.lower()}_value" for kind in Type if kind is not Type.NOT_SET
-}  # of ParameterValue: bool_value ... string_array_value
+_FIELDS = {kind: f"{kind.name.lower()}_value" for kind in Type}
+"""Of ParameterValue: bool_value ... string_array_value."""
 _DTYPES = {
     Type.BYTE_ARRAY: np.uint8,
     Type.BOOL_ARRAY: np.bool_,
@@ -135,7 +134,14 @@ class Parameter:
 
     def get_parameter_value(self) -> ParameterValue:
         """Return the value as a message."""
-        return value_msg(self.kind, self.value)
+        kind, value = self.kind, self.value
+        if kind is Type.NOT_SET:
+            return new(ParameterValue)
+        if kind is Type.BYTE_ARRAY:
+            value = np.frombuffer(b"".join(value), np.uint8)
+        elif kind in _DTYPES:
+            value = np.array(value, _DTYPES[kind])
+        return new(ParameterValue, type=kind.value, **{_FIELDS[kind]: value})
 
     def to_parameter_msg(self) -> ParameterMsg:
         """Return name and value as a message."""
@@ -148,23 +154,12 @@ class Parameter:
         Raises:
             BridgeError: a type that does not exist.
         """
-        kind, value = from_value_msg(message.name, message.value)
-        return Parameter(message.name, kind, value)
+        value = value_to_python(message.value, message.name)
+        return Parameter(message.name, Type(message.value.type), value)
 
 
-def value_msg(kind: Type, value: Any) -> ParameterValue:
-    """Return a value of a known type as a message."""
-    if kind is Type.NOT_SET:
-        return new(ParameterValue)
-    if kind is Type.BYTE_ARRAY:
-        value = np.frombuffer(b"".join(value), np.uint8)
-    elif kind in _DTYPES:
-        value = np.array(value, _DTYPES[kind])
-    return new(ParameterValue, type=kind.value, **{_FIELDS[kind]: value})
-
-
-def from_value_msg(name: str, message: ParameterValue) -> tuple[Type, Any]:
-    """Return type and value of a message.
+def value_to_python(message: ParameterValue, name: str = "") -> Any:
+    """Return a message's value; None if it is not set (rclpy's parameter_value_to_python).
 
     Raises:
         BridgeError: a type that does not exist.
@@ -173,20 +168,11 @@ def from_value_msg(name: str, message: ParameterValue) -> tuple[Type, Any]:
         raise BridgeError(f"the parameter {name} has the type {message.type}; valid is 0 to 9")
     kind = Type(message.type)
     if kind is Type.NOT_SET:
-        return kind, None
+        return None
     value = getattr(message, _FIELDS[kind])
     if kind is Type.BYTE_ARRAY:
-        return kind, [bytes([byte]) for byte in value.astype(np.uint8)]  # int8 when received
-    return kind, value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def value_to_python(message: ParameterValue) -> Any:
-    """Return a message's value; None if it is not set (rclpy's parameter_value_to_python).
-
-    Raises:
-        BridgeError: a type that does not exist.
-    """
-    return from_value_msg("", message)[1]
+        return [bytes([byte]) for byte in value.astype(np.uint8)]  # int8 when received
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _in_range(name: str, value: Any) -> Any:

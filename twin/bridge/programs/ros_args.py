@@ -61,63 +61,59 @@ def parse(arguments: Sequence[str]) -> RosArguments:
     Raises:
         BridgeError: an unknown or incomplete ROS argument, or a parameter file that cannot be read.
     """
-    reader = _Reader()
-    return reader.read(iter(arguments))
+    remappings: list[names.RemapRule] = []
+    sections: list[parameter_files.Section] = []
+    parameters: list[tuple[str, str, Any]] = []
+    levels: list[tuple[str, int]] = []
+    actions: dict[str, Callable[[str], None]] = {
+        "remap": lambda text: remappings.append(names.RemapRule.parse(text)),
+        "param": lambda text: parameters.append(_parameter(text)),
+        "params_file": lambda text: sections.extend(parameter_files.read(Path(text))),
+        "log_level": lambda text: levels.append(_log_level(text)),
+        "ignored": lambda text: None,
+    }
+    rest: list[str] = []
+    given = iter(arguments)
+    for argument in given:
+        if argument == "--ros-args":
+            _read_ros(given, actions)
+        else:
+            rest.append(argument)
+    return RosArguments(
+        remappings=tuple(remappings),
+        sections=tuple(sections),
+        parameters=tuple(parameters),
+        log_levels=tuple(levels),
+        rest=tuple(rest),
+    )
 
 
-class _Reader:
-    def __init__(self) -> None:
-        self._remappings: list[names.RemapRule] = []
-        self._files: list[parameter_files.Section] = []
-        self._parameters: list[tuple[str, str, Any]] = []
-        self._levels: list[tuple[str, int]] = []
+def _read_ros(arguments: Iterator[str], actions: dict[str, Callable[[str], None]]) -> None:
+    for argument in arguments:
+        if argument == "--":
+            return
+        if argument in _SWITCHES or argument == "--ros-args":
+            continue
+        if argument not in _WITH_VALUE:
+            known = nearest(argument, [*_WITH_VALUE, *_SWITCHES])
+            raise BridgeError(f"{argument!r} after --ros-args is not known; {known}")
+        value = next(arguments, None)
+        if value is None:
+            raise BridgeError(f"nothing follows {argument} at the end of the arguments")
+        actions[_WITH_VALUE[argument]](value)
 
-    def read(self, arguments: Iterator[str]) -> RosArguments:
-        rest: list[str] = []
-        for argument in arguments:
-            if argument == "--ros-args":
-                self._read_ros(arguments)
-            else:
-                rest.append(argument)
-        return RosArguments(
-            remappings=tuple(self._remappings),
-            sections=tuple(self._files),
-            parameters=tuple(self._parameters),
-            log_levels=tuple(self._levels),
-            rest=tuple(rest),
-        )
 
-    def _read_ros(self, arguments: Iterator[str]) -> None:
-        actions: dict[str, Callable[[str], None]] = {
-            "remap": lambda text: self._remappings.append(names.RemapRule.parse(text)),
-            "param": self._param,
-            "params_file": lambda text: self._files.extend(parameter_files.read(Path(text))),
-            "log_level": self._log_level,
-            "ignored": lambda text: None,
-        }
-        for argument in arguments:
-            if argument == "--":
-                return
-            if argument in _SWITCHES or argument == "--ros-args":
-                continue
-            if argument not in _WITH_VALUE:
-                known = nearest(argument, [*_WITH_VALUE, *_SWITCHES])
-                raise BridgeError(f"{argument!r} after --ros-args is not known; {known}")
-            value = next(arguments, None)
-            if value is None:
-                raise BridgeError(f"nothing follows {argument} at the end of the arguments")
-            actions[_WITH_VALUE[argument]](value)
+def _parameter(text: str) -> tuple[str, str, Any]:
+    left, found, value = text.partition(":=")
+    node, _, name = left.rpartition(":")
+    if not (found and name):
+        raise BridgeError(f"{text!r} is no parameter; valid: name:=value, node:name:=value")
+    return node, name, parameter_files.scalar(value)
 
-    def _param(self, text: str) -> None:
-        left, found, value = text.partition(":=")
-        node, _, name = left.rpartition(":")
-        if not (found and name):
-            raise BridgeError(f"{text!r} is no parameter; valid: name:=value, node:name:=value")
-        self._parameters.append((node, name, parameter_files.scalar(value)))
 
-    def _log_level(self, text: str) -> None:
-        name, found, word = text.partition(":=")
-        level = LEVELS.get((word if found else text).upper())
-        if level is None:
-            raise BridgeError(f"{text!r} is no log level; valid: {', '.join(LEVELS)}, or logger:=LEVEL")
-        self._levels.append((name if found else "", level))
+def _log_level(text: str) -> tuple[str, int]:
+    name, found, word = text.partition(":=")
+    level = LEVELS.get((word if found else text).upper())
+    if level is None:
+        raise BridgeError(f"{text!r} is no log level; valid: {', '.join(LEVELS)}, or logger:=LEVEL")
+    return name if found else "", level

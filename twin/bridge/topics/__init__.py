@@ -12,7 +12,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.qos import INFINITE_NS, QoS
-from twin.bridge.wire.admission import Admission, read
+from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
 from twin.bridge.wire.naming import Interface
@@ -32,7 +32,7 @@ _KEEP_ALL = 100_000
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_codec", "_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
+    __slots__ = ("_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
     def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
         self.publisher = publisher
@@ -45,25 +45,36 @@ class Sample(Generic[M]):
         """Simulated time of publishing [ns]."""
         self.message = message
         """The publisher's own object: not to be changed or kept."""
-        self._codec = publisher.codec
         self._payload: bytes | None = None
 
     @property
     def payload(self) -> bytes:
         """The message as CDR."""
         if self._payload is None:
-            self._payload = self._codec.encode(self.message)
+            self._payload = self.publisher.codec.encode(self.message)
         return self._payload
 
 
 class Endpoint:
     """What publishers, subscriptions, services and clients have in common: a key, a token, a gid."""
 
-    def __init__(self, node: Node, kind: EndpointKind, name: str, typename: str, qos: QoS) -> None:
+    def __init__(
+        self,
+        node: Node,
+        kind: EndpointKind,
+        name: str,
+        typename: str,
+        qos: QoS,
+        *,
+        type_hash: str | None = None,
+    ) -> None:
+        """Prepare; a type of which the hash is given need not be known here."""
         bus = node.bus
-        self.interface = Interface(name, types.dds_name(typename), types.rihs01(typename))
-        type_hash = bus.naming.type_hash(self.interface.type_hash)
-        token = node.token.endpoint(bus.next_id(), kind, name, self.interface.dds_name, type_hash, qos)
+        if type_hash is None:
+            type_hash = types.rihs01(typename)
+        dds_name = types.dds_name(typename) if typename.count("/") == 2 else typename
+        self.interface = Interface(name, dds_name, type_hash)
+        token = node.token.endpoint(bus.next_id(), kind, name, dds_name, bus.naming.type_hash(type_hash), qos)
         self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
@@ -186,8 +197,7 @@ class Subscription(Endpoint, Generic[M]):
         """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
         if not isinstance(self._origin, zenoh.Sample):
             return self._origin
-        attachment = self._origin.attachment  # read only if asked for: few want to know
-        return parse_attachment(attachment.to_bytes() if attachment else None)
+        return parse_attachment(attachment_of(self._origin))  # read only if asked for: few want to know
 
     def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
         """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
@@ -240,8 +250,7 @@ class Subscription(Endpoint, Generic[M]):
             if not self._networked or str(sample.key_expr) == self.key:
                 self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
-        attachment = sample.attachment.to_bytes() if sample.attachment else None
-        source = self._admission.source(str(sample.key_expr), attachment)
+        source = self._admission.source(sample)
         if source is not None:
             payload = sample.payload.to_bytes()
             bus.external.push(Arrival(source, self, (payload, source), len(payload)))

@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
-from twin.bridge.wire.keys import Attachment
-
-
-class Receiver(Protocol):
-    """A subscription."""
-
-    def enqueue(self, data: tuple[bytes, Attachment], external: bool) -> None:
-        """Put a payload and its source into the node's inbox."""
+from twin.bridge.wire.external import Receiver
 
 
 class Listeners:

@@ -13,7 +13,7 @@ from twin.bridge import types
 from twin.bridge.qos import QoS
 from twin.bridge.topics import declare_subscriber
 from twin.bridge.wire import ros2dds as wire_ros2dds
-from twin.bridge.wire.admission import nameless_source
+from twin.bridge.wire.admission import attachment_of, nameless_source
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, parse_attachment
 from twin.bridge.wire.naming import parse_key
@@ -102,7 +102,7 @@ class RawSubscription:
         self._pending.clear()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        data = self._read(self.node.bus, str(sample.key_expr), sample)
+        data = self._read(self.node.bus, sample)
         if data is not None:
             self._take(data)
 
@@ -114,8 +114,9 @@ class RawSubscription:
         else:
             bus.external.push(Arrival(data.source, self, data, len(data.payload)))
 
-    def _read(self, bus: Bus, key: str, sample: zenoh.Sample) -> RawSample | None:
-        source = parse_attachment(sample.attachment.to_bytes() if sample.attachment else None)
+    def _read(self, bus: Bus, sample: zenoh.Sample) -> RawSample | None:
+        key = str(sample.key_expr)
+        source = parse_attachment(attachment_of(sample))
         typed = parse_key(key)
         if typed is None:
             topic, announced = f"/{key}", self._announced
@@ -124,11 +125,11 @@ class RawSubscription:
                 bus.external.refuse("type", topic, "no type, and no bridge announces the topic")
                 return None
             source = source or nameless_source(key, next(self._nameless))
-        elif typed.domain != str(bus.domain_id):
+        elif typed[0] != str(bus.domain_id):
             return None
         else:
-            topic, type_hash = typed.name, typed.type_hash
-            typename = types.from_dds_name(typed.dds_name) or typed.dds_name
+            topic, dds_name, type_hash = typed[1]
+            typename = types.from_dds_name(dds_name) or dds_name
         if source is None:
             bus.external.refuse("attachment", topic, "no rmw_zenoh attachment of 33 bytes")
             return None

@@ -17,20 +17,19 @@ import numpy as np
 
 from twin.bridge.types import type_store
 from twin.bridge.types.literals import Value
-from twin.bridge.types.parser import Definition
-from twin.bridge.types.type_hash import FieldDefs, rihs01_of
-from twin.bridge.types.type_names import Parts, dds_name, from_dds_name, parts
-from twin.bridge.types.type_store import add_folder, add_folders, store
+from twin.bridge.types.type_hash import rihs01_of
+from twin.bridge.types.type_names import dds_name as dds_name
+from twin.bridge.types.type_names import from_dds_name as from_dds_name
+from twin.bridge.types.type_names import full_name as full_name
+from twin.bridge.types.type_names import parts as parts
+from twin.bridge.types.type_store import add_definitions as add_definitions
+from twin.bridge.types.type_store import add_folder as add_folder
+from twin.bridge.types.type_store import add_folders as add_folders
+from twin.bridge.types.type_store import names as names
+from twin.bridge.types.type_store import register as register
+from twin.bridge.types.type_store import store as store
+from twin.bridge.types.type_store import text_of as text_of
 from twin.errors import BridgeError
-
-
-def register(typename: str, text: str) -> None:
-    """Make a type known by its definition, as in a .msg, .srv or .action file; types it uses may come later.
-
-    Raises:
-        BridgeError: the text is no definition, or the name is taken by one with other fields.
-    """
-    type_store.add(Definition("/".join(parts(typename)), text))
 
 
 def get(typename: str) -> type[Any]:
@@ -39,8 +38,7 @@ def get(typename: str) -> type[Any]:
     Raises:
         BridgeError: an unknown type; the message lists the package's types.
     """
-    name = "/".join(parts(typename))
-    type_store.load(name)
+    name = _loaded(typename)
     if name not in store.types:
         raise BridgeError(f"{name} is no message; its parts are, such as {name}_Request or {name}_Goal")
     return store.types[name]
@@ -52,9 +50,7 @@ def rihs01(typename: str) -> str:
     Raises:
         BridgeError: an unknown type.
     """
-    name = "/".join(parts(typename))
-    type_store.load(name)
-    return _rihs01(name)
+    return _rihs01(_loaded(typename))
 
 
 def definitions(typename: str) -> Mapping[str, Any]:
@@ -63,35 +59,8 @@ def definitions(typename: str) -> Mapping[str, Any]:
     Raises:
         BridgeError: an unknown type.
     """
-    type_store.load("/".join(parts(typename)))
+    _loaded(typename)
     return type_store.definitions
-
-
-def add_definitions(definitions: FieldDefs, defaults: Mapping[str, dict[str, Value]]) -> None:
-    """Make types known by their fields, in rosbags' form; every type that they use must be among them.
-
-    Args:
-        definitions: type name -> (constants, fields).
-        defaults: type name -> field -> default value.
-
-    Raises:
-        BridgeError: a type that is already known with other fields.
-    """
-    type_store.add_fields(definitions, defaults)
-
-
-def text_of(typename: str) -> str | None:
-    """Return a definition's text, or None for a part of a service or an action, which has none of its own.
-
-    Raises:
-        BridgeError: an unknown type.
-    """
-    return type_store.text_of("/".join(parts(typename)))
-
-
-def names() -> list[str]:
-    """Return every message, service and action that has a name here, sorted."""
-    return type_store.names()
 
 
 @dataclass(frozen=True)
@@ -157,33 +126,15 @@ def dtype_of(base: str) -> np.dtype[Any]:
 
 def defaults(typename: str) -> dict[str, Value]:
     """Return the values of the fields that have a default other than zero."""
-    name = "/".join(parts(typename))
+    return type_store.defaults.get(_loaded(typename), {})
+
+
+def _loaded(typename: str) -> str:
+    name = full_name(typename)
     type_store.load(name)
-    return type_store.defaults.get(name, {})
+    return name
 
 
 @cache
 def _rihs01(name: str) -> str:
     return rihs01_of(name, type_store.definitions)
-
-
-__all__ = [
-    "ActionType",
-    "Parts",
-    "ServiceType",
-    "add_definitions",
-    "add_folder",
-    "add_folders",
-    "dds_name",
-    "defaults",
-    "definitions",
-    "dtype_of",
-    "from_dds_name",
-    "get",
-    "names",
-    "parts",
-    "register",
-    "rihs01",
-    "store",
-    "text_of",
-]

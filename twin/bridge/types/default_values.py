@@ -33,7 +33,6 @@ def new(cls: type[M], **fields: Any) -> M:
 
 
 @cache
-@cache
 def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
     """Return what makes each field's default."""
     values = types.defaults(msgtype)

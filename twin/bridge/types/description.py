@@ -15,7 +15,7 @@ from twin.bridge import types
 from twin.bridge.types.bounds import MOST_NUMBERS, MOST_OBJECTS, STRINGS
 from twin.bridge.types.default_values import new
 from twin.bridge.types.literals import Scalar, Value, parse_scalar
-from twin.bridge.types.type_hash import BASE_NAMES, FieldDefs, description_of, rihs01_of
+from twin.bridge.types.type_hash import BASE_NAMES, FieldDefs, description_of, element_of, rihs01_of
 from twin.errors import BridgeError
 
 TypeDescription: Any = types.get("type_description_interfaces/msg/TypeDescription")
@@ -39,7 +39,7 @@ def describe(typename: str) -> Any:
     Raises:
         BridgeError: an unknown type.
     """
-    plain = description_of("/".join(types.parts(typename)), types.definitions(typename))
+    plain = description_of(types.full_name(typename), types.definitions(typename))
     return TypeDescription(
         type_description=_individual(plain["type_description"]),
         referenced_type_descriptions=[_individual(item) for item in plain["referenced_type_descriptions"]],
@@ -54,7 +54,7 @@ def sources(typename: str) -> list[Any]:
     Raises:
         BridgeError: an unknown type.
     """
-    name = "/".join(types.parts(typename))
+    name = types.full_name(typename)
     used = [item.type_name for item in describe(name).referenced_type_descriptions]
     return [_source(item) for item in (name, *used)]
 
@@ -153,7 +153,7 @@ def _defaults(item: Any, fields: list[tuple[str, Any]]) -> dict[str, Value]:
     for field, (name, (node, value)) in zip(item.fields, fields, strict=True):
         if not field.default_value:
             continue
-        inner, element = (node, value) if node in (Nodetype.BASE, Nodetype.NAME) else value[0]
+        inner, element = element_of((node, value))
         try:
             if inner != Nodetype.BASE:
                 raise ValueError("only plain values have a default")
@@ -195,7 +195,7 @@ def _check(name: str, definitions: FieldDefs, path: tuple[str, ...] = ()) -> Non
             raise BridgeError(
                 f"{field!r} is no name of a field of {name}; valid: letters, digits, underscores"
             )
-        inner, used = (node, value) if node in (Nodetype.BASE, Nodetype.NAME) else value[0]
+        inner, used = element_of((node, value))
         plain = inner == Nodetype.BASE and used[0] not in STRINGS
         if node == Nodetype.ARRAY and not 0 < value[1] <= (MOST_NUMBERS if plain else MOST_OBJECTS):
             raise BridgeError(f"{name}.{field} is an array of {value[1]} elements, which is none or too many")

@@ -14,9 +14,7 @@ from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
 from twin.bridge.types.bounds import STRINGS, Many
-
-PADDING = "structure_needs_at_least_one_member"
-"""The field that rosidl gives to an empty structure, and that no tool shows."""
+from twin.bridge.types.text import PADDING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,10 +62,7 @@ def array_types(typename: str) -> tuple[tuple[Callable[[Any], Any], np.dtype[Any
 
     Not those inside of sequences, and not those of bytes, which may be signed or not.
     """
-    found = []
-    for path, field in _arrays(typename):
-        found.append((attrgetter(path), types.dtype_of(field.base)))
-    return tuple(found)
+    return tuple((attrgetter(path), types.dtype_of(field.base)) for path, field in _arrays(typename))
 
 
 def _arrays(typename: str) -> Iterator[tuple[str, Field]]:

@@ -7,12 +7,11 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from twin.bridge.types.parser import SECTIONS, Definition
+from twin.bridge.types.parser import MESSAGE, SECTIONS, Definition
 from twin.errors import BridgeError, Problem
 from twin.files.reading import read_text
 
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
-_FILE = re.compile(r"[A-Za-z][A-Za-z0-9]*")
 _PACKAGE_TAG = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _IGNORED = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 _LARGEST = 1_000_000
@@ -69,7 +68,7 @@ def _definitions(package: Path, problems: list[Problem]) -> Iterator[Definition]
         return
     for kind in SECTIONS:
         for file in sorted((package / kind).glob(f"*.{kind}")):
-            if not _FILE.fullmatch(file.stem):
+            if not MESSAGE.fullmatch(file.stem):
                 problems.append(Problem("no name of a type; valid: letters and digits, a letter first", file))
                 continue
             try:

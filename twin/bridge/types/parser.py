@@ -19,7 +19,7 @@ from twin.errors import BridgeError, Problem, nearest
 
 _ROS_1 = {"time": "builtin_interfaces/msg/Time", "duration": "builtin_interfaces/msg/Duration"}
 _PACKAGE = re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*")
-_MESSAGE = re.compile(r"[A-Za-z][A-Za-z0-9]*")
+MESSAGE = re.compile(r"[A-Za-z][A-Za-z0-9]*")
 _CONSTANT = re.compile(r"[A-Z]([A-Z0-9_]?[A-Z0-9]+)*")
 _TYPE = re.compile(r"(?P<base>[^\s\[\]<=]+)(?P<bound><=(?P<length>[^\[\]]*))?(?P<many>\[(?P<size>[^\]]*)\])?")
 _SEPARATOR = re.compile(r"---\s*(#.*)?")
@@ -198,7 +198,7 @@ class _Parser:
             typename = _ROS_1[base]
         elif base == "Header" and not (file and file.with_name("Header.msg").exists()):
             typename = "std_msgs/msg/Header"
-        elif not _MESSAGE.fullmatch(name) or (package and not _PACKAGE.fullmatch(package)):
+        elif not MESSAGE.fullmatch(name) or (package and not _PACKAGE.fullmatch(package)):
             raise ValueError(f"{written!r} is no type; {nearest(base, BASE_TYPES)}, package/Name")
         else:
             typename = f"{package or self._package}/msg/{name}"

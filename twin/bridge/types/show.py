@@ -21,7 +21,7 @@ def show_lines(typename: str, comments: Comments = "own", within: tuple[str, ...
     Raises:
         BridgeError: an unknown type, a part of a service or an action, or a type that contains itself.
     """
-    name = "/".join(types.parts(typename))
+    name = types.full_name(typename)
     if name in within:
         raise BridgeError(f"{name} contains itself: {' -> '.join([*within, name])}")
     text = types.text_of(name)

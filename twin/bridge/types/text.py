@@ -8,7 +8,8 @@ from rosbags.interfaces import Nodetype
 
 from twin.bridge.types.literals import Value
 
-_PADDING = "structure_needs_at_least_one_member"
+PADDING = "structure_needs_at_least_one_member"
+"""The field that rosidl gives to an empty structure, and that no tool shows."""
 
 
 def definition_text(name: str, constants: list[Any], fields: list[Any], defaults: dict[str, Value]) -> str:
@@ -16,18 +17,20 @@ def definition_text(name: str, constants: list[Any], fields: list[Any], defaults
     package = name.split("/")[0]
     lines = [f"{base} {constant}={_literal(value)}" for constant, base, value in constants]
     for field, description in fields:
-        if field != _PADDING:
+        if field != PADDING:
             default = f" {_literal(defaults[field])}" if field in defaults else ""
             lines.append(f"{written(description, package)} {field}{default}")
     return "".join(f"{line}\n" for line in lines)
 
 
 def written(description: Any, package: str = "") -> str:
-    """Return the type of a field, in rosbags' form, as a definition in `package` spells it."""
+    """Return the type of a field, in rosbags' form, as a definition in `package` spells it.
+
+    Parts of services and actions, which no file can name, keep their full name.
+    """
     node, value = description
     if node == Nodetype.NAME:
-        own, _, name = value.split("/")
-        return name if own == package else f"{own}/{name}"
+        return str(value).removeprefix(f"{package}/msg/").replace("/msg/", "/")
     if node == Nodetype.BASE:
         base, bound = value
         return f"{base}<={bound}" if bound else base

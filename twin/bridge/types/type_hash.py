@@ -22,13 +22,15 @@ _IDS = {
     "uint64": 9, "float32": 10, "float64": 11, "bool": 15, "byte": 16, "octet": 16,
     "string": 17, "wstring": 18,
 }  # fmt: skip
-BASE_NAMES = {
-    2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64", 9: "uint64",
-    10: "float32", 11: "float64", 13: "char", 15: "bool", 16: "byte", 17: "string", 18: "wstring",
-}  # fmt: skip
+BASE_NAMES = {number: base for base, number in _IDS.items() if base not in ("char", "octet")} | {13: "char"}
 """Id of a single value -> base type."""
 _NESTED, _BOUNDED_STRING, _BOUNDED_WSTRING = 1, 21, 22
 _ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 48, 96, 144
+
+
+def element_of(description: Any) -> Any:
+    """Return a field's own description, or that of the elements of an array or a sequence."""
+    return description if description[0] in (Nodetype.BASE, Nodetype.NAME) else description[1][0]
 
 
 def rihs01_of(typename: str, definitions: Mapping[str, Any]) -> str:
@@ -57,7 +59,7 @@ def _describe(typename: str, definitions: Mapping[str, Any], structs: dict[str, 
         "fields": [{"name": name, "type": _field_type(description)} for name, description in fields],
     }
     for _, description in fields:
-        node, value = description if description[0] in (Nodetype.BASE, Nodetype.NAME) else description[1][0]
+        node, value = element_of(description)
         if node == Nodetype.NAME:
             _describe(value, definitions, structs)
 
@@ -69,7 +71,7 @@ def _field_type(description: Any) -> dict[str, Any]:
     elif description[0] == Nodetype.SEQUENCE:
         capacity = description[1][1]
         offset = _BOUNDED_SEQUENCE if capacity else _UNBOUNDED_SEQUENCE
-    node, value = description[1][0] if offset else description
+    node, value = element_of(description)
     nested, string_capacity = "", 0
     if node == Nodetype.NAME:
         number, nested = _NESTED, value

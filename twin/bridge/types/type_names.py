@@ -33,6 +33,15 @@ def parts(typename: str) -> Parts:
     return Parts(*full.split("/"))
 
 
+def full_name(typename: str) -> str:
+    """Return 'geometry_msgs/msg/Twist' also for 'geometry_msgs/Twist'.
+
+    Raises:
+        BridgeError: not the name of a ROS 2 type.
+    """
+    return "/".join(parts(typename))
+
+
 def dds_name(typename: str) -> str:
     """Return the type as keys spell it: geometry_msgs::msg::dds_::Twist_."""
     package, kind, name = parts(typename)

@@ -17,10 +17,9 @@ _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 
 def service_parts(name: str, request: Structure, response: Structure) -> dict[str, Structure]:
     """Return the messages of a service: request, response, event."""
-    event = Structure(fields=[("info", _message(_EVENT_INFO))])
-    for field in ("request", "response"):
-        element = _message(f"{name}_{field.capitalize()}")
-        event.fields.append((field, (Nodetype.SEQUENCE, (element, 1))))
+    parts = {field: _message(f"{name}_{field.capitalize()}") for field in ("request", "response")}
+    optional = [(field, (Nodetype.SEQUENCE, (part, 1))) for field, part in parts.items()]
+    event = Structure(fields=[("info", _message(_EVENT_INFO)), *optional])
     return {f"{name}_Request": request, f"{name}_Response": response, f"{name}_Event": event}
 
 

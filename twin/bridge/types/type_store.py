@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Collection, Iterable, Mapping
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,9 @@ from twin.bridge.types.bounds import BASE_TYPES
 from twin.bridge.types.folders import find_definitions
 from twin.bridge.types.literals import Value
 from twin.bridge.types.parser import Definition, Reference, Structure
-from twin.bridge.types.shipped import shipped, shipped_names
-from twin.bridge.types.text import definition_text
+from twin.bridge.types.text import PADDING, definition_text
 from twin.bridge.types.type_hash import FieldDefs
-from twin.bridge.types.type_names import whole
+from twin.bridge.types.type_names import full_name, whole
 from twin.bridge.types.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
@@ -36,19 +37,21 @@ defaults: dict[str, dict[str, Value]] = {
 """Default values: type name -> field -> value. rosbags drops them; those of the types that it has are from
 the Jazzy branches of common_interfaces and rcl_interfaces."""
 
-_PADDING: Any = ("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))
+_PADDING: Any = (PADDING, (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
 _loading: list[str] = []
 _in_library = frozenset(store.types)
+_SHIPPED = resources.files("twin.bridge") / "interfaces"
+"""The definitions that come with this package, for types that rosbags lacks."""
 
 
-def add(definition: Definition) -> None:
-    """Keep a definition until it is used.
+def register(typename: str, text: str) -> None:
+    """Make a type known by its definition, as in a .msg, .srv or .action file; types it uses may come later.
 
     Raises:
-        BridgeError: a fault in its text, or other fields than a definition of this name that is known.
+        BridgeError: the text is no definition, or the name is taken by one with other fields.
     """
-    _add_all([definition])
+    _add_all([Definition(full_name(typename), text)])
 
 
 def add_folder(path: Path | str) -> list[str]:
@@ -84,7 +87,7 @@ def load(name: str) -> None:
     owner = whole(name)
     if owner in _loading:
         raise BridgeError(f"{owner} contains itself: {' -> '.join([*_loading, owner])}")
-    definition = _own.get(owner) or shipped(owner)
+    definition = _own.get(owner) or _shipped(owner)
     if definition is None:
         raise BridgeError(_unknown(owner))
     _loading.append(owner)
@@ -103,8 +106,16 @@ def load(name: str) -> None:
         raise BridgeError(f"{owner} has no part {name}")
 
 
-def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
-    """Make types known by their fields; see `types.add_definitions`."""
+def add_definitions(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None:
+    """Make types known by their fields, in rosbags' form; every type that they use must be among them.
+
+    Args:
+        given: type name -> (constants, fields).
+        values: type name -> field -> default value.
+
+    Raises:
+        BridgeError: a type that is already known with other fields.
+    """
     for name, (_, fields) in given.items():
         if _exists(name):
             load(name)
@@ -119,9 +130,14 @@ def add_fields(given: FieldDefs, values: Mapping[str, dict[str, Value]]) -> None
                 defaults[name] = values.get(name, {})
 
 
-def text_of(name: str) -> str | None:
-    """Return the text of a definition; see `types.text_of`."""
-    definition = _own.get(name) or shipped(name)
+def text_of(typename: str) -> str | None:
+    """Return a definition's text, or None for a part of a service or an action, which has none of its own.
+
+    Raises:
+        BridgeError: an unknown type.
+    """
+    name = full_name(typename)
+    definition = _own.get(name) or _shipped(name)
     if definition is not None:
         return definition.text
     load(name)
@@ -133,15 +149,34 @@ def text_of(name: str) -> str | None:
 
 
 def names() -> list[str]:
-    """Return the names of all messages, services and actions, sorted."""
+    """Return every message, service and action that has a name here, sorted."""
     messages = (name for name in store.types if "/msg/" in name)
     interfaces = (name for name in derived if name == whole(name))
-    return sorted({*messages, *interfaces, *_own, *shipped_names()})
+    return sorted({*messages, *interfaces, *_own, *_shipped_names()})
+
+
+@cache
+def _shipped(name: str) -> Definition | None:
+    """Return the definition of 'package/kind/Name', or None."""
+    package, kind, tail = name.split("/")
+    file = _SHIPPED / package / kind / f"{tail}.{kind}"
+    return Definition(name, file.read_text(encoding="utf-8")) if file.is_file() else None
+
+
+@cache
+def _shipped_names() -> tuple[str, ...]:
+    return tuple(
+        f"{package.name}/{kind.name}/{file.name.partition('.')[0]}"
+        for package in _SHIPPED.iterdir()
+        if package.is_dir()
+        for kind in package.iterdir()
+        for file in kind.iterdir()
+    )
 
 
 def _exists(name: str) -> bool:
     owner = whole(name)
-    return name in definitions or owner in _own or shipped(owner) is not None
+    return name in definitions or owner in _own or _shipped(owner) is not None
 
 
 def _add_all(given: list[Definition]) -> None:
@@ -153,12 +188,9 @@ def _add_all(given: list[Definition]) -> None:
         sections, faults = definition.read()
         if definition.file is not None:  # a text's references may still come
             faults += _unknown_references(definition, sections, names)
-        other = new.get(name) or _own.get(name) or shipped(name)
-        if (
-            not faults
-            and (other is not None or name in _in_library)
-            and not _same(definition, sections, other)
-        ):
+        other = new.get(name) or _own.get(name) or _shipped(name)
+        is_known = other is not None or name in _in_library
+        if not faults and is_known and not _same(definition, sections, other):
             where = other.where if other is not None else "ROS's own definition"
             faults.append(definition.problem(f"{name} is already known with another definition: {where}", 1))
         problems += sorted(faults, key=lambda fault: fault.line or 0)
@@ -222,9 +254,8 @@ def _register_all(owner: str, sections: tuple[Structure, ...]) -> None:
 
 
 def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
-    plain: Any = {name: (constants, fields)}
     try:
-        store.register(plain)
+        store.register({name: (constants, fields)})
     except TypesysError as error:  # such as fields `from` and `from_`, which Python cannot tell apart
         raise BridgeError(f"{name} cannot be used: {error}") from error
 

@@ -6,6 +6,7 @@ from itertools import count
 from typing import TYPE_CHECKING, TypeVar
 
 import xxhash
+import zenoh
 
 from twin.bridge.wire.external import ExternalQueue
 from twin.bridge.wire.keys import Attachment, parse_attachment
@@ -20,6 +21,11 @@ _WORD = 4
 """Fewer bytes than this after a message fill its last word."""
 
 
+def attachment_of(sent: zenoh.Sample | zenoh.Query) -> bytes | None:
+    """Return the attachment's bytes, None without one."""
+    return sent.attachment.to_bytes() if sent.attachment else None
+
+
 class Admission:
     """Judges samples and requests of one topic or service; called in any thread."""
 
@@ -28,8 +34,9 @@ class Admission:
         self._item = item
         self._nameless = count(1)
 
-    def source(self, key: str, attachment: bytes | None) -> Attachment | None:
+    def source(self, sent: zenoh.Sample | zenoh.Query) -> Attachment | None:
         """Return who sent something, or None if it is not for this endpoint, which is counted."""
+        key, attachment = str(sent.key_expr), attachment_of(sent)
         wrong = mismatch(self._item, key)
         if wrong is not None:
             self._external.refuse(wrong[0], self._item.name, wrong[1])

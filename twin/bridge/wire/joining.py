@@ -20,16 +20,9 @@ def session_to_join(
     timeout_s: float = 3.0,
     wire: Wire = "rmw_zenoh",
 ) -> SessionConfig:
-    """Return a Zenoh client that opens no listener, or a peer if it is to listen.
+    """Return a Zenoh client without a listener, or a peer if it is to listen; arguments as of `live.join`.
 
-    Args:
-        connect: Endpoints of a run, a router or any rmw_zenoh peer; None: TWIN_CONNECT, or where rmw_zenoh
-            expects a router, unless `listen` or the file says enough.
-        listen: Endpoints where others may connect.
-        config: Zenoh configuration file; None: ZENOH_SESSION_CONFIG_URI, or none.
-        domain_id: None: ROS_DOMAIN_ID, or 0.
-        timeout_s: How long to try to connect [s].
-        wire: How keys and tokens are spelled.
+    Nothing to connect to is added where `listen` or the file says enough.
 
     Raises:
         BridgeError: the file or ROS_DOMAIN_ID cannot be used.

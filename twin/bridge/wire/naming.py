@@ -30,22 +30,12 @@ class Interface(NamedTuple):
     """'RIHS01_<64 hex>'."""
 
 
-class TypedKey(NamedTuple):
-    """A key of rmw_zenoh in parts."""
-
-    domain: str
-    name: str
-    """Absolute."""
-    dds_name: str
-    type_hash: str
-
-
-def parse_key(key: str) -> TypedKey | None:
-    """Return the parts of a key in rmw_zenoh's form, None for one of another form, as ros2dds's."""
+def parse_key(key: str) -> tuple[str, Interface] | None:
+    """Return domain and interface of a key in rmw_zenoh's form, None for one of another, as ros2dds's."""
     parts = key.split("/")
     if len(parts) < 4 or "::dds_::" not in parts[-2] or not parts[0].isdecimal():
         return None
-    return TypedKey(parts[0], "/" + "/".join(parts[1:-2]), parts[-2], parts[-1])
+    return parts[0], Interface("/" + "/".join(parts[1:-2]), *parts[-2:])
 
 
 @dataclass(frozen=True)
@@ -88,9 +78,10 @@ class Naming:
 
 def mismatch(item: Interface, key: str) -> tuple[str, str] | None:
     """Return (reason, detail) if what comes on a key is not what an endpoint carries."""
-    theirs = parse_key(key)
-    if theirs is None:
+    typed = parse_key(key)
+    if typed is None:
         return None  # ros2dds: the key tells no type
+    _, theirs = typed
     if theirs.dds_name != item.dds_name:
         return "type", f"{_clipped(theirs.dds_name)} instead of {item.dds_name}"
     if theirs.type_hash not in (item.type_hash, HUMBLE_HASH):

@@ -6,7 +6,7 @@ Source: zenoh-plugin-ros2dds, liveliness_mgt.rs (tokens, QoS), ros2_utils.rs (ke
 from __future__ import annotations
 
 import struct
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast, get_args
 
 from twin.bridge.qos import QoS, profile
 from twin.bridge.wire.keys import Attachment, EndpointKind
@@ -18,7 +18,6 @@ _REQUEST = b"rqh"
 _ACTION = "/_action/"
 Kind = Literal["MP", "MS", "SS", "SC", "AS", "AC"]
 """rmw_zenoh's kinds, and action server and action client."""
-_KINDS: tuple[Kind, ...] = ("MP", "MS", "SS", "SC", "AS", "AC")
 
 
 def key(name: str) -> str:
@@ -68,16 +67,11 @@ def parse_token(token: str) -> Announced | None:
         ValueError: a QoS in another form.
     """
     parts = token.split("/")
-    if len(parts) < 6 or parts[0] != "@" or parts[2] != "@ros2_lv":
-        return None
-    for kind in _KINDS:
-        if parts[3] == kind:
-            break
-    else:
+    if len(parts) < 6 or parts[0] != "@" or parts[2] != "@ros2_lv" or parts[3] not in get_args(Kind):
         return None
     name, typename = (part.replace(_SLASH, "/") for part in parts[4:6])
     qos, type_hash = (QoS(), "") if len(parts) < 7 else _parse_qos(parts[6])
-    return Announced(parts[1], kind, f"/{name}", typename, type_hash, qos)
+    return Announced(parts[1], cast(Kind, parts[3]), f"/{name}", typename, type_hash, qos)
 
 
 def pack_request_id(source: Attachment) -> bytes:

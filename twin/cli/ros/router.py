@@ -31,16 +31,16 @@ def router(
     ] = None,
 ) -> None:
     """Run a Zenoh router, as rmw_zenohd, until Ctrl-C."""
-    from twin.bridge.wire.router import RouterConfig, run_router
+    from twin.bridge.wire.router import router_session, run_router
 
-    settings = RouterConfig(listen=tuple(listen or ()), connect=tuple(connect or ()), file=config)
+    settings = router_session(listen or (), connect=connect or (), file=config)
     # Blocked and waited for: a handler that sets an Event can lock itself out while the Event is waited for.
     ends = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     try:
-        with run_router(settings) as running:
+        with run_router(settings) as session_id:
             typer.echo(
-                f"Started Zenoh router with id {running.session_id}, listening on {', '.join(running.listen)}"
+                f"Started Zenoh router with id {session_id}, listening on {', '.join(settings.listen)}"
             )
             signal.sigwait(ends)
     finally:

@@ -147,7 +147,7 @@ def test_a_second_source_and_the_service_set_pose(bench: Bench) -> None:
     filtered = bench.listen(Odometry, "odometry/filtered", 10)
     speeds = bench.node.create_publisher(TwistWithCovarianceStamped, "speed", 10)
     fixes = bench.node.create_publisher(PoseWithCovarianceStamped, "fix", 10)
-    assert node.node.parameters.get("pose0_config").value == list(which(X, Y))
+    assert node.node.get_parameter("pose0_config").value == list(which(X, Y))
     for _ in range(20):
         pose = PoseWithCovariance(pose=pose_from_pose2(Pose2(2.0, -1.0, 0.0)), covariance=np.eye(6).ravel())
         fixes.publish(PoseWithCovarianceStamped(header=header(bench.clock.now_ns, "odom"), pose=pose))

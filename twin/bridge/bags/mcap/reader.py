@@ -10,29 +10,16 @@ from __future__ import annotations
 import heapq
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from io import BytesIO
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, NamedTuple
 
+from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    Footer,
-    McapRecord,
-    Message,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from twin.bridge.bags.compression import decompress
@@ -46,16 +33,16 @@ _FOOTER_SIZE = _HEAD.size + 20
 _LARGEST_RECORD = 1 << 32
 
 _KINDS: dict[int, Any] = {
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.CHUNK: Chunk,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.STATISTICS: Statistics,
-    Opcode.ATTACHMENT: Attachment,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.METADATA: Metadata,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.FOOTER: Footer,
+    Opcode.SCHEMA: records.Schema,
+    Opcode.CHANNEL: records.Channel,
+    Opcode.CHUNK: records.Chunk,
+    Opcode.CHUNK_INDEX: records.ChunkIndex,
+    Opcode.STATISTICS: records.Statistics,
+    Opcode.ATTACHMENT: records.Attachment,
+    Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
+    Opcode.METADATA: records.Metadata,
+    Opcode.METADATA_INDEX: records.MetadataIndex,
+    Opcode.FOOTER: records.Footer,
 }
 """What is read; other records are passed over."""
 
@@ -93,25 +80,21 @@ class McapReader:
             self._file.close()
             raise
 
-    def messages(
-        self, channels: set[int] | None = None, start_ns: int | None = None, end_ns: int | None = None
-    ) -> Iterator[Message]:
-        """Yield messages by log time, from `start_ns` to `end_ns` [ns] inclusive; equal times as in the file.
+    def messages(self, channels: Container[int], first_ns: int, last_ns: int) -> Iterator[records.Message]:
+        """Yield messages by log time, from `first_ns` to `last_ns` inclusive; equal times as in the file.
 
         Raises:
             RecordingError: a chunk is damaged.
         """
-        first = self.start_ns if start_ns is None else start_ns
-        last = self.end_ns if end_ns is None else end_ns
-        blocks = [b for b in self._blocks if b.start_ns <= last and b.end_ns >= first]
+        blocks = [b for b in self._blocks if b.start_ns <= last_ns and b.end_ns >= first_ns]
         blocks.sort(key=lambda block: (block.start_ns, block.offset))
-        waiting: list[tuple[int, int, int, Message]] = []
+        waiting: list[tuple[int, int, int, records.Message]] = []
         for block in blocks:
             # Nothing in this or a later block is earlier than its start.
             while waiting and waiting[0][0] < block.start_ns:
                 yield heapq.heappop(waiting)[3]
             for number, message in enumerate(self._messages_of(block)):
-                if (channels is None or message.channel_id in channels) and first <= message.log_time <= last:
+                if message.channel_id in channels and first_ns <= message.log_time <= last_ns:
                     heapq.heappush(waiting, (message.log_time, block.offset, number, message))
         while waiting:
             yield heapq.heappop(waiting)[3]
@@ -120,16 +103,15 @@ class McapReader:
         """Return the last attachment of that name, None if there is none."""
         if name not in self._attachments:
             return None
-        attachment: Attachment = self._record_at(*self._attachments[name])
-        return attachment.data
+        return self._record_at(*self._attachments[name]).data
 
     def close(self) -> None:
         """Close the file. Harmless when repeated."""
         self._file.close()
 
     def _forget(self) -> None:
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, records.Schema] = {}
+        self.channels: dict[int, records.Channel] = {}
         self.counts: Counter[int] = Counter()
         """Messages by channel."""
         self.start_ns, self.end_ns = 0, 0
@@ -160,7 +142,7 @@ class McapReader:
         tail = self._read(end, _FOOTER_SIZE + len(MAGIC))
         if not tail.endswith(MAGIC):
             raise ValueError("ends in the middle: its writer was stopped")
-        footer: Footer = _parse(Opcode.FOOTER, tail[_HEAD.size : _FOOTER_SIZE])
+        footer: records.Footer = _parse(Opcode.FOOTER, tail[_HEAD.size : _FOOTER_SIZE])
         if footer.summary_start == 0:
             raise ValueError("")  # allowed
         if footer.summary_start > end:
@@ -171,37 +153,28 @@ class McapReader:
         statistics = None
         for op, content in _records(summary):
             record = _parse(op, content)
-            if isinstance(record, ChunkIndex):
-                self._blocks.append(
-                    _Block(
-                        record.message_start_time,
-                        record.message_end_time,
-                        record.chunk_start_offset,
-                        record.chunk_length,
-                    )
-                )
-            elif isinstance(record, Statistics):
+            if isinstance(record, records.ChunkIndex):
+                times = record.message_start_time, record.message_end_time
+                self._blocks.append(_Block(*times, record.chunk_start_offset, record.chunk_length))
+            elif isinstance(record, records.Statistics):
                 statistics = record
-            elif isinstance(record, MetadataIndex):
+            elif isinstance(record, records.MetadataIndex):
                 self._keep(self._record_at(record.offset, record.length))
-            elif isinstance(record, AttachmentIndex):
+            elif isinstance(record, records.AttachmentIndex):
                 self._attachments[record.name] = (record.offset, record.length)
             else:
                 self._keep(record)
-        if statistics is None or (len(self._blocks), len(self.channels)) != (
-            statistics.chunk_count,
-            statistics.channel_count,
-        ):
+        found = len(self._blocks), len(self.channels)
+        if statistics is None or found != (statistics.chunk_count, statistics.channel_count):
             raise ValueError("has an incomplete summary")
         if statistics.message_count and not self._blocks:
             raise ValueError("")  # written without chunks: no damage, but no index either
-        self.counts.update(statistics.channel_message_counts)
+        self.counts = Counter(statistics.channel_message_counts)
         self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
 
     def _scan(self) -> None:
         """Look through the records up to the first that is not whole."""
         at = len(MAGIC)
-        times: list[int] = []
         while at + _HEAD.size <= self._size:
             op, length = _HEAD.unpack(self._read(at, _HEAD.size))
             whole = _HEAD.size + length
@@ -212,45 +185,45 @@ class McapReader:
                 break
             try:
                 if op != Opcode.MESSAGE_INDEX:
-                    self._scan_record(op, at, whole, times)
+                    self._scan_record(op, at, whole)
             except ValueError as fault:
                 self.damage = f"is damaged at byte {at}: {fault}"
                 break
             at += whole
-        if times:
-            self.start_ns, self.end_ns = min(times), max(times)
 
-    def _scan_record(self, op: int, at: int, whole: int, times: list[int]) -> None:
+    def _scan_record(self, op: int, at: int, whole: int) -> None:
         record = _parse(op, self._read(at + _HEAD.size, whole - _HEAD.size))
-        if isinstance(record, Attachment):
+        if isinstance(record, records.Attachment):
             self._attachments[record.name] = (at, whole)
-        elif isinstance(record, Chunk):
+        elif isinstance(record, records.Chunk):
             for inner, content in _records(_unpacked(record)):
-                self._keep(_parse(inner, content), times)
+                self._keep(_parse(inner, content))
             self._blocks.append(_Block(record.message_start_time, record.message_end_time, at, whole))
         else:
-            self._keep(record, times)
-            if isinstance(record, Message):
+            self._keep(record)
+            if isinstance(record, records.Message):
                 self._blocks.append(_Block(record.log_time, record.log_time, at, whole))
 
-    def _keep(self, record: McapRecord | None, times: list[int] | None = None) -> None:
-        """Take in what a record tells; `times` gathers those of messages."""
-        if isinstance(record, Schema):
+    def _keep(self, record: records.McapRecord | None) -> None:
+        """Take in what a record tells."""
+        if isinstance(record, records.Schema):
             self.schemas[record.id] = record
-        elif isinstance(record, Channel):
+        elif isinstance(record, records.Channel):
             self.channels[record.id] = record
-        elif isinstance(record, Metadata):
+        elif isinstance(record, records.Metadata):
             self.metadata[record.name] = record.metadata
-        elif isinstance(record, Message) and times is not None:
+        elif isinstance(record, records.Message):
+            time = record.log_time
+            self.start_ns = min(self.start_ns, time) if self.counts else time
+            self.end_ns = max(self.end_ns, time) if self.counts else time
             self.counts[record.channel_id] += 1
-            times.append(record.log_time)
 
-    def _messages_of(self, block: _Block) -> Iterator[Message]:
+    def _messages_of(self, block: _Block) -> Iterator[records.Message]:
         try:
             record = self._record_at(block.offset, block.length)
-            if isinstance(record, Message):
+            if isinstance(record, records.Message):
                 yield record
-            elif isinstance(record, Chunk):
+            elif isinstance(record, records.Chunk):
                 for op, content in _records(_unpacked(record)):
                     if op == Opcode.MESSAGE:
                         yield _parse(op, content)
@@ -294,7 +267,7 @@ def _parse(op: int, content: bytes) -> Any:
         if len(content) < _MESSAGE.size:
             raise ValueError("a record ends too early")
         channel, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(content)
-        return Message(channel, log_ns, content[_MESSAGE.size :], publish_ns, sequence)
+        return records.Message(channel, log_ns, content[_MESSAGE.size :], publish_ns, sequence)
     return _KINDS[op].read(_Fields(BytesIO(content))) if op in _KINDS else None
 
 
@@ -311,7 +284,7 @@ def _records(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-def _unpacked(chunk: Chunk) -> bytes:
+def _unpacked(chunk: records.Chunk) -> bytes:
     data = decompress(chunk.data, chunk.compression, chunk.uncompressed_size)
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError("the checksum is wrong")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import version
-from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +121,12 @@ class _WholeRecords:
         self.size = 0
         """Bytes in the file."""
         self._waiting = bytearray()
-        self._file = _create(path)
+        try:
+            self._file = path.open("xb", buffering=0)
+        except FileExistsError as fault:
+            raise RecordingError(f"{path} exists already; name another bag, or remove it") from fault
+        except OSError as fault:
+            raise RecordingError(f"{path}: cannot be written: {fault.strerror}") from fault
 
     def write(self, data: bytes) -> None:
         self._waiting += data
@@ -143,12 +147,3 @@ class _WholeRecords:
 
     def close(self) -> None:
         self._file.close()
-
-
-def _create(path: Path) -> FileIO:
-    try:
-        return path.open("xb", buffering=0)
-    except FileExistsError as fault:
-        raise RecordingError(f"{path} exists already; name another bag, or remove it") from fault
-    except OSError as fault:
-        raise RecordingError(f"{path}: cannot be written: {fault.strerror}") from fault

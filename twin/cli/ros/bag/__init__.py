@@ -46,10 +46,10 @@ def record(
     joining: Joining,
 ) -> None:
     """Record topics until Ctrl-C or SIGTERM; a killed recorder loses at most the last second."""
-    from twin.bridge.bags.compression import as_compression
+    from twin.bridge.bags.compression import COMPRESSIONS, one_of
     from twin.bridge.bags.recorder import Recorder, RecorderConfig
     from twin.bridge.bags.topic_choice import TopicChoice
-    from twin.bridge.bags.writer import BagConfig, as_storage
+    from twin.bridge.bags.writer import STORAGES, BagConfig
     from twin.bridge.wire.interrupts import noted_signals
     from twin.cli.run.folders import bag_folder
 
@@ -60,7 +60,10 @@ def record(
         topics=TopicChoice(topics=names, regex="" if everything else regex, exclude=exclude),
         hidden=hidden,
         use_sim_time=joining.use_sim_time,
-        bag=BagConfig(storage=as_storage(storage), compression=as_compression(compression)),
+        bag=BagConfig(
+            storage=one_of(STORAGES, storage, "storage of bags"),
+            compression=one_of(COMPRESSIONS, compression, "compression"),
+        ),
     )
     folder = output or bag_folder()
     with joining.open() as process, noted_signals() as signals:
@@ -169,16 +172,16 @@ def convert(
 ) -> None:
     """Write a bag into another storage; one that was cut off becomes whole."""
     from twin.bridge.bags import convert as converter
-    from twin.bridge.bags.compression import as_compression
+    from twin.bridge.bags.compression import COMPRESSIONS, one_of
     from twin.bridge.bags.topic_choice import TopicChoice
 
     target = storage or ("rosbag1" if output.suffix == ".bag" else "mcap")
     done = converter.convert(
         bag,
         output,
-        storage=converter.as_target(target),
+        storage=one_of(converter.TARGETS, target, "storage of bags"),
         topics=TopicChoice(topics=tuple(topics or ()), regex=regex, exclude=exclude),
-        compression=as_compression(compression),
+        compression=one_of(COMPRESSIONS, compression, "compression"),
     )
     _tell(done.notices)
     typer.echo(f"{done.messages} messages on {done.topics} topics in {output}")

@@ -91,7 +91,7 @@ def find(
     """List the topics of a type."""
     from twin.bridge import types
 
-    wanted = "/".join(types.parts(topic_type))
+    wanted = types.full_name(topic_type)
     _, topics = _topics(joining, hidden)
     found = [name for name, known in topics.items() if wanted in known]
     if count:

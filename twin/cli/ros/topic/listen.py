@@ -53,7 +53,7 @@ class Listener:
         """
         from twin.bridge import types
 
-        full = "/".join(types.parts(typename))
+        full = types.full_name(typename)
         if types.parts(full).kind != "msg":
             raise BridgeError(f"{full} is no message; topics carry package/msg/Name")
         matching = process.endpoints(name)

@@ -127,7 +127,7 @@ def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]
     """Return the class of a type, learnt from those who use the topic if it is not known here."""
     from twin.bridge import types
 
-    full = "/".join(types.parts(typename))
+    full = types.full_name(typename)
     if types.parts(full).kind != "msg":
         raise BridgeError(f"{full} is no message; topics carry package/msg/Name")
     endpoints = process.endpoints(name)
