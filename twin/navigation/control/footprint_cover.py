@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.navigation._jit import fast_jit
-from twin.navigation.costmaps.costmap import Costmap, inflation_costs
-from twin.navigation.costmaps.footprint import radii
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.footprint import padded, radii
 
 F32 = NDArray[np.float32]
 
@@ -49,16 +49,14 @@ class FootprintCover(NamedTuple):
         if not consider_footprint or len(footprint) < 3:
             none = np.zeros((0, 2), dtype=np.float32)
             return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
-        padded = _padded(footprint, padding)
-        centres, radius = _circles(padded)
-        outside = radii(padded)[1]
-        spacing = costmap.resolution / 2.0
+        wider, cell = padded(footprint, padding), costmap.resolution
+        centres, radius = _circles(wider)
         return FootprintCover(
-            outline=(_outline(footprint, spacing) / costmap.resolution).astype(np.float32),
-            padded=(_outline(padded, spacing) / costmap.resolution).astype(np.float32),
-            circles=(centres / costmap.resolution).astype(np.float32),
-            centre_cost=_cost(costmap, outside),
-            circle_cost=_cost(costmap, radius),
+            outline=(_outline(footprint, cell / 2.0) / cell).astype(np.float32),
+            padded=(_outline(wider, cell / 2.0) / cell).astype(np.float32),
+            circles=(centres / cell).astype(np.float32),
+            centre_cost=costmap.cost_within(radii(wider)[1] + _SLACK * cell),
+            circle_cost=costmap.cost_within(radius + _SLACK * cell),
         )
 
 
@@ -127,24 +125,6 @@ class CoverOf:
                 padding=self._padding,
             )
         return self._cover
-
-
-def _cost(costmap: Costmap, distance: float) -> int:
-    """Return the least cost of cells that may have an obstacle within `distance` [m]."""
-    farthest = distance + _SLACK * costmap.resolution
-    return int(
-        inflation_costs(
-            farthest,
-            inscribed_radius=costmap.inscribed_radius,
-            inflation_radius=math.inf,
-            cost_scaling_factor=costmap.cost_scaling_factor,
-        )
-    )
-
-
-def _padded(corners: Array, padding: float) -> Array:
-    """Return the corners moved out by the padding along x and along y (nav2_costmap_2d padFootprint)."""
-    return corners + padding * np.sign(corners)
 
 
 def _outline(corners: Array, spacing: float) -> Array:

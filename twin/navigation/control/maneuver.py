@@ -19,7 +19,7 @@ from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.maneuver_kernel import contact, keeps_clear, most_contact, search
 from twin.navigation.control.rotation import turn_rate
-from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.costmap import Costmap, triple
 from twin.navigation.costmaps.footprint import padded
 
 _BINS = 48
@@ -145,8 +145,7 @@ class Maneuver:
 
     def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
         """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
-        pose = float(at.x), float(at.y), float(at.yaw)
-        touched = contact(costmap.costs, self.footprint, *pose, costmap.frame)
+        touched = contact(costmap.costs, self.footprint, triple(at), costmap.frame)
         # A way along a thing is never driven exactly.
         self._most, self._nearest = most_contact(most_contact(touched)), 0
         self._moves = find_maneuver(costmap, self.footprint, at, path, self.config)
@@ -167,8 +166,7 @@ class Maneuver:
             costmap: Around the robot.
             dt: Control period [s].
         """
-        pose = float(at.x), float(at.y), float(at.yaw)
-        if not contact(costmap.costs, self.footprint, *pose, costmap.frame):
+        if not contact(costmap.costs, self.footprint, triple(at), costmap.frame):
             self._most = 0
         while self._moves:
             move = self._moves[0]
@@ -216,10 +214,8 @@ class Maneuver:
         v, w = command
         size = abs(v) or max(abs(w), 1e-6)
         dt = min(_LOOK if v else _LOOK_TURN, abs(left)) / size / 5.0
-        pose = float(at.x), float(at.y), float(at.yaw)
-        return bool(
-            keeps_clear(costmap.costs, self.footprint, self._most, pose, command, dt, 5, costmap.frame)
-        )
+        costs, frame = costmap.costs, costmap.frame
+        return bool(keeps_clear(costs, self.footprint, self._most, triple(at), command, dt, 5, frame))
 
 
 def _moves_of(poses: Array, gears: list[int], step: float) -> list[Move]:
@@ -247,11 +243,9 @@ def _targets(costmap: Costmap, corners: Array, path: Array, config: ManeuverConf
     """Return where on the path the robot may stand and go on, shape (m, 3)."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))])
     wanted = (along >= min(config.ahead_min, along[-1])) & (along <= config.ahead_max)
-    height, width = costmap.costs.shape
-    free = []
-    for x, y, yaw in path[wanted]:
-        column, row = costmap.world_to_cell(x, y)
-        inside = 0 <= column < width and 0 <= row < height
-        if inside and not contact(costmap.costs, corners, x, y, yaw, costmap.frame):
-            free.append((x, y, yaw))
+    free = [
+        (x, y, yaw)
+        for x, y, yaw in path[wanted]
+        if costmap.contains(x, y) and not contact(costmap.costs, corners, (x, y, yaw), costmap.frame)
+    ]
     return np.array(free).reshape(-1, 3)

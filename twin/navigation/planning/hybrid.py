@@ -15,7 +15,6 @@ from twin.navigation.costmaps.costmap import (
     MAX_NON_OBSTACLE,
     NO_INFORMATION,
     Costmap,
-    inflation_costs,
 )
 from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
 from twin.navigation.planning.config import HybridConfig
@@ -112,14 +111,8 @@ class HybridPlanner(GlobalPlanner):
         clear_below = 0
         if self.inflation_radius >= reach:
             # One cell more, for costs are those of the cells' centres.
-            cost = inflation_costs(
-                reach + costmap.resolution,
-                inscribed_radius=costmap.inscribed_radius,
-                inflation_radius=math.inf,
-                cost_scaling_factor=costmap.cost_scaling_factor,
-            )
             within = self.inflation_radius >= reach + costmap.resolution
-            clear_below = int(cost) if within else 0
+            clear_below = costmap.cost_within(reach + costmap.resolution) if within else 0
         radius = max(self.config.minimum_turning_radius / costmap.resolution, 1.0)
         return _Frame(costmap, corners / costmap.resolution, radius, clear_below)
 

@@ -49,7 +49,7 @@ def pose_cost(
         return -1
     if cost < clear_below or corners.shape[0] < 2:
         return cost
-    worst = outline_cost(costs, corners, x, y, yaw, 0.0, 0.0, 1.0)
+    worst = outline_cost(costs, corners, (x, y, yaw), (0.0, 0.0, 1.0))
     if worst == 254 or (worst == 255 and not allow_unknown):
         return -1
     return cost
