@@ -47,7 +47,4 @@ class SpeedLimiter:
         """Return the largest change within `dt` [s]."""
         limits, target = self.limits, self._clamped(target)
         braking = abs(target) < abs(self.value) or target * self.value < 0.0
-        rate = limits.max_acceleration
-        if braking and limits.max_deceleration is not None:
-            rate = limits.max_deceleration
-        return rate * dt
+        return ((braking and limits.max_deceleration) or limits.max_acceleration) * dt

@@ -61,9 +61,8 @@ class OdometryWatch:
     as along a corridor, it is believed. People who walk about explain no scan as a whole.
     """
 
-    def __init__(self, config: OdometryWatchConfig | None = None) -> None:
-        """Begin without a scan."""
-        self._config = config or OdometryWatchConfig()
+    def __init__(self) -> None:
+        self._config = OdometryWatchConfig()
         self._before: tuple[int, Pose2, Array] | None = None
         self._odom: Pose2 | None = None
         self._turned = 0.0

@@ -31,9 +31,8 @@ class Hall(StrictModel):
     def _ordered(self) -> Hall:
         for axis, (low, high) in (("x", self.x), ("y", self.y)):
             if low >= high:
-                raise Faults(
-                    [Fault((axis,), f"hall.{axis} must go from low to high, not {low:g} to {high:g}")]
-                )
+                text = f"hall.{axis} must go from low to high, not {low:g} to {high:g}"
+                raise Faults([Fault((axis,), text)])
         return self
 
     @property
@@ -59,11 +58,6 @@ class PillarEntry(StrictModel):
     size: tuple[Length, Length] = (0.4, 0.4)
     height: Length = 2.0
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), *self.size)
-
 
 class RackEntry(StrictModel):
     """A rack with goods on levels; x of its pose points out of its front.
@@ -84,11 +78,6 @@ class RackEntry(StrictModel):
     headroom: Length = 0.35
     """Height of the uprights above the highest surface."""
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.depth, self.length)
-
 
 class PalletEntry(StrictModel):
     """A EUR pallet (1.2 m × 0.8 m) with a load."""
@@ -97,11 +86,6 @@ class PalletEntry(StrictModel):
     load: Annotated[Metres, Field(ge=0.1)] = 0.7
     """Height of the load above the deck; without one a lidar near the floor would not see the pallet."""
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), 1.2, 0.8)
-
 
 class ObstacleEntry(StrictModel):
     """A box that always stands there, and is on the map."""
@@ -109,11 +93,6 @@ class ObstacleEntry(StrictModel):
     pose: PoseList
     size: tuple[Length, Length, Length]
     colour: Colour = "grey"
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.size[0], self.size[1])
 
 
 class ToteKind(StrictModel):
@@ -158,11 +137,6 @@ class TableEntry(StrictModel):
     """Along x of the pose."""
     height: Length = 0.4
     slot_spacing: Length = 0.5
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.depth, self.length)
 
 
 class ZoneEntry(StrictModel):
@@ -217,9 +191,8 @@ def _names(arena: ArenaFile) -> Iterator[Fault]:
             if "/" in name or "#" in name:
                 yield Fault((section, name), f"the name '{name}' must not contain '/' or '#'")
             if name in seen:
-                yield Fault(
-                    (section, name), f"the name '{name}' is already taken in {seen[name]}; choose another"
-                )
+                text = f"the name '{name}' is already taken in {seen[name]}; choose another"
+                yield Fault((section, name), text)
             seen.setdefault(name, section)
 
 
@@ -234,13 +207,10 @@ def _racks(arena: ArenaFile) -> Iterator[Fault]:
             yield Fault(("racks", name, "levels"), text)
         if tote.width > rack.slot_spacing:
             text = f"a tote is {tote.width:g} m wide and a slot of rack '{name}' {rack.slot_spacing:g} m; "
-            yield Fault(
-                ("racks", name, "slot_spacing"), f"{text}slot_spacing must be at least {tote.width:g}"
-            )
-        if tote.inset + tote.depth > rack.depth:
-            text = (
-                f"a tote needs {tote.inset + tote.depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
-            )
+            text += f"slot_spacing must be at least {tote.width:g}"
+            yield Fault(("racks", name, "slot_spacing"), text)
+        if (depth := tote.inset + tote.depth) > rack.depth:
+            text = f"a tote needs {depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
             yield Fault(("racks", name, "depth"), text)
 
 
@@ -265,12 +235,21 @@ def _totes(arena: ArenaFile) -> Iterator[Fault]:
 
 
 def _solids(arena: ArenaFile) -> Iterator[tuple[tuple[str, ...], str, Rectangle]]:
+    """Yield where each thing is in the file, what it is called, and what it covers of the floor."""
     for section in ("pillars", "racks", "pallets", "obstacles"):
         for name, entry in getattr(arena, section).items():
-            yield (section, name), f"{section[:-1]} '{name}'", entry.rectangle
+            yield (section, name), f"{section[:-1]} '{name}'", covered(entry)
     for name, zone in arena.zones.items():
         if zone.table is not None:
-            yield ("zones", name, "table"), f"table of zone '{name}'", zone.table.rectangle
+            yield ("zones", name, "table"), f"table of zone '{name}'", covered(zone.table)
+
+
+def covered(entry: PillarEntry | RackEntry | PalletEntry | ObstacleEntry | TableEntry) -> Rectangle:
+    """Return what a thing covers of the floor."""
+    if isinstance(entry, RackEntry | TableEntry):
+        return Rectangle(Pose2(*entry.pose), entry.depth, entry.length)
+    x, y = (1.2, 0.8) if isinstance(entry, PalletEntry) else entry.size[:2]
+    return Rectangle(Pose2(*entry.pose), x, y)
 
 
 def _places(arena: ArenaFile) -> Iterator[Fault]:

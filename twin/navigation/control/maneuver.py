@@ -176,21 +176,18 @@ class Maneuver:
                 self._moves.pop(0)
                 self._nearest = 0
                 continue
-            command = (
-                self._drive(move, at, left, velocity, dt) if move.gear else self._turn(left, velocity, dt)
-            )
+            command = self._drive(move, at, left, velocity, dt)
             if self._is_free(at, command, left, costmap):
                 return command
             self._moves = []
         return None
 
-    def _turn(self, left: float, velocity: tuple[float, float], dt: float) -> tuple[float, float]:
-        limits = {"max_rate": self.config.turn_speed, "acceleration": self.config.turn_acceleration}
-        return 0.0, turn_rate(left, velocity[1], dt, **limits)
-
     def _drive(
         self, move: Move, at: Pose2, left: float, velocity: tuple[float, float], dt: float
     ) -> tuple[float, float]:
+        if not move.gear:
+            limits = {"max_rate": self.config.turn_speed, "acceleration": self.config.turn_acceleration}
+            return 0.0, turn_rate(left, velocity[1], dt, **limits)
         local = at.inverse().apply(move.poses[:, :2])
         nearest = self._nearest
         ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > _LOOKAHEAD))

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 from twin.navigation.failures import InvalidPath
 from twin.navigation.planning.direction import cusps, is_reversing
+from twin.parameters import Metres, Positive, Radians
 
 SPACING = 0.05
 """Of the poses of a local path [m]: critics count in them."""
@@ -23,18 +25,14 @@ SPACING = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class PathHandlerConfig:
-    """Parameters; names and defaults are Nav2's."""
+    """What controllers have of it among their parameters; names and defaults are Nav2's."""
 
-    prune_distance: float = 2.0
-    """How far ahead the local path reaches [m]."""
-    max_robot_pose_search_dist: float = 3.0
-    """How far along the path the nearest pose is searched each time [m]."""
-    enforce_path_inversion: bool = True
-    """Whether the local path ends at a cusp until that is reached."""
-    inversion_xy_tolerance: float = 0.2
-    """[m]"""
-    inversion_yaw_tolerance: float = 0.4
-    """[rad]"""
+    max_robot_pose_search_dist: Annotated[Metres, Positive] = 3.0
+    """How far along the path the nearest pose is searched each time."""
+    inversion_xy_tolerance: Annotated[Metres, Positive] = 0.2
+    """How near a cusp is reached."""
+    inversion_yaw_tolerance: Annotated[Radians, Positive] = 0.4
+    """And in which heading."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +49,21 @@ class LocalPath:
     """Whether the last pose is the path's, not a cusp or the end of the window."""
 
 
-@dataclass(kw_only=True)
 class PathHandler:
     """Follows one path at a time."""
 
-    config: PathHandlerConfig = field(default_factory=PathHandlerConfig)
+    def __init__(
+        self, config: PathHandlerConfig | None = None, *, to_cusps: bool, prune_distance: float = 2.0
+    ) -> None:
+        """Begin without a path.
 
-    def __post_init__(self) -> None:
+        Args:
+            config: Distances and tolerances.
+            to_cusps: Whether the local path ends at a cusp until that is reached.
+            prune_distance: How far ahead the local path reaches [m].
+        """
+        self.config = config or PathHandlerConfig()
+        self._to_cusps, self._prune_distance = to_cusps, prune_distance
         self.reset()
 
     def reset(self) -> None:
@@ -82,7 +88,7 @@ class PathHandler:
         self.path = path
         self._poses, knots = dense(path, SPACING)
         self._along = _arc_length(self._poses)
-        turns = cusps(path) if self.config.enforce_path_inversion else []
+        turns = cusps(path) if self._to_cusps else []
         for first, last in itertools.pairwise([0, *turns, len(path) - 1]):
             self._segments.append((int(knots[last]), is_reversing(path[first : last + 1])))
 
@@ -115,7 +121,7 @@ class PathHandler:
             last, reversing = self._segments[0]
             self._advance(pose, last)
         first = self._nearest
-        reach = self._along[first] + self.config.prune_distance
+        reach = self._along[first] + self._prune_distance
         end = min(last, int(np.searchsorted(self._along, reach, side="right")))
         poses = self._poses[first : end + 1]
         return LocalPath(

@@ -34,10 +34,10 @@ def trace_scan(
 
     Args:
         obstacles: Changed.
-        points: Shape (n, 2) [m].
-        sensor: x, y [m].
-        marking: Least and greatest range at which a point marks [m].
-        clearing: Where rays begin and end to clear [m].
+        points: Ends of the rays, shape (n, 2), in the costmap's frame [m].
+        sensor: x, y of the sensor [m].
+        marking: obstacle_min_range, obstacle_max_range [m].
+        clearing: raytrace_min_range, raytrace_max_range [m].
         frame: Of the grid.
     """
     height, width = obstacles.shape

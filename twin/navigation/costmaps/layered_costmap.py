@@ -144,14 +144,7 @@ class LayeredCostmap:
     def update_range(
         self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float
     ) -> None:
-        """Take a reading of a sonar or infrared sensor.
-
-        Args:
-            sensor: Pose in the costmap's frame; the cone opens along its x.
-            distance: What was measured [m].
-            limits: The sensor's least and greatest range [m]; if equal it tells only -inf (something) or inf.
-            field_of_view: Full angle of the cone [rad].
-        """
+        """Take a reading of a sonar or infrared sensor; arguments as those of `RangeSensorLayer.add`."""
         if self._ranges is None:
             self._ranges = RangeSensorLayer(self.shape, self.config.range_sensor_layer)
         self._touch(self._ranges.add(sensor, distance, limits, field_of_view, self._grid.frame))
@@ -161,10 +154,7 @@ class LayeredCostmap:
     ) -> None:
         """Lay a keep-out mask over the costmap, or take it away; call it again when the frames have moved.
 
-        Args:
-            keepout: The mask.
-            robot: Pose in the costmap's frame, for `override_lethal_cost`.
-            T_mask_costmap: Pose of the costmap's frame in the mask's.
+        Arguments as those of `KeepoutFilter.costs`.
         """
         layer = (
             None if keepout is None else keepout.costs(self.shape, self._grid.frame, robot, T_mask_costmap)
@@ -209,13 +199,10 @@ class LayeredCostmap:
                 self._known = None if layer.is_known else self._known
 
     def adopt(self, old: LayeredCostmap) -> None:
-        """Take what sensors have seen on another costmap in the same frame, where it lies on this one.
+        """Take what sensors saw on the costmap of the map before, in the same frame, where it lies on this one.
 
         So obstacles stay when a new map comes, as in Nav2 where its geometry is the same; a map that grows
         while it is made has another one each time. Of cells of another size nothing is taken.
-
-        Args:
-            old: The costmap of the map before.
         """
         self._own = old._own
         resolution = self._grid.resolution
@@ -236,11 +223,7 @@ class LayeredCostmap:
         self._forget(everything(self.shape), outside=False)
 
     def mark(self, points: Array) -> None:
-        """Mark what is known from elsewhere, a map for instance; a ray through it clears it as ever.
-
-        Args:
-            points: Shape (n, 2), in the costmap's frame [m].
-        """
+        """Mark points, shape (n, 2) [m], of a map for instance; a ray through one clears it as ever."""
         self._touch(self._obstacles.mark(points, self._grid.frame))
 
     def clear_area(self, x: float, y: float, size: float, *, outside: bool = False) -> None:

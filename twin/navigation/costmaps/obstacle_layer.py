@@ -28,15 +28,7 @@ class ObstacleLayer(SensedLayer):
         clearing: tuple[float, float],
         frame: Triple,
     ) -> Window:
-        """Clear along the rays of a scan and mark its points; return what changed.
-
-        Args:
-            points: Ends of the rays, shape (n, 2), in the costmap's frame [m].
-            sensor: x, y of the sensor [m].
-            marking: obstacle_min_range, obstacle_max_range [m].
-            clearing: raytrace_min_range, raytrace_max_range [m].
-            frame: Origin x, y and resolution of the grid [m].
-        """
+        """Clear along the rays of a scan and mark its points, as `trace_scan` does; return what changed."""
         x, y, resolution = frame
         reach = max(marking[1], clearing[1])
         around = Window(
@@ -50,12 +42,7 @@ class ObstacleLayer(SensedLayer):
         return differing(before, self.cells[around.slices], around)
 
     def mark(self, points: Array, frame: Triple) -> Window:
-        """Mark cells as lethal without a ray to them; return where that may matter.
-
-        Args:
-            points: Shape (n, 2), in the costmap's frame [m]; those off the grid are left out.
-            frame: Origin x, y and resolution of the grid [m].
-        """
+        """Mark the cells of points, shape (n, 2) [m], without a ray to them; return where that may matter."""
         columns, rows = np.floor((points - frame[:2]) / frame[2]).astype(np.int64).T
         height, width = self.cells.shape
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)

@@ -11,7 +11,7 @@ from twin.navigation._jit import fast_jit
 from twin.navigation.control.footprint_cover import F32
 from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
 
 ROWS = {
     "ConstraintCritic": arrays.CONSTRAINT,
@@ -29,15 +29,17 @@ ROWS = {
 }
 
 
-def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
+def cost_tables(
+    config: MPPIConfig, inscribed_radius: float, cost_scaling_factor: float, near_goal: bool, vx_max: float
+) -> F32:
     """Return, by cost, shape (3, 256): CostCritic, ObstaclesCritic, and the speed that is allowed [m/s]."""
     cost = np.arange(256, dtype=np.float64)
     critic = config.CostCritic
-    clearance = costmap.inscribed_radius - np.log(np.maximum(cost, 1.0) / 252.0) / costmap.cost_scaling_factor
+    clearance = inscribed_radius - np.log(np.maximum(cost, 1.0) / 252.0) / cost_scaling_factor
     clearance = np.where(cost >= INSCRIBED_INFLATED_OBSTACLE, 0.0, clearance)
     pointwise = np.where(cost >= critic.near_collision_cost, critic.critical_cost, 0.0 if near_goal else cost)
     obstacles, speed = config.ObstaclesCritic, config.SpeedCritic
-    surface = clearance - costmap.inscribed_radius
+    surface = clearance - inscribed_radius
     margin = np.maximum(obstacles.collision_margin_distance - surface, 0.0)
     repulsion = 0.0 if near_goal else obstacles.repulsion_weight
     # Scores matter by their differences: Nav2's inflation radius in the repulsion drops out.
@@ -47,23 +49,6 @@ def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max
     for unknown in (FREE_SPACE, NO_INFORMATION):
         tables[:, unknown] = (0.0, 0.0, vx_max)
     return tables.astype(np.float32)
-
-
-class CostTables:
-    """`cost_tables`, kept until something that they depend on changes."""
-
-    def __init__(self, config: MPPIConfig) -> None:
-        self._config = config
-        self._key: tuple[float, ...] | None = None
-        self._tables: F32 = np.zeros((3, 256), dtype=np.float32)
-
-    def of(self, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
-        """Return the tables; see `cost_tables`."""
-        key = (costmap.inscribed_radius, costmap.cost_scaling_factor, near_goal, vx_max)
-        if key != self._key:
-            self._key = key
-            self._tables = cost_tables(self._config, costmap, near_goal=near_goal, vx_max=vx_max)
-        return self._tables
 
 
 class Totals:

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.controller import Controller, Situation
-from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import LocalPath, PathHandler
 from twin.navigation.control.regulated_pure_pursuit.collision_check import CollisionCheck
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
@@ -34,15 +34,7 @@ class RegulatedPurePursuit(Controller):
         config = self.config
         self._tolerance = config.xy_goal_tolerance
         self._collisions = CollisionCheck(config, self.footprint)
-        self._handler = PathHandler(
-            config=PathHandlerConfig(
-                prune_distance=math.inf,
-                max_robot_pose_search_dist=config.max_robot_pose_search_dist,
-                enforce_path_inversion=config.allow_reversing,
-                inversion_xy_tolerance=config.inversion_xy_tolerance,
-                inversion_yaw_tolerance=config.inversion_yaw_tolerance,
-            )
-        )
+        self._handler = PathHandler(config, to_cusps=config.allow_reversing, prune_distance=math.inf)
 
     def set_plan(self, path: Array) -> None:
         """Follow another path; see `Controller.set_plan`."""

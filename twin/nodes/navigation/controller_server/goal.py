@@ -11,7 +11,7 @@ import numpy as np
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker
-from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import PathHandler
 from twin.navigation.control.progress_checker import ProgressChecker
 from twin.navigation.failures import ControlFailure
 from twin.navigation.plugins import GOAL_CHECKERS, PROGRESS_CHECKERS, create
@@ -89,7 +89,7 @@ def follow_goal(
         raise Abort(TF_ERROR, f"the path's frame {frame!r} has no transform to {robot_pose.frames.map!r}")
     if not len(path) or not np.isfinite(path).all():
         raise Abort(INVALID_PATH, "the path is empty or not finite")
-    handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
+    handler = PathHandler(to_cusps=False)
     handler.accept(path)
     controller.set_goal_tolerance(goal_checker.xy_tolerance)
     try:
