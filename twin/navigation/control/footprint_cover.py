@@ -119,10 +119,7 @@ class CoverOf:
         if key != self._key:
             self._key = key
             self._cover = FootprintCover.of(
-                self._footprint,
-                costmap,
-                consider_footprint=self._consider_footprint,
-                padding=self._padding,
+                self._footprint, costmap, consider_footprint=self._consider_footprint, padding=self._padding
             )
         return self._cover
 

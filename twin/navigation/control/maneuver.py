@@ -78,11 +78,7 @@ class Move:
 
 
 def find_maneuver(
-    costmap: Costmap,
-    footprint: ArrayLike,
-    start: Pose2,
-    path: Array,
-    config: ManeuverConfig | None = None,
+    costmap: Costmap, footprint: ArrayLike, start: Pose2, path: Array, config: ManeuverConfig | None = None
 ) -> list[Move]:
     """Return the moves, in order, that lead from a blocked pose on to the path; none if there are none.
 

@@ -34,14 +34,7 @@ def _tightness(costs: Cells, corners: Array, wider: Array, pose: Triple, frame: 
 
 @jit
 def _swept(
-    costs: Cells,
-    corners: Array,
-    wider: Array,
-    at: Array,
-    way: float,
-    turn: float,
-    parts: int,
-    frame: Triple,
+    costs: Cells, corners: Array, wider: Array, at: Array, way: float, turn: float, parts: int, frame: Triple
 ) -> tuple[int, int]:
     """Return the most that a move from a pose touches, and what it touches at its end."""
     most = last = 0

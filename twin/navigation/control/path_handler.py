@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 from twin.navigation.failures import InvalidPath
 from twin.navigation.planning.direction import cusps, is_reversing
-from twin.parameters import Metres, Positive, Radians
 
 SPACING = 0.05
 """Of the poses of a local path [m]: critics count in them."""
@@ -25,14 +24,21 @@ SPACING = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class PathHandlerConfig:
-    """What controllers have of it among their parameters; names and defaults are Nav2's."""
+    """Parameters; names and defaults are Nav2's."""
 
-    max_robot_pose_search_dist: Annotated[Metres, Positive] = 3.0
-    """How far along the path the nearest pose is searched each time."""
-    inversion_xy_tolerance: Annotated[Metres, Positive] = 0.2
-    """How near a cusp is reached."""
-    inversion_yaw_tolerance: Annotated[Radians, Positive] = 0.4
-    """And in which heading."""
+    max_robot_pose_search_dist: float = 3.0
+    """How far along the path the nearest pose is searched each time [m]."""
+    inversion_xy_tolerance: float = 0.2
+    """How near a cusp is reached [m] ..."""
+    inversion_yaw_tolerance: float = 0.4
+    """... and in which heading [rad]."""
+
+    @staticmethod
+    def of(config: Any) -> PathHandlerConfig:
+        """Return those that are among a controller's parameters."""
+        return PathHandlerConfig(
+            **{each.name: getattr(config, each.name) for each in fields(PathHandlerConfig)}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

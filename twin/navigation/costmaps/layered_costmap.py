@@ -199,7 +199,7 @@ class LayeredCostmap:
                 self._known = None if layer.is_known else self._known
 
     def adopt(self, old: LayeredCostmap) -> None:
-        """Take what sensors saw on the costmap of the map before, in the same frame, where it lies on this one.
+        """Take what sensors saw on the last map's costmap, in the same frame, where it lies on this one.
 
         So obstacles stay when a new map comes, as in Nav2 where its geometry is the same; a map that grows
         while it is made has another one each time. Of cells of another size nothing is taken.

@@ -36,12 +36,7 @@ class RangeSensorLayer(SensedLayer):
         self._table[255] = NO_INFORMATION
 
     def add(
-        self,
-        sensor: Pose2,
-        distance: float,
-        limits: tuple[float, float],
-        field_of_view: float,
-        frame: Triple,
+        self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float, frame: Triple
     ) -> Window:
         """Take a reading; return the window that may have changed.
 

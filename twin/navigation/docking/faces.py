@@ -45,11 +45,7 @@ class BoxFace:
 
 
 def fit_wall(
-    points: ArrayLike,
-    *,
-    facing: float = 0.0,
-    max_yaw: float = math.pi,
-    min_length: float = 0.0,
+    points: ArrayLike, *, facing: float = 0.0, max_yaw: float = math.pi, min_length: float = 0.0
 ) -> WallFit | None:
     """Return the line that most points lie on, among lines that may be the wall, or None if there is none.
 

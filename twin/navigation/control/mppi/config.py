@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.parameters import (
     Flat,
     Fraction,
@@ -211,7 +210,7 @@ class TrajectoryVisualizerConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MPPIConfig(PathHandlerConfig):
+class MPPIConfig:
     """Parameters of the optimizer, by the critics' names those of the critics."""
 
     time_steps: Annotated[int, Interval(ge=4, le=1000)] = 56
@@ -268,8 +267,14 @@ class MPPIConfig(PathHandlerConfig):
     """How much of the averaged trajectory must be free of collisions; else the best rollout drives."""
     enforce_path_inversion: bool = True
     """Whether a cusp of the path is driven to before what comes after it."""
+    inversion_xy_tolerance: Annotated[Metres, Positive] = 0.2
+    """How near a cusp is reached."""
+    inversion_yaw_tolerance: Annotated[Radians, Positive] = 0.4
+    """And in which heading."""
     detours: bool = True
     """Whether a way around what stands on the path is searched in the costmap and followed; not Nav2's."""
+    max_robot_pose_search_dist: Annotated[Metres, Positive] = 3.0
+    """How far along the path the nearest pose is searched each time."""
     seed: Annotated[int, NotNegative] = 0
     """Of the noise."""
     critics: tuple[str, ...] = CRITICS

@@ -25,6 +25,7 @@ from twin.navigation.control.mppi.rollouts import Rollouts
 from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
 from twin.navigation.control.mppi.scoring import cost_tables
 from twin.navigation.control.mppi.sent_commands import SentCommands
+from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.failures import NoValidControl
 
 _EXACT = 3
@@ -82,7 +83,7 @@ class MPPI(Controller):
             self.footprint, consider_footprint=critic.consider_footprint, padding=critic.footprint_padding
         )
         self._handler = DetouringPathHandler(
-            config,
+            PathHandlerConfig.of(config),
             to_cusps=self.reverses,
             prune_distance=config.prune_distance,
             detours=config.detours,

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.navigation._jit import fast_jit
 from twin.navigation.control.footprint_cover import F32
-from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.config import MPPIConfig
 from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
 
-ROWS = {
-    "ConstraintCritic": arrays.CONSTRAINT,
-    "CostCritic": arrays.COST,
-    "ObstaclesCritic": arrays.OBSTACLES,
-    "GoalCritic": arrays.GOAL,
-    "GoalAngleCritic": arrays.GOAL_ANGLE,
-    "PathAlignCritic": arrays.ALIGN,
-    "PathFollowCritic": arrays.FOLLOW,
-    "PathAngleCritic": arrays.ANGLE,
-    "PreferForwardCritic": arrays.FORWARD,
-    "TwirlingCritic": arrays.TWIRLING,
-    "VelocityDeadbandCritic": arrays.DEADBAND,
-    "SpeedCritic": arrays.SPEED,
-}
+NAMES = [field.name for field in fields(MPPIConfig) if field.name.endswith("Critic")]
+"""Of the critics, in the order of their rows."""
 
 
 def cost_tables(
@@ -56,10 +44,10 @@ class Totals:
 
     def __init__(self, config: MPPIConfig) -> None:
         self._names = [
-            name for name in ROWS if config.scores(name) and getattr(config, name).cost_weight != 0.0
+            name for name in NAMES if config.scores(name) and getattr(config, name).cost_weight != 0.0
         ]
         critics = [getattr(config, name) for name in self._names]
-        rows = [ROWS[name] for name in self._names]
+        rows = [NAMES.index(name) for name in self._names]
         # Nav2 weighs costs as fractions of 254.
         weights = [critic.cost_weight / (254.0 if critic is config.CostCritic else 1.0) for critic in critics]
         powers = [critic.cost_power for critic in critics]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.parameters import (
     Derived,
     Metres,
@@ -21,7 +20,7 @@ from twin.parameters import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegulatedPurePursuitConfig(PathHandlerConfig):
+class RegulatedPurePursuitConfig:
     """Parameters of regulated pure pursuit; names and defaults are Nav2's."""
 
     desired_linear_vel: Annotated[MetresPerSecond, Positive] = 0.5
@@ -71,6 +70,8 @@ class RegulatedPurePursuitConfig(PathHandlerConfig):
     """Of that creeping."""
     xy_goal_tolerance: Annotated[Metres, Positive, Derived] = 0.25
     """The goal checker's: closer than this the robot only turns to the goal's heading."""
+    max_robot_pose_search_dist: Annotated[Metres, Positive] = 3.0
+    """How far along the path the nearest pose is searched each time."""
     use_fixed_curvature_lookahead: bool = False
     """Whether curvature is that of the arc to a point curvature_lookahead_dist ahead."""
     curvature_lookahead_dist: Annotated[Metres, Positive] = 0.6
@@ -79,6 +80,10 @@ class RegulatedPurePursuitConfig(PathHandlerConfig):
     """Whether that point may lie beyond the goal, in the path's last direction."""
     allow_reversing: bool = False
     """Whether parts of the path whose headings point backwards are driven backwards, from cusp to cusp."""
+    inversion_xy_tolerance: Annotated[Metres, Positive] = 0.2
+    """How near a cusp is reached."""
+    inversion_yaw_tolerance: Annotated[Radians, Positive] = 0.4
+    """And in which heading."""
     use_cancel_deceleration: bool = False
     """Whether a cancelled robot follows the path until it stands."""
     cancel_deceleration: Annotated[MetresPerSecondSquared, Positive] = 3.2

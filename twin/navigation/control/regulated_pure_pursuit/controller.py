@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.controller import Controller, Situation
-from twin.navigation.control.path_handler import LocalPath, PathHandler
+from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
 from twin.navigation.control.regulated_pure_pursuit.collision_check import CollisionCheck
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation import turn_rate
@@ -34,7 +34,9 @@ class RegulatedPurePursuit(Controller):
         config = self.config
         self._tolerance = config.xy_goal_tolerance
         self._collisions = CollisionCheck(config, self.footprint)
-        self._handler = PathHandler(config, to_cusps=config.allow_reversing, prune_distance=math.inf)
+        self._handler = PathHandler(
+            PathHandlerConfig.of(config), to_cusps=config.allow_reversing, prune_distance=math.inf
+        )
 
     def set_plan(self, path: Array) -> None:
         """Follow another path; see `Controller.set_plan`."""

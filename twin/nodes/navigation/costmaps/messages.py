@@ -8,15 +8,7 @@ import numpy as np
 
 from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import Costmap as CostmapMessage
-from twin.bridge.msgs import (
-    CostmapMetaData,
-    OccupancyGrid,
-    Point32,
-    Polygon,
-    PolygonStamped,
-    header,
-    stamp,
-)
+from twin.bridge.msgs import CostmapMetaData, OccupancyGrid, Point32, Polygon, PolygonStamped, header, stamp
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
