@@ -171,14 +171,6 @@ class DriveOnHeading(_Behavior):
 
 
 @dataclass(kw_only=True)
-class BackUp(DriveOnHeading):
-    """Drive straight back."""
-
-    target_distance: float = -0.15
-    """Negative [m]."""
-
-
-@dataclass(kw_only=True)
 class Wait(_Behavior):
     """Stand still."""
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.parameters import Kilograms, Metres
+from twin.parameters import Kilograms, Metres, Radians
 from twin.strict_yaml import Fault, Faults, StrictModel
-from twin.warehouse.arena_types import Colour, Interval, Length, Point, PoseList
-from twin.warehouse.cylinders import CylindersEntry, outside
 from twin.warehouse.footprint import Rectangle, overlap
+
+Length = Annotated[Metres, Field(gt=0.0)]
+Point = tuple[Metres, Metres]
+PoseList = tuple[Metres, Metres, Radians]
+Interval = tuple[Metres, Metres]
+Colour = Literal["red", "yellow", "green", "blue", "orange", "grey", "white", "wood"]
 
 
 class Hall(StrictModel):
@@ -93,6 +98,19 @@ class ObstacleEntry(StrictModel):
     pose: PoseList
     size: tuple[Length, Length, Length]
     colour: Colour = "grey"
+
+
+class CylindersEntry(StrictModel):
+    """Cylinders of one size that stand upright; they may touch each other."""
+
+    centres: Annotated[tuple[Point, ...], Field(min_length=1)]
+    radius: Length
+    height: Length = 1.0
+    colour: Colour = "grey"
+
+    def covers(self, x: float, y: float) -> bool:
+        """Return whether a point [m] is inside one of them."""
+        return min(math.dist((x, y), centre) for centre in self.centres) <= self.radius
 
 
 class ToteKind(StrictModel):
@@ -259,7 +277,12 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
     for loc, what, rectangle in _solids(arena):
         if not hall.contains(rectangle.corners):
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
-    yield from outside(arena.cylinders, arena.hall.x, arena.hall.y)
+    for name, group in arena.cylinders.items():
+        r = group.radius
+        for index, (x, y) in enumerate(group.centres):
+            if not hall.contains([[x - r, y - r], [x + r, y + r]]):
+                text = f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})"
+                yield Fault(("cylinders", name, "centres", index), text)
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]

@@ -15,8 +15,7 @@ from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box, Cylinder
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
-from twin.warehouse.arena_file import PartitionEntry, RackEntry, ToteKind
-from twin.warehouse.cylinders import CylindersEntry
+from twin.warehouse.arena_file import CylindersEntry, PartitionEntry, RackEntry, ToteKind
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena

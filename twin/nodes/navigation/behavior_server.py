@@ -108,10 +108,13 @@ class BehaviorServerNode:
         return self._made(recovery.Spin, goal, target_yaw=goal.target_yaw)
 
     def _backup(self, goal: Any) -> Behavior:
-        return self._made(recovery.BackUp, goal, target_distance=-abs(goal.target.x), speed=abs(goal.speed))
+        return self._straight(goal, -abs(goal.target.x))
 
     def _drive(self, goal: Any) -> Behavior:
-        return self._made(recovery.DriveOnHeading, goal, target_distance=goal.target.x, speed=abs(goal.speed))
+        return self._straight(goal, goal.target.x)
+
+    def _straight(self, goal: Any, x: float) -> Behavior:
+        return self._made(recovery.DriveOnHeading, goal, target_distance=x, speed=abs(goal.speed))
 
     def _wait(self, goal: Any) -> Behavior:
         return recovery.Wait(duration=ns(goal.time) * 1e-9)

@@ -47,7 +47,7 @@ class DWB(Controller):
 
     def _build(self) -> None:
         config = self.config
-        self._oscillation = Oscillation(config=config.Oscillation)
+        self._oscillation = Oscillation(config.Oscillation)
         self._critics = own_critics(config)
         self._cover = CoverOf(self.footprint, consider_footprint="ObstacleFootprint" in config.critics)
         self._handler = PathHandler(to_cusps=self.reverses, prune_distance=config.prune_distance)

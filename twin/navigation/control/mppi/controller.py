@@ -212,9 +212,8 @@ class MPPI(Controller):
 
     def _smooth(self) -> None:
         """Filter the controls; what was sent before them is their past (Nav2's savitskyGolayFilter)."""
-        if self.config.time_steps <= 20:
-            return
-        controls.smooth(self._mean, self._sent.latest(_SMOOTHED), _FILTERS[self.config.sgf_order])
+        if self.config.time_steps > 20:
+            controls.smooth(self._mean, self._sent.latest(_SMOOTHED), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)

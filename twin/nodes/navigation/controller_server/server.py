@@ -1,7 +1,7 @@
 """`/controller_server`: the `follow_path` action; publishes `cmd_vel_nav`, as in Nav2.
 
-A goal becomes a `controller_goal.py:FollowGoal`; each period `controller_command.py:Commander` finds the
-command for it, and `controller_display.py:ControllerDisplay` shows what is followed.
+A goal becomes a `goal.py:FollowGoal`; each period `command.py:Commander` finds the command for it, and
+`display.py:ControllerDisplay` shows what is followed.
 """
 
 from __future__ import annotations
