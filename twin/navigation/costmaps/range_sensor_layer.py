@@ -121,15 +121,8 @@ def _update_cone(
 ) -> None:
     """Apply Bayes' rule to the cells of a window.
 
-    Args:
-        cells: Changed.
-        sensor: x, y, yaw.
-        model: Distance that was measured [m], half of the cone's angle [rad], distance that counts half [m].
-        clearing: Whether the reading tells that nothing is there.
-        inflate_cone: As `RangeSensorConfig` has it.
-        triangle: The cone's corners: columns, then rows.
-        window: Around it.
-        frame: Of the grid.
+    `model` is what was measured [m], half of the cone's angle [rad] and the distance that counts half [m];
+    `triangle` has the cone's corners: columns, then rows.
     """
     (x, y, yaw), (distance, half, phi_v), (origin_x, origin_y, resolution) = sensor, model, frame
     tx, ty = (
