@@ -33,32 +33,6 @@ class FootprintCover(NamedTuple):
     circle_cost: int
     """That of a circle's centre."""
 
-    @staticmethod
-    def of(
-        footprint: Array, costmap: Costmap, *, consider_footprint: bool, padding: float = 0.0
-    ) -> FootprintCover:
-        """Return the cover of a footprint, shape (n, 2) [m], for a costmap.
-
-        Args:
-            footprint: Corners in the base frame; a single corner is a robot known by its radius alone.
-            costmap: Its inflation tells how far from an obstacle a cell is; where it ends too early to tell,
-                every look is at the outline.
-            consider_footprint: False checks the centre for inscribed cost alone.
-            padding: Put around `padded` [m]; the circles cover that.
-        """
-        if not consider_footprint or len(footprint) < 3:
-            none = np.zeros((0, 2), dtype=np.float32)
-            return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
-        wider, cell = padded(footprint, padding), costmap.resolution
-        centres, radius = _circles(wider)
-        return FootprintCover(
-            outline=(_outline(footprint, cell / 2.0) / cell).astype(np.float32),
-            padded=(_outline(wider, cell / 2.0) / cell).astype(np.float32),
-            circles=(centres / cell).astype(np.float32),
-            centre_cost=costmap.cost_within(radii(wider)[1] + _SLACK * cell),
-            circle_cost=costmap.cost_within(radius + _SLACK * cell),
-        )
-
 
 @fast_jit
 def outline_hits(
@@ -109,19 +83,41 @@ class CoverOf:
     """The cover of a footprint, made again only when a costmap is inflated or resolved otherwise."""
 
     def __init__(self, footprint: Array, *, consider_footprint: bool, padding: float = 0.0) -> None:
-        self._footprint = footprint
-        self._consider_footprint, self._padding = consider_footprint, padding
+        """Take a footprint.
+
+        Args:
+            footprint: Corners in the base frame, shape (n, 2) [m]; a single corner is a robot known by its
+                radius alone.
+            consider_footprint: False checks the centre for inscribed cost alone.
+            padding: Put around `FootprintCover.padded` [m]; the circles cover that.
+        """
+        self._footprint, self._padding = footprint, padding
+        self._centre_alone = not consider_footprint or len(footprint) < 3
         self._key: tuple[float, ...] | None = None
 
     def on(self, costmap: Costmap) -> FootprintCover:
-        """Return `FootprintCover.of`."""
+        """Return the cover for a costmap: its inflation tells how far from an obstacle a cell is.
+
+        Where that ends too early to tell, every look is at the outline.
+        """
         key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
         if key != self._key:
-            self._key = key
-            self._cover = FootprintCover.of(
-                self._footprint, costmap, consider_footprint=self._consider_footprint, padding=self._padding
-            )
+            self._key, self._cover = key, self._made(costmap)
         return self._cover
+
+    def _made(self, costmap: Costmap) -> FootprintCover:
+        if self._centre_alone:
+            none = np.zeros((0, 2), dtype=np.float32)
+            return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
+        wider, cell = padded(self._footprint, self._padding), costmap.resolution
+        centres, radius = _circles(wider)
+        return FootprintCover(
+            outline=(_outline(self._footprint, cell / 2.0) / cell).astype(np.float32),
+            padded=(_outline(wider, cell / 2.0) / cell).astype(np.float32),
+            circles=(centres / cell).astype(np.float32),
+            centre_cost=costmap.cost_within(radii(wider)[1] + _SLACK * cell),
+            circle_cost=costmap.cost_within(radius + _SLACK * cell),
+        )
 
 
 def _outline(corners: Array, spacing: float) -> Array:

@@ -61,7 +61,6 @@ class BehaviorServerNode:
         *,
         costmap: CostmapNode | None = None,
         cmd_vel: str = "cmd_vel_nav",
-        cmd_vel_teleop: str = "cmd_vel_assisted_teleop",
         period_ns: int = 20_000_000,
         namespace: str = "",
     ) -> None:
@@ -73,7 +72,7 @@ class BehaviorServerNode:
         self._period_ns = period_ns
         self._publisher = self.node.create_publisher(Twist, cmd_vel, 1)
         self._teleop: recovery.AssistedTeleop | None = None
-        self.node.create_subscription(Twist, cmd_vel_teleop, self._on_teleop, 10)
+        self.node.create_subscription(Twist, "cmd_vel_assisted_teleop", self._on_teleop, 10)
         self.node.create_subscription(Empty, "preempt_teleop", self._on_preempt_teleop, 10)
         for name, served in self._behaviors().items():
             ActionServer(self.node, served.action, name, self._execution(name, served), _is_finite)
