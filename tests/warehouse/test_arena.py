@@ -14,6 +14,7 @@ from twin.sim.scene import Shape, StaticBody
 from twin.sim.world import World
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
+from twin.warehouse.arena_file import covered
 from twin.warehouse.footprint import Rectangle, overlap
 
 NAMED = ("tote_a", "tote_b", "tote_c")
@@ -38,8 +39,8 @@ def test_aisles_are_wide_enough_to_turn(warehouse: Arena) -> None:
         aisle = Rectangle(front, 2.2, rack.length)
         assert warehouse.hall.contains(aisle.corners)
         others = [other.footprint for other in warehouse.racks.values() if other is not rack]
-        others += [pillar.rectangle for pillar in warehouse.file.pillars.values()]
-        others += [pallet.rectangle for pallet in warehouse.file.pallets.values()]
+        others += [covered(pillar) for pillar in warehouse.file.pillars.values()]
+        others += [covered(pallet) for pallet in warehouse.file.pallets.values()]
         assert not any(overlap(aisle, other) for other in others)
 
 

@@ -30,12 +30,26 @@ from twin.models import load
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.runtime.defaults import from_description as derive
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
-from twin.warehouse.skills import Station
+from twin.warehouse.shelf import Slot, Tote
 
-SHELF = Station(name="shelf", face=Pose2(5.0, 2.0, np.pi / 2), surface_z=0.8)
-TABLE = Station(name="table", face=Pose2(8.0, 0.0, 0.0), surface_z=0.4)
+
+def slot(name: str, face: Pose2, height: float) -> Slot:
+    """A slot before which a robot stands with the heading of `face`, a point of the slot's front edge."""
+    front = Pose3.from_pose2(face @ Pose2(0.0, 0.0, np.pi), height)
+    return Slot(shelf=name, level=0, index=0, T_map_slot=front)
+
+
+def task(name: str = "tote_a", height: float = 0.8) -> PickAndPlaceTask:
+    """Carry a tote from a shelf whose surface is so high [m]."""
+    shelf, size = slot("shelf", Pose2(5.0, 2.0, np.pi / 2), height), (0.30, 0.24, 0.18)
+    tote = Tote(
+        name=name, slot=shelf, T_map_tote=shelf.standing(0.30, 0.18, 0.05), size=size, mass=2.5,
+        friction=0.6, rgba=(0.8, 0.2, 0.1, 1.0),
+    )  # fmt: skip
+    return PickAndPlaceTask(tote=tote, place=slot("table", Pose2(8.0, 0.0, 0.0), 0.4))
+
+
 TOTE_IN_BASE = Pose2(0.6, 0.02, 0.05)
-TASK = {"tote_width": 0.24, "box_depth": 0.30, "tote_height": 0.18, "pick": SHELF, "place": TABLE}
 
 Answer = Callable[[GoalHandle], Any]
 
@@ -84,12 +98,12 @@ class Robot:
         """Run a mission to its end."""
         mission = PickAndPlaceNode(
             self.bus,
-            tasks or [PickAndPlaceTask(tote="tote_a", **TASK)],
             self.manipulator.arm,
             gripper_joint=self.manipulator.gripper_joint,
             gripper_open=self.manipulator.gripper_open,
             robot_pose=RobotPose(self.transforms, Frames()),
         )
+        mission.carry(tasks or [task()])
         while not mission.done:
             assert self.clock.now_ns < seconds * 1e9, f"no end; it is at {mission.state!r}"
             self.clock.now_ns += 20_000_000
@@ -197,8 +211,8 @@ def test_one_tote_is_fetched_and_set_down(robot: Robot) -> None:
         "undock table",
     ]
     assert robot.states[-1] == "done"
-    words = ["drive to shelf", "dock at shelf", "look", "reach", "grasp", "retract", "back off",
-             "carry to table", "dock at table", "set down", "release", "back off"]  # fmt: skip
+    words = ["drive to shelf/0/0", "dock at shelf/0/0", "look", "reach", "grasp", "retract", "back off",
+             "carry to table/0/0", "dock at table/0/0", "set down", "release", "back off"]  # fmt: skip
     assert robot.states[:-1] == [f"tote_a: {word}" for word in words]
 
 
@@ -220,7 +234,7 @@ def test_a_loaded_arm_moves_at_half_its_speed(robot: Robot) -> None:
 
 
 def test_two_totes_come_one_after_the_other(robot: Robot) -> None:
-    tasks = [PickAndPlaceTask(tote=name, **TASK) for name in ("tote_a", "tote_b")]
+    tasks = [task("tote_a"), task("tote_b")]
     assert robot.run(tasks).succeeded
     assert steps(robot).count("close") == 2
     first_b = next(i for i, state in enumerate(robot.states) if state.startswith("tote_b"))
@@ -254,7 +268,7 @@ def test_between_two_attempts_it_lets_go_and_drives_to_the_staging_pose_again(ro
 
 def test_a_table_that_was_missed_is_docked_at_again_with_the_tote_in_the_gripper(robot: Robot) -> None:
     def miss() -> None:
-        if robot.states and robot.states[-1] == "tote_a: dock at table" and not missed:
+        if robot.states and robot.states[-1] == "tote_a: dock at table/0/0" and not missed:
             missed.append(True)
             robot.failures["dock_robot"] = ["docking failed: missed"]
 
@@ -322,7 +336,7 @@ def test_a_tote_lost_on_the_way_ends_the_drive_at_once(
     lost: list[float] = []
 
     def lose() -> None:
-        if robot.states and robot.states[-1] == "tote_a: carry to table" and not lost:
+        if robot.states and robot.states[-1] == "tote_a: carry to table/0/0" and not lost:
             lost.append(robot.clock.now_ns * 1e-9)
             happens(robot)
 
@@ -341,7 +355,7 @@ def test_navigation_that_fails_ends_the_mission_with_its_reason(robot: Robot) ->
     mission = robot.run()
     assert mission.succeeded is False
     assert mission.reason == (
-        "tote_a: drive to shelf: NavigateTo[shelf]: no path from (0.00, 0.00) to (5.00, 0.70)"
+        "tote_a: drive to shelf/0/0: NavigateTo[shelf/0/0]: no path from (0.00, 0.00) to (5.00, 0.70)"
     )
 
 
@@ -354,9 +368,7 @@ def test_an_arm_that_is_blocked_is_named(robot: Robot) -> None:
 
 
 def test_a_tote_out_of_reach_is_said_before_anything_is_grasped(robot: Robot) -> None:
-    high = Station(name="roof", face=SHELF.face, surface_z=3.0)
-    task = PickAndPlaceTask(tote="tote_a", **{**TASK, "pick": high})
-    mission = robot.run([task])
+    mission = robot.run([task(height=3.0)])
     assert mission.succeeded is False
     assert "cannot reach" in mission.reason
     assert "close" not in robot.log

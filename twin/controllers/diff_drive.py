@@ -51,13 +51,10 @@ class DiffDriveController:
         self._angular = SpeedLimiter(config.angular)
         self._command = (0.0, 0.0)
         self._age = math.inf
-        self.rejected = 0
-        """Commands refused because they were not finite."""
 
     def set_command(self, linear: float, angular: float) -> bool:
         """Take a command [m/s, rad/s]; return False, and keep the old one, if it is not finite."""
         if not (math.isfinite(linear) and math.isfinite(angular)):
-            self.rejected += 1
             return False
         self._command = (linear, angular)
         self._age = 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.odometry_noise import DIFF_DRIVE, SKID_STEER, OdometryNoise
 from twin.controllers.skid_steer import cornering_slip, track_ratio, weight_shares
-from twin.geometry import Array, Pose3
+from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.kinematics import link_poses
@@ -96,15 +95,10 @@ def _stance(drive: DriveSpec, description: RobotDescription) -> tuple[Array, lis
     joints = (*drive.left_joints, *drive.right_joints)
     wheels = np.array([poses[description.joints[name].child].xyz for name in joints])
     is_left = [True] * len(drive.left_joints) + [False] * len(drive.right_joints)
-    return wheels, is_left, _centre_of_mass(description, poses)
-
-
-def _centre_of_mass(description: RobotDescription, poses: Mapping[str, Pose3]) -> Array:
-    """Return the centre of mass at joint position zero in the root frame [m], shape (3,)."""
-    parts = [
+    masses = [
         (link.inertial.mass, poses[name].apply(link.inertial.T_link_com.xyz))
         for name, link in description.links.items()
         if link.inertial is not None
     ]
-    masses = np.array([mass for mass, _ in parts])
-    return np.asarray(masses @ np.array([point for _, point in parts]) / masses.sum())
+    mass = np.array([mass for mass, _ in masses])
+    return wheels, is_left, np.asarray(mass @ np.array([point for _, point in masses]) / mass.sum())

@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-Velocity = tuple[float, float]
-
 
 @dataclass(frozen=True, kw_only=True)
 class MuxInput:
@@ -37,7 +35,5 @@ class TwistMux:
 
     def active(self, now: float) -> str | None:
         """Return the name of the source in charge at `now` [s]."""
-        for source in self._inputs:
-            if now - self._stamps[source.name] <= source.timeout:
-                return source.name
-        return None
+        live = (each.name for each in self._inputs if now - self._stamps[each.name] <= each.timeout)
+        return next(live, None)

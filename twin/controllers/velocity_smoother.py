@@ -72,8 +72,7 @@ class VelocitySmoother:
             linear = self._linear.value + share * (linear - self._linear.value)
             angular = self._angular.value + share * (angular - self._angular.value)
         v, w = self._linear.limit(linear, dt), self._angular.limit(angular, dt)
-        if abs(v) < self.config.deadband_linear:
-            v = 0.0
-        if abs(w) < self.config.deadband_angular:
-            w = 0.0
-        return v, w
+        return (
+            0.0 if abs(v) < self.config.deadband_linear else v,
+            0.0 if abs(w) < self.config.deadband_angular else w,
+        )

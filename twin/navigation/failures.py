@@ -11,80 +11,59 @@ class NavigationFailure(Exception):
 
     error_code: int = 0
 
+    def __init_subclass__(cls, *, error_code: int | None = None) -> None:
+        """Take the code of a subclass; without one it has that of its base."""
+        if error_code is not None:
+            cls.error_code = error_code
 
-class PlanningFailure(NavigationFailure):
+
+class PlanningFailure(NavigationFailure, error_code=200):
     """No plan; codes of nav2_msgs/action/ComputePathToPose."""
 
-    error_code = 200
 
-
-class InvalidPlanner(PlanningFailure):
+class InvalidPlanner(PlanningFailure, error_code=201):
     """There is no planner of that name."""
 
-    error_code = 201
 
-
-class NoPose(PlanningFailure):
+class NoPose(PlanningFailure, error_code=202):
     """A pose cannot be brought into the map frame, or there is no map."""
 
-    error_code = 202
 
-
-class NoViapoints(PlanningFailure):
+class NoViapoints(PlanningFailure, error_code=209):
     """No poses to go through; a code of ComputePathThroughPoses alone, 309, less the offset of its codes."""
 
-    error_code = 209
 
-
-class StartOutsideMap(PlanningFailure):
+class StartOutsideMap(PlanningFailure, error_code=203):
     """The start is outside the costmap."""
 
-    error_code = 203
 
-
-class GoalOutsideMap(PlanningFailure):
+class GoalOutsideMap(PlanningFailure, error_code=204):
     """The goal is outside the costmap."""
 
-    error_code = 204
 
-
-class StartOccupied(PlanningFailure):
+class StartOccupied(PlanningFailure, error_code=205):
     """The start is inside an obstacle."""
 
-    error_code = 205
 
-
-class GoalOccupied(PlanningFailure):
+class GoalOccupied(PlanningFailure, error_code=206):
     """The goal, and everything within the tolerance around it, is inside an obstacle."""
 
-    error_code = 206
 
-
-class PlanningTimeout(PlanningFailure):
+class PlanningTimeout(PlanningFailure, error_code=207):
     """The search was given up."""
 
-    error_code = 207
 
-
-class NoValidPath(PlanningFailure):
+class NoValidPath(PlanningFailure, error_code=208):
     """Start and goal are free but not connected."""
 
-    error_code = 208
 
-
-class ControlFailure(NavigationFailure):
+class ControlFailure(NavigationFailure, error_code=101):
     """No command; codes of nav2_msgs/action/FollowPath."""
 
-    error_code = 101
 
-
-class InvalidPath(ControlFailure):
+class InvalidPath(ControlFailure, error_code=103):
     """The path is empty or not a path."""
 
-    error_code = 103
 
-
-class NoValidControl(ControlFailure):
+class NoValidControl(ControlFailure, error_code=106):
     """Every admissible command leads into a collision."""
-
-    error_code = 106

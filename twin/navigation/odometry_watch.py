@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,25 +23,17 @@ _NEAR, _NEAR_PER_METRE = 0.1, 0.02
 """Where a ray ends so near to the scan before, it is explained by it [m]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class OdometryWatchConfig:
-    """When odometry and scans contradict each other. A turn of 1 rad counts like a way of 1 m."""
-
-    period_ns: int = 500_000_000
-    """Time between two scans that are compared [ns]."""
-    least_motion: float = 0.1
-    """Comparisons count in which either tells of so much motion [m] or [rad]."""
-    comparisons: int = 20
-    """Of the last so many ..."""
-    contradictions: int = 15
-    """... so many must contradict: 7.5 s of motion."""
-    difference: float = 0.5
-    """The motions differ by more than this part of the larger one; Nav2's alphas are for wheels that are
-    wrong by 45 %."""
-    fit: float = 0.7
-    """Least share of a scan that its motion must explain by the scan before ..."""
-    gain: float = 0.15
-    """... and by how much more than odometry's."""
+_PERIOD_NS = 500_000_000
+"""Time between two scans that are compared [ns]."""
+_LEAST_MOTION = 0.1
+"""Comparisons count in which either tells of so much motion [m] or [rad]: 1 rad counts like 1 m."""
+_COMPARISONS, _CONTRADICTIONS = 20, 15
+"""Of the last so many so many must contradict: 7.5 s of motion."""
+_DIFFERENCE = 0.5
+"""The motions differ by more than this part of the larger one; Nav2's alphas are for wheels that are
+wrong by 45 %."""
+_FIT, _GAIN = 0.7, 0.15
+"""Least share of a scan that its motion must explain by the scan before; by how much more than odometry's."""
 
 
 class _Comparison(NamedTuple):
@@ -61,13 +52,11 @@ class OdometryWatch:
     as along a corridor, it is believed. People who walk about explain no scan as a whole.
     """
 
-    def __init__(self, config: OdometryWatchConfig | None = None) -> None:
-        """Begin without a scan."""
-        self._config = config or OdometryWatchConfig()
+    def __init__(self) -> None:
         self._before: tuple[int, Pose2, Array] | None = None
         self._odom: Pose2 | None = None
         self._turned = 0.0
-        self._comparisons: deque[_Comparison] = deque(maxlen=self._config.comparisons)
+        self._comparisons: deque[_Comparison] = deque(maxlen=_COMPARISONS)
 
     def take(self, points: Callable[[], Array], odom: Pose2, time_ns: int) -> None:
         """Take a scan.
@@ -78,28 +67,27 @@ class OdometryWatch:
             odom: The base's pose in odom when it was taken.
             time_ns: When it was taken.
         """
-        config = self._config
         if self._odom is not None:
             self._turned += wrap_angle(odom.yaw - self._odom.yaw)
         self._odom = odom
-        if self._before is not None and time_ns - self._before[0] < config.period_ns:
+        if self._before is not None and time_ns - self._before[0] < _PERIOD_NS:
             return
         ends = points()
         before, self._before = self._before, (time_ns, odom, ends)
         turned, self._turned = self._turned, 0.0
-        if before is None or time_ns - before[0] > 2 * config.period_ns or not (len(ends) and len(before[2])):
+        if before is None or time_ns - before[0] > 2 * _PERIOD_NS or not (len(ends) and len(before[2])):
             return
         moved = before[1].inverse() @ odom
         compared = self._compare(before[2], ends, Pose2(moved.x, moved.y, turned))
-        if max(_extent(compared.odometry), _extent(compared.scans)) >= config.least_motion:
+        if max(_extent(compared.odometry), _extent(compared.scans)) >= _LEAST_MOTION:
             self._comparisons.append(compared)
 
     @property
     def fault(self) -> str:
         """Why odometry cannot be believed, in words; empty if it can."""
-        if sum(compared.contradicts for compared in self._comparisons) < self._config.contradictions:
+        if sum(compared.contradicts for compared in self._comparisons) < _CONTRADICTIONS:
             return ""
-        seconds = len(self._comparisons) * self._config.period_ns * 1e-9
+        seconds = len(self._comparisons) * _PERIOD_NS * 1e-9
         wheels = _told(compared.odometry for compared in self._comparisons)
         scans = _told(compared.scans for compared in self._comparisons)
         return (
@@ -107,12 +95,11 @@ class OdometryWatch:
         )
 
     def _compare(self, before: Array, points: Array, odometry: Pose2) -> _Comparison:
-        config = self._config
         points = points[:: max(1, len(points) // _RAYS)]
         tree = cKDTree(before)
         explained = _share(tree, points, odometry)
         agreed = _Comparison(odometry, odometry, contradicts=False)
-        needed = max(config.fit, explained + config.gain)
+        needed = max(_FIT, explained + _GAIN)
         if needed > 1.0:
             return agreed
         grid = CorrelationGrid(before, _CELL, _SMEAR, _LEVELS)
@@ -122,7 +109,7 @@ class OdometryWatch:
             return agreed
         scans = match.pose
         apart = Pose2(odometry.x - scans.x, odometry.y - scans.y, odometry.yaw - scans.yaw)
-        allowed = max(config.least_motion, config.difference * max(_extent(odometry), _extent(scans)))
+        allowed = max(_LEAST_MOTION, _DIFFERENCE * max(_extent(odometry), _extent(scans)))
         return _Comparison(odometry, scans, contradicts=_extent(apart) > allowed)
 
 

@@ -46,30 +46,23 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-CONTROLLERS: Kind[Controller] = Kind(
-    "controller", base="twin.navigation.control.controller:Controller", group="twin.controllers"
-)
-CRITICS: Kind[Critic] = Kind("critic", base="twin.navigation.control.critic:Critic", group="twin.critics")
+
+def _kind(name: str, base: str, group: str) -> Kind[Any]:
+    return Kind(name, base=f"twin.navigation.{base}", group=f"twin.{group}")
+
+
+CONTROLLERS: Kind[Controller] = _kind("controller", "control.controller:Controller", "controllers")
+CRITICS: Kind[Critic] = _kind("critic", "control.critic:Critic", "critics")
 """Of MPPI and DWB, beside those that are compiled into them."""
-GOAL_CHECKERS: Kind[GoalChecker] = Kind(
-    "goal checker", base="twin.navigation.control.goal_checker:GoalChecker", group="twin.goal_checkers"
+GOAL_CHECKERS: Kind[GoalChecker] = _kind("goal checker", "control.goal_checker:GoalChecker", "goal_checkers")
+PROGRESS_CHECKERS: Kind[ProgressChecker] = _kind(
+    "progress checker", "control.progress_checker:ProgressChecker", "progress_checkers"
 )
-PROGRESS_CHECKERS: Kind[ProgressChecker] = Kind(
-    "progress checker",
-    base="twin.navigation.control.progress_checker:ProgressChecker",
-    group="twin.progress_checkers",
-)
-PLANNERS: Kind[GlobalPlanner] = Kind(
-    "planner", base="twin.navigation.planning.planner:GlobalPlanner", group="twin.planners"
-)
-SMOOTHERS: Kind[Smoother] = Kind(
-    "smoother", base="twin.navigation.planning.smoother:Smoother", group="twin.smoothers"
-)
-LAYERS: Kind[Layer] = Kind("layer", base="twin.navigation.costmaps.layer:Layer", group="twin.layers")
+PLANNERS: Kind[GlobalPlanner] = _kind("planner", "planning.planner:GlobalPlanner", "planners")
+SMOOTHERS: Kind[Smoother] = _kind("smoother", "planning.smoother:Smoother", "smoothers")
+LAYERS: Kind[Layer] = _kind("layer", "costmaps.layer:Layer", "layers")
 """Of costmaps, beside those that ship: `costmap_config.LAYERS`."""
-TREE_NODES: Kind[TreeNode] = Kind(
-    "behaviour tree node", base="twin.navigation.behavior_trees.node:TreeNode", group="twin.bt_nodes"
-)
+TREE_NODES: Kind[TreeNode] = _kind("behaviour tree node", "behavior_trees.node:TreeNode", "bt_nodes")
 """Beside those of BehaviorTree.CPP and Nav2."""
 _CONFIGS: dict[tuple[str, str], type] = {}
 """Of what ships, by kind and name."""

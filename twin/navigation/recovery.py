@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
-from twin.navigation.costmaps.costmap import Costmap, collision_step
+from twin.navigation.costmaps.costmap import Costmap, collision_step, triple
 from twin.navigation.costmaps.kernels import escapes
 from twin.parameters import (
     Interval,
@@ -34,9 +34,9 @@ TIMEOUT = "timeout"
 class BehaviorStep(NamedTuple):
     """The command of one period."""
 
-    v: float
+    v: float = 0.0
     """[m/s]"""
-    w: float
+    w: float = 0.0
     """[rad/s]"""
     done: bool = False
     failed_reason: str | None = None
@@ -111,8 +111,8 @@ class _Behavior:
         if hit != 0:
             return hit > 0
         # The present pose is a collision: a robot that touches something may move away, not further in.
-        state = float(pose.x), float(pose.y), float(pose.yaw), float(v), float(w)
-        return not escapes(costmap.costs, self._footprint, *state, time / steps, steps, *costmap.frame)
+        at, command = triple(pose), (float(v), float(w))
+        return not escapes(costmap.costs, self._footprint, at, command, time / steps, steps, costmap.frame)
 
 
 @dataclass(kw_only=True)
@@ -132,15 +132,14 @@ class Spin(_Behavior):
         direction = math.copysign(1.0, self.target_yaw)
         remaining = abs(self.target_yaw) - direction * self._turned
         if remaining <= 1e-3:
-            return BehaviorStep(0.0, 0.0, done=True)
+            return BehaviorStep(done=True)
         if self._timed_out(dt):
-            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
-        config = self.config
-        accel = config.rotational_acc_lim
+            return BehaviorStep(failed_reason=TIMEOUT)
+        config, accel = self.config, self.config.rotational_acc_lim
         speed = self._ramp(remaining, accel, accel, config.min_rotational_vel, config.max_rotational_vel, dt)
         w = direction * speed
         if self._collides(pose, 0.0, w, remaining, costmap):
-            return BehaviorStep(0.0, 0.0, failed_reason=COLLISION_AHEAD)
+            return BehaviorStep(failed_reason=COLLISION_AHEAD)
         return BehaviorStep(0.0, w)
 
 
@@ -160,24 +159,15 @@ class DriveOnHeading(_Behavior):
         self.progress = self._start.distance(pose)
         remaining = abs(self.target_distance) - self.progress
         if remaining <= 1e-3:
-            return BehaviorStep(0.0, 0.0, done=True)
+            return BehaviorStep(done=True)
         if self._timed_out(dt):
-            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
-        config = self.config
-        accel, decel = config.acceleration_limit, config.deceleration_limit
-        speed = self._ramp(remaining, accel, decel, config.minimum_speed, self.speed, dt)
+            return BehaviorStep(failed_reason=TIMEOUT)
+        accel, decel = self.config.acceleration_limit, self.config.deceleration_limit
+        speed = self._ramp(remaining, accel, decel, self.config.minimum_speed, self.speed, dt)
         v = math.copysign(speed, self.target_distance)
         if self._collides(pose, v, 0.0, remaining, costmap):
-            return BehaviorStep(0.0, 0.0, failed_reason=COLLISION_AHEAD)
+            return BehaviorStep(failed_reason=COLLISION_AHEAD)
         return BehaviorStep(v, 0.0)
-
-
-@dataclass(kw_only=True)
-class BackUp(DriveOnHeading):
-    """Drive straight back."""
-
-    target_distance: float = -0.15
-    """Negative [m]."""
 
 
 @dataclass(kw_only=True)
@@ -192,7 +182,7 @@ class Wait(_Behavior):
         del pose, costmap
         self._elapsed += dt
         self.progress = max(self.duration - self._elapsed, 0.0)
-        return BehaviorStep(0.0, 0.0, done=self._elapsed >= self.duration - 1e-9)
+        return BehaviorStep(done=self._elapsed >= self.duration - 1e-9)
 
 
 @dataclass(kw_only=True)
@@ -207,9 +197,9 @@ class AssistedTeleop(_Behavior):
     def update(self, pose: Pose2, dt: float, costmap: Costmap | None = None) -> BehaviorStep:
         """Return the next command; `pose` in the costmap's frame, `dt` in [s]."""
         if self.is_over:
-            return BehaviorStep(0.0, 0.0, done=True)
+            return BehaviorStep(done=True)
         if self._timed_out(dt):
-            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
+            return BehaviorStep(failed_reason=TIMEOUT)
         self.progress = self._elapsed
         v, w = self.steered
         share = self._share(pose, v, w, costmap)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -37,16 +35,10 @@ class RepeatedScan:
         return self._count >= self._repeats and (moved or turned)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScanWatchConfig:
-    """What no healthy lidar does."""
-
-    repeats: int = 3
-    """So many equal scans in a row, while odometry moves, are one old scan."""
-    repeats_distance: float = 0.1
-    """How far odometry must have come meanwhile [m], or turned [rad]."""
-    sudden_share: float = 0.2
-    """If so many of the rays hit something, not all of them hit nothing in the next scan."""
+_REPEATS, _REPEATS_DISTANCE = 3, 0.1
+"""So many equal scans in a row are one old scan, while odometry comes so far [m], or turns so much [rad]."""
+_SUDDEN_SHARE = 0.2
+"""If so many of the rays hit something, not all of them hit nothing in the next scan."""
 
 
 class ScanWatch:
@@ -56,9 +48,8 @@ class ScanWatch:
     out in the open.
     """
 
-    def __init__(self, config: ScanWatchConfig | None = None) -> None:
-        self._config = config = config or ScanWatchConfig()
-        self._repeated = RepeatedScan(config.repeats, config.repeats_distance)
+    def __init__(self) -> None:
+        self._repeated = RepeatedScan(_REPEATS, _REPEATS_DISTANCE)
         self._hits = 0.0
 
     def fault(self, ranges: ArrayLike, odom: Pose2 | None) -> str:
@@ -72,7 +63,7 @@ class ScanWatch:
         if np.isnan(values).all():
             return "every reading is NaN"
         hits = float(np.count_nonzero(values < np.inf)) / len(values)  # -inf is too near to be measured
-        if hits == 0.0 and self._hits >= self._config.sudden_share:
+        if hits == 0.0 and self._hits >= _SUDDEN_SHARE:
             return "suddenly no ray returns"
         self._hits = hits
         if hits > 0.0 and odom is not None and self._repeated.is_frozen(values, odom):

@@ -12,7 +12,7 @@ from twin import strict_yaml
 from twin.errors import ScenarioError, nearest
 from twin.geometry import Pose2
 from twin.sim.scene import Scene, StaticBody
-from twin.warehouse.arena_file import ArenaFile, TableEntry, slot_count
+from twin.warehouse.arena_file import ArenaFile, RackEntry, TableEntry, slot_count
 from twin.warehouse.arena_scene import PALETTE, goods, structure
 from twin.warehouse.catalogue import catalogue
 from twin.warehouse.footprint import Rectangle
@@ -48,18 +48,7 @@ class Arena:
     def __init__(self, file: ArenaFile) -> None:
         self.file = file
         self.name = file.name
-        racks = {
-            name: Shelf(
-                name=name,
-                pose=Pose2(*rack.pose),
-                depth=rack.depth,
-                length=rack.length,
-                levels=rack.levels,
-                slot_spacing=rack.slot_spacing,
-                slots_per_level=slot_count(rack.length, rack.slot_spacing),
-            )
-            for name, rack in file.racks.items()
-        }
+        racks = {name: _shelf(name, rack, rack.levels) for name, rack in file.racks.items()}
         self.racks: Mapping[str, Shelf] = MappingProxyType(racks)
         self.totes: Mapping[str, Tote] = MappingProxyType({name: self._tote(name) for name in file.totes})
         self.zones: Mapping[str, Zone] = MappingProxyType({name: self._zone(name) for name in file.zones})
@@ -173,13 +162,13 @@ class Arena:
 
     def _zone(self, name: str) -> Zone:
         entry = self.file.zones[name]
-        pose = Pose2(*entry.pose)
+        pose, table = Pose2(*entry.pose), entry.table
         return Zone(
             name=name,
             pose=pose,
             area=Rectangle(pose, *entry.size),
             rgba=PALETTE[entry.colour],
-            table=None if entry.table is None else _table(name, entry.table),
+            table=None if table is None else _shelf(name, table, (table.height,)),
         )
 
     @cached_property
@@ -193,13 +182,13 @@ class Arena:
         return known[name]
 
 
-def _table(zone: str, entry: TableEntry) -> Shelf:
+def _shelf(name: str, entry: RackEntry | TableEntry, levels: tuple[float, ...]) -> Shelf:
     return Shelf(
-        name=zone,
+        name=name,
         pose=Pose2(*entry.pose),
         depth=entry.depth,
         length=entry.length,
-        levels=(entry.height,),
+        levels=levels,
         slot_spacing=entry.slot_spacing,
         slots_per_level=slot_count(entry.length, entry.slot_spacing),
     )

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from twin.errors import nearest
 from twin.geometry import Pose2
-from twin.parameters import Kilograms, Metres
+from twin.parameters import Kilograms, Metres, Radians
 from twin.strict_yaml import Fault, Faults, StrictModel
-from twin.warehouse.arena_types import Colour, Interval, Length, Point, PoseList
-from twin.warehouse.cylinders import CylindersEntry, outside
 from twin.warehouse.footprint import Rectangle, overlap
+
+Length = Annotated[Metres, Field(gt=0.0)]
+Point = tuple[Metres, Metres]
+PoseList = tuple[Metres, Metres, Radians]
+Interval = tuple[Metres, Metres]
+Colour = Literal["red", "yellow", "green", "blue", "orange", "grey", "white", "wood"]
 
 
 class Hall(StrictModel):
@@ -31,9 +36,8 @@ class Hall(StrictModel):
     def _ordered(self) -> Hall:
         for axis, (low, high) in (("x", self.x), ("y", self.y)):
             if low >= high:
-                raise Faults(
-                    [Fault((axis,), f"hall.{axis} must go from low to high, not {low:g} to {high:g}")]
-                )
+                text = f"hall.{axis} must go from low to high, not {low:g} to {high:g}"
+                raise Faults([Fault((axis,), text)])
         return self
 
     @property
@@ -59,11 +63,6 @@ class PillarEntry(StrictModel):
     size: tuple[Length, Length] = (0.4, 0.4)
     height: Length = 2.0
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), *self.size)
-
 
 class RackEntry(StrictModel):
     """A rack with goods on levels; x of its pose points out of its front.
@@ -84,11 +83,6 @@ class RackEntry(StrictModel):
     headroom: Length = 0.35
     """Height of the uprights above the highest surface."""
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.depth, self.length)
-
 
 class PalletEntry(StrictModel):
     """A EUR pallet (1.2 m × 0.8 m) with a load."""
@@ -96,11 +90,6 @@ class PalletEntry(StrictModel):
     pose: PoseList
     load: Annotated[Metres, Field(ge=0.1)] = 0.7
     """Height of the load above the deck; without one a lidar near the floor would not see the pallet."""
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), 1.2, 0.8)
 
 
 class ObstacleEntry(StrictModel):
@@ -110,10 +99,18 @@ class ObstacleEntry(StrictModel):
     size: tuple[Length, Length, Length]
     colour: Colour = "grey"
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.size[0], self.size[1])
+
+class CylindersEntry(StrictModel):
+    """Cylinders of one size that stand upright; they may touch each other."""
+
+    centres: Annotated[tuple[Point, ...], Field(min_length=1)]
+    radius: Length
+    height: Length = 1.0
+    colour: Colour = "grey"
+
+    def covers(self, x: float, y: float) -> bool:
+        """Return whether a point [m] is inside one of them."""
+        return min(math.dist((x, y), centre) for centre in self.centres) <= self.radius
 
 
 class ToteKind(StrictModel):
@@ -158,11 +155,6 @@ class TableEntry(StrictModel):
     """Along x of the pose."""
     height: Length = 0.4
     slot_spacing: Length = 0.5
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """What it covers of the floor."""
-        return Rectangle(Pose2(*self.pose), self.depth, self.length)
 
 
 class ZoneEntry(StrictModel):
@@ -217,9 +209,8 @@ def _names(arena: ArenaFile) -> Iterator[Fault]:
             if "/" in name or "#" in name:
                 yield Fault((section, name), f"the name '{name}' must not contain '/' or '#'")
             if name in seen:
-                yield Fault(
-                    (section, name), f"the name '{name}' is already taken in {seen[name]}; choose another"
-                )
+                text = f"the name '{name}' is already taken in {seen[name]}; choose another"
+                yield Fault((section, name), text)
             seen.setdefault(name, section)
 
 
@@ -234,13 +225,10 @@ def _racks(arena: ArenaFile) -> Iterator[Fault]:
             yield Fault(("racks", name, "levels"), text)
         if tote.width > rack.slot_spacing:
             text = f"a tote is {tote.width:g} m wide and a slot of rack '{name}' {rack.slot_spacing:g} m; "
-            yield Fault(
-                ("racks", name, "slot_spacing"), f"{text}slot_spacing must be at least {tote.width:g}"
-            )
-        if tote.inset + tote.depth > rack.depth:
-            text = (
-                f"a tote needs {tote.inset + tote.depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
-            )
+            text += f"slot_spacing must be at least {tote.width:g}"
+            yield Fault(("racks", name, "slot_spacing"), text)
+        if (depth := tote.inset + tote.depth) > rack.depth:
+            text = f"a tote needs {depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
             yield Fault(("racks", name, "depth"), text)
 
 
@@ -265,12 +253,21 @@ def _totes(arena: ArenaFile) -> Iterator[Fault]:
 
 
 def _solids(arena: ArenaFile) -> Iterator[tuple[tuple[str, ...], str, Rectangle]]:
+    """Yield where each thing is in the file, what it is called, and what it covers of the floor."""
     for section in ("pillars", "racks", "pallets", "obstacles"):
         for name, entry in getattr(arena, section).items():
-            yield (section, name), f"{section[:-1]} '{name}'", entry.rectangle
+            yield (section, name), f"{section[:-1]} '{name}'", covered(entry)
     for name, zone in arena.zones.items():
         if zone.table is not None:
-            yield ("zones", name, "table"), f"table of zone '{name}'", zone.table.rectangle
+            yield ("zones", name, "table"), f"table of zone '{name}'", covered(zone.table)
+
+
+def covered(entry: PillarEntry | RackEntry | PalletEntry | ObstacleEntry | TableEntry) -> Rectangle:
+    """Return what a thing covers of the floor."""
+    if isinstance(entry, RackEntry | TableEntry):
+        return Rectangle(Pose2(*entry.pose), entry.depth, entry.length)
+    x, y = (1.2, 0.8) if isinstance(entry, PalletEntry) else entry.size[:2]
+    return Rectangle(Pose2(*entry.pose), x, y)
 
 
 def _places(arena: ArenaFile) -> Iterator[Fault]:
@@ -280,7 +277,12 @@ def _places(arena: ArenaFile) -> Iterator[Fault]:
     for loc, what, rectangle in _solids(arena):
         if not hall.contains(rectangle.corners):
             yield Fault((*loc, "pose"), f"{what} reaches out of the hall ({extent})")
-    yield from outside(arena.cylinders, arena.hall.x, arena.hall.y)
+    for name, group in arena.cylinders.items():
+        r = group.radius
+        for index, (x, y) in enumerate(group.centres):
+            if not hall.contains([[x - r, y - r], [x + r, y + r]]):
+                text = f"a cylinder of '{name}' at ({x:g}, {y:g}) reaches out of the hall ({extent})"
+                yield Fault(("cylinders", name, "centres", index), text)
     stands: list[tuple[tuple[str, ...], str, PoseList]]
     stands = [(("zones", n, "pose"), f"zone '{n}'", z.pose) for n, z in arena.zones.items()]
     stands += [(("poses", n), f"pose '{n}'", pose) for n, pose in arena.poses.items()]

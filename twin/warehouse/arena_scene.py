@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -14,8 +15,7 @@ from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box, Cylinder
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
-from twin.warehouse.arena_file import PartitionEntry, RackEntry, ToteKind
-from twin.warehouse.cylinders import CylindersEntry
+from twin.warehouse.arena_file import CylindersEntry, PartitionEntry, RackEntry, ToteKind
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena
@@ -52,6 +52,7 @@ _UPRIGHT = 0.05
 _PAINT = 0.002
 """Paint stands proud of what it is on by this much, or a renderer could not tell which is in front [m]."""
 _STRIPE = 0.06
+_ORIGIN = Pose2(0.0, 0.0, 0.0)
 _DECK = 0.144
 """Height of a EUR pallet [m]."""
 
@@ -68,13 +69,14 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
     for name, rack in file.racks.items():
         yield _rack(name, rack)
     for name, pallet in file.pallets.items():
-        shapes = (
+        load, middle = pallet.load, (0.0, 0.0, _DECK + pallet.load / 2.0)
+        yield _body(
+            name,
+            Pose2(*pallet.pose),
             box((1.2, 0.8, _DECK), (0.0, 0.0, _DECK / 2.0), PALETTE["wood"]),
-            box((1.1, 0.74, pallet.load), (0.0, 0.0, _DECK + pallet.load / 2.0), _CARDBOARD),
-            box((1.1 + 2 * _PAINT, 0.08, pallet.load + _PAINT), (0.0, 0.0, _DECK + pallet.load / 2.0),
-                (0.62, 0.47, 0.31, 1.0), solid=False),
-        )  # fmt: skip
-        yield StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*pallet.pose)), shapes=shapes)
+            box((1.1, 0.74, load), middle, _CARDBOARD),
+            box((1.1 + 2 * _PAINT, 0.08, load + _PAINT), middle, _TAPE, solid=False),
+        )
     for name, obstacle in file.obstacles.items():
         yield _block(name, Pose2(*obstacle.pose), obstacle.size, PALETTE[obstacle.colour])
     for name, cylinders in file.cylinders.items():
@@ -93,11 +95,8 @@ def goods(
         pose = tote.T_map_tote @ _placement_error(seed, tote.name, jitter)
         shapes = _tote_shapes(tote.size, tote.rgba)
         if tote.name in free:
-            frees.append(
-                FreeBody(
-                    name=tote.name, T_world_body=pose, shapes=shapes, mass=tote.mass, friction=tote.friction
-                )
-            )
+            held = {"mass": tote.mass, "friction": tote.friction}
+            frees.append(FreeBody(name=tote.name, T_world_body=pose, shapes=shapes, **held))
         else:
             statics.append(StaticBody(name=tote.name, T_world_body=pose, shapes=shapes))
     return [*statics, *_stock(arena, seed, jitter)], tuple(frees)
@@ -148,9 +147,11 @@ def box(
 
 
 def _block(name: str, pose: Pose2, size: tuple[float, float, float], rgba: Rgba) -> StaticBody:
-    return StaticBody(
-        name=name, T_world_body=Pose3.from_pose2(pose), shapes=(box(size, (0.0, 0.0, size[2] / 2.0), rgba),)
-    )
+    return _body(name, pose, box(size, (0.0, 0.0, size[2] / 2.0), rgba))
+
+
+def _body(name: str, pose: Pose2, *shapes: Shape) -> StaticBody:
+    return StaticBody(name=name, T_world_body=Pose3.from_pose2(pose), shapes=shapes)
 
 
 def _walls(arena: Arena) -> StaticBody:
@@ -158,13 +159,14 @@ def _walls(arena: Arena) -> StaticBody:
     (x0, x1), (y0, y1), t, h = hall.x, hall.y, hall.wall_thickness, hall.wall_height
     cx, cy, z = (x0 + x1) / 2.0, (y0 + y1) / 2.0, h / 2.0
     along_x, along_y = (x1 - x0 + 2.0 * t, t, h), (t, y1 - y0, h)
-    shapes = (
+    return _body(
+        "walls",
+        _ORIGIN,
         box(along_x, (cx, y0 - t / 2.0, z), _WALL),
         box(along_x, (cx, y1 + t / 2.0, z), _WALL),
         box(along_y, (x0 - t / 2.0, cy, z), _WALL),
         box(along_y, (x1 + t / 2.0, cy, z), _WALL),
     )
-    return StaticBody(name="walls", T_world_body=Pose3.from_xyz_rpy(), shapes=shapes)
 
 
 def _partition(name: str, entry: PartitionEntry) -> StaticBody:
@@ -175,16 +177,9 @@ def _partition(name: str, entry: PartitionEntry) -> StaticBody:
 
 
 def _cylinders(name: str, entry: CylindersEntry) -> StaticBody:
-    upright = Cylinder(radius=entry.radius, length=entry.height)
-    shapes = tuple(
-        Shape(
-            geometry=upright,
-            T_body_geometry=Pose3.from_xyz_rpy((x, y, entry.height / 2.0)),
-            rgba=PALETTE[entry.colour],
-        )
-        for x, y in entry.centres
-    )
-    return StaticBody(name=name, T_world_body=Pose3.from_xyz_rpy(), shapes=shapes)
+    upright, rgba = Cylinder(radius=entry.radius, length=entry.height), PALETTE[entry.colour]
+    places = (Pose3.from_xyz_rpy((x, y, entry.height / 2.0)) for x, y in entry.centres)
+    return _body(name, _ORIGIN, *(Shape(geometry=upright, T_body_geometry=at, rgba=rgba) for at in places))
 
 
 def _rack(name: str, rack: RackEntry) -> StaticBody:
@@ -206,7 +201,7 @@ def _rack(name: str, rack: RackEntry) -> StaticBody:
         for y in np.linspace(-edge, edge, max(1, round(length / rack.bay)) + 1)
         for side in (-1.0, 1.0)
     ]
-    return StaticBody(name=name, T_world_body=Pose3.from_pose2(Pose2(*rack.pose)), shapes=tuple(shapes))
+    return _body(name, Pose2(*rack.pose), *shapes)
 
 
 def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, ...]:
@@ -238,22 +233,23 @@ def _mixed(rgba: Rgba, grey: float, part: float) -> Rgba:
 
 
 def _zone(zone: Zone) -> Iterator[StaticBody]:
+    paint = partial(box, rgba=zone.rgba, solid=False)
     x, y, s = zone.area.size_x, zone.area.size_y, _STRIPE
-    rgba = zone.rgba
-    stripes = (
-        box((x, s, _PAINT), (0.0, (s - y) / 2.0, _PAINT / 2.0), rgba, solid=False),
-        box((x, s, _PAINT), (0.0, (y - s) / 2.0, _PAINT / 2.0), rgba, solid=False),
-        box((s, y - 2.0 * s, _PAINT), ((s - x) / 2.0, 0.0, _PAINT / 2.0), rgba, solid=False),
-        box((s, y - 2.0 * s, _PAINT), ((x - s) / 2.0, 0.0, _PAINT / 2.0), rgba, solid=False),
-    )
-    yield StaticBody(
-        name=f"{zone.name}_marking", T_world_body=Pose3.from_pose2(zone.area.centre), shapes=stripes
+    along_x, along_y, z = (x, s, _PAINT), (s, y - 2.0 * s, _PAINT), _PAINT / 2.0
+    yield _body(
+        f"{zone.name}_marking",
+        zone.area.centre,
+        paint(along_x, (0.0, (s - y) / 2.0, z)),
+        paint(along_x, (0.0, (y - s) / 2.0, z)),
+        paint(along_y, ((s - x) / 2.0, 0.0, z)),
+        paint(along_y, ((x - s) / 2.0, 0.0, z)),
     )
     if zone.table is not None:
-        table, height = zone.table, zone.table.levels[0]
-        shapes = (
-            box((table.depth, table.length, height), (0.0, 0.0, height / 2.0), PALETTE["grey"]),
-            box((table.depth + 2.0 * _PAINT, table.length + 2.0 * _PAINT, 0.05),
-                (0.0, 0.0, height - 0.025 - _PAINT), rgba, solid=False),
-        )  # fmt: skip
-        yield StaticBody(name=f"{zone.name}_table", T_world_body=Pose3.from_pose2(table.pose), shapes=shapes)
+        depth, length, height = zone.table.depth, zone.table.length, zone.table.levels[0]
+        edge = (depth + 2.0 * _PAINT, length + 2.0 * _PAINT, 0.05)
+        yield _body(
+            f"{zone.name}_table",
+            zone.table.pose,
+            box((depth, length, height), (0.0, 0.0, height / 2.0), PALETTE["grey"]),
+            paint(edge, (0.0, 0.0, height - 0.025 - _PAINT)),
+        )

@@ -5,27 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from twin.bridge.bus import Bus
-from twin.manipulation.telescopic_arm import TelescopicArm
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.missions.leaves import sequence, with_recovery
-from twin.nodes.navigation.robot_pose import RobotPose
-from twin.warehouse.skills import MobileManipulationNode, Station
+from twin.warehouse.shelf import Slot, Tote
+from twin.warehouse.skills import MobileManipulationNode
 
 
 @dataclass(frozen=True, kw_only=True)
 class PickAndPlaceTask:
     """One tote to carry."""
 
-    tote: str
-    tote_width: float
-    """Between the fingers [m]."""
-    box_depth: float
-    """Along the reach [m]."""
-    tote_height: float
-    """[m]"""
-    pick: Station
-    place: Station
+    tote: Tote
+    """Between the fingers is its width, along the reach its depth."""
+    place: Slot
+    """On a table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,88 +44,69 @@ class PickAndPlaceConfig:
 class PickAndPlaceNode(MobileManipulationNode):
     """Runs the tasks one after the other, each as a behaviour tree."""
 
-    def __init__(
-        self,
-        bus: Bus,
-        tasks: Sequence[PickAndPlaceTask],
-        arm: TelescopicArm,
-        *,
-        gripper_joint: str,
-        gripper_open: float,
-        robot_pose: RobotPose,
-        config: PickAndPlaceConfig | None = None,
-        period_ns: int = 100_000_000,
-        namespace: str = "",
-    ) -> None:
-        super().__init__(
-            bus,
-            arm,
-            gripper_joint=gripper_joint,
-            gripper_open=gripper_open,
-            robot_pose=robot_pose,
-            namespace=namespace,
-        )
-        self.config = config or PickAndPlaceConfig()
-        self.run(sequence("PickAndPlace", [self._task(task) for task in tasks]), period_ns)
+    config = PickAndPlaceConfig()
+
+    def carry(self, tasks: Sequence[PickAndPlaceTask]) -> None:
+        """Begin with the first of the tasks."""
+        self.run(sequence("PickAndPlace", [self._task(task) for task in tasks]), 100_000_000)
 
     def _task(self, task: PickAndPlaceTask) -> TreeNode:
-        carry_z = self.config.carry_z
+        carry_z, tote = self.config.carry_z, task.tote
         give_up = [
-            self.stop_looking(),
+            self.detect("StopLooking", enabled=False),
             self.open_gripper(),
             self.retract(),
             self.undock_from("shelf"),
             self.stow(carry_z),
-            self.report(f"{task.tote}: drive to {task.pick.name} again"),
-            self.drive_to(task.pick),
+            self.report(f"{tote.name}: drive to {tote.slot.name} again"),
+            self.drive_to(tote.slot),
         ]
         pick = with_recovery(
             "PickWithRetries",
             self.config.pick_attempts - 1,
-            self._pick(task),
+            self._pick(tote),
             sequence("ReleaseAndStageAgain", give_up),
         )
         return sequence(
-            task.tote,
+            tote.name,
             [
-                self.report(f"{task.tote}: drive to {task.pick.name}"),
+                self.report(f"{tote.name}: drive to {tote.slot.name}"),
                 self.stow(carry_z),
-                self.drive_to(task.pick),
+                self.drive_to(tote.slot),
                 pick,
-                self.holding(task.tote, task.tote_width, [*self._carry(task), *self._set_down(task)]),
-                self.report(f"{task.tote}: release"),
+                self.holding(tote, [*self._carry(task), *self._set_down(task)]),
+                self.report(f"{tote.name}: release"),
                 self.open_gripper(),
-                self.report(f"{task.tote}: back off"),
+                self.report(f"{tote.name}: back off"),
                 self.retract(),
                 self.undock_from("table"),
                 self.stow(carry_z),
             ],
         )
 
-    def _pick(self, task: PickAndPlaceTask) -> TreeNode:
-        surface = task.pick.surface_z
-        grasp_z = surface + task.tote_height / 2.0
+    def _pick(self, tote: Tote) -> TreeNode:
+        surface, (depth, width, height) = tote.slot.height, tote.size
+        grasp_z = surface + height / 2.0
         return sequence(
             "Pick",
             [
-                self.report(f"{task.tote}: dock at {task.pick.name}"),
+                self.report(f"{tote.name}: dock at {tote.slot.name}"),
                 self.open_gripper(),
                 self.move_to_height("RaiseToLook", surface + self.config.detection_height),
-                self.start_looking(),
-                self.dock_at(task.pick, "tote"),
-                self.report(f"{task.tote}: look"),
+                self.detect("StartLooking", enabled=True),
+                self.dock_at(tote.slot, "tote"),
+                self.report(f"{tote.name}: look"),
                 self.look(),
-                self.stop_looking(),
-                self.report(f"{task.tote}: reach"),
-                self.reach_for_tote(grasp_z, task.box_depth),
-                self.report(f"{task.tote}: grasp"),
-                self.close_on(task.tote_width),
+                self.detect("StopLooking", enabled=False),
+                self.report(f"{tote.name}: reach"),
+                self.reach_for_tote(grasp_z, depth),
+                self.report(f"{tote.name}: grasp"),
+                self.close_on(width),
                 self.holding(
-                    task.tote,
-                    task.tote_width,
+                    tote,
                     [
                         self.move_to_height("LiftOff", grasp_z + self.config.lift_off, loaded=True),
-                        self.report(f"{task.tote}: retract"),
+                        self.report(f"{tote.name}: retract"),
                         self.retract(loaded=True),
                     ],
                 ),
@@ -141,16 +115,16 @@ class PickAndPlaceNode(MobileManipulationNode):
 
     def _carry(self, task: PickAndPlaceTask) -> list[TreeNode]:
         return [
-            self.report(f"{task.tote}: back off"),
+            self.report(f"{task.tote.name}: back off"),
             self.undock_from("shelf"),
             self.move_to_height("LowerToCarry", self.config.carry_z, loaded=True),
-            self.report(f"{task.tote}: carry to {task.place.name}"),
+            self.report(f"{task.tote.name}: carry to {task.place.name}"),
             self.drive_to(task.place),
         ]
 
     def _set_down(self, task: PickAndPlaceTask) -> list[TreeNode]:
         config = self.config
-        set_down = task.place.surface_z + task.tote_height / 2.0 + config.set_down_clearance
+        set_down = task.place.height + task.tote.size[2] / 2.0 + config.set_down_clearance
         above = set_down + config.lift_off
         x = self.skills.docked_distance + config.place_depth
         dock = with_recovery(
@@ -160,9 +134,9 @@ class PickAndPlaceNode(MobileManipulationNode):
             sequence("StageAgain", [self.undock_from("table"), self.drive_to(task.place)]),
         )
         return [
-            self.report(f"{task.tote}: dock at {task.place.name}"),
+            self.report(f"{task.tote.name}: dock at {task.place.name}"),
             dock,
-            self.report(f"{task.tote}: set down"),
+            self.report(f"{task.tote.name}: set down"),
             self.move_to_height("RaiseToPlace", above, loaded=True),
             self.reach("ReachToPlace", x, above, loaded=True),
             self.move_to_height("Lower", set_down, loaded=True),

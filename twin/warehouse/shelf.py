@@ -68,10 +68,7 @@ class Shelf:
         along = (index - (self.slots_per_level - 1) / 2.0) * self.slot_spacing
         front = self.pose @ Pose2(self.depth / 2.0, along, 0.0)
         return Slot(
-            shelf=self.name,
-            level=level,
-            index=index,
-            T_map_slot=Pose3.from_pose2(front, self.levels[level]),
+            shelf=self.name, level=level, index=index, T_map_slot=Pose3.from_pose2(front, self.levels[level])
         )
 
     def slots(self) -> tuple[Slot, ...]:

@@ -27,6 +27,7 @@ from twin.bridge.msgs import (
     JointTrajectory,
     JointTrajectoryPoint,
     PoseArray,
+    PoseStamped,
     duration,
     header,
     new,
@@ -49,17 +50,7 @@ from twin.nodes.missions.leaves import (
 )
 from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.robot_pose import RobotPose
-
-
-@dataclass(frozen=True, kw_only=True)
-class Station:
-    """A place to dock at: the front face of a shelf slot or of a table, as the warehouse's plan gives it."""
-
-    name: str
-    face: Pose2
-    """Point on the front face in `map`; its x axis points into the shelf, as a docked robot looks."""
-    surface_z: float
-    """Height of the surface that goods stand on [m]."""
+from twin.warehouse.shelf import Slot, Tote
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,11 +88,10 @@ class MobileManipulationNode(MissionNode):
         gripper_joint: str,
         gripper_open: float,
         robot_pose: RobotPose,
-        skills: SkillsConfig | None = None,
         namespace: str = "",
     ) -> None:
         super().__init__(bus, namespace=namespace)
-        self.skills = skills or SkillsConfig()
+        self.skills = SkillsConfig()
         self._arm = arm
         self._gripper_joint = gripper_joint
         self._gripper_open = gripper_open
@@ -130,54 +120,57 @@ class MobileManipulationNode(MissionNode):
         self._totes += [tote for tote in totes if abs(tote.y) <= self.skills.max_aside][:1]
         del self._totes[: -self.skills.samples]
 
+    def _call(
+        self,
+        name: str,
+        client: ActionClient,
+        goal: Callable[[], Any | None],
+        judge: Callable[[Any], str | None] | None = None,
+    ) -> TreeNode:
+        return CallAction(name, client, goal, on_result=judge, on_failure=self.note)
+
+    def _in_map(self, pose: Pose2) -> PoseStamped:
+        return pose_stamped(pose, self._frames.map, self.node.now_ns)
+
     # Driving
 
     def report(self, state: str) -> TreeNode:
         """Go on to a state of the mission."""
         return Do(f"State[{state}]", lambda: self.enter(state))
 
-    def drive_to(self, station: Station) -> TreeNode:
-        """Navigate to the staging pose before a station."""
-        staging = station.face @ Pose2(-self.skills.staging_distance, 0.0, 0.0)
-        return CallAction(
-            f"NavigateTo[{station.name}]",
+    def drive_to(self, slot: Slot) -> TreeNode:
+        """Navigate to the staging pose before a slot."""
+        staging = slot.approach(0.0) @ Pose2(-self.skills.staging_distance, 0.0, 0.0)
+        return self._call(
+            f"NavigateTo[{slot.name}]",
             self._navigate,
-            lambda: new(NavigateToPose.Goal, pose=pose_stamped(staging, self._frames.map, self.node.now_ns)),
-            on_failure=self.note,
+            lambda: new(NavigateToPose.Goal, pose=self._in_map(staging)),
         )
 
-    def dock_at(self, station: Station, dock_type: str) -> TreeNode:
-        """Dock at a station; `tote` centres the robot on the tote there, `table` on the plan's point."""
-        docked = station.face @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
-        return CallAction(
-            f"Dock[{station.name}]",
+    def dock_at(self, slot: Slot, dock_type: str) -> TreeNode:
+        """Dock at a slot; `tote` centres the robot on the tote there, `table` on the plan's point."""
+        docked = slot.approach(0.0) @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
+        return self._call(
+            f"Dock[{slot.name}]",
             self._dock,
             lambda: new(
                 DockRobot.Goal,
                 use_dock_id=False,
-                dock_pose=pose_stamped(docked, self._frames.map, self.node.now_ns),
+                dock_pose=self._in_map(docked),
                 dock_type=dock_type,
                 navigate_to_staging_pose=False,
             ),
-            on_failure=self.note,
         )
 
     def undock_from(self, dock_type: str) -> TreeNode:
         """Back off to the staging distance."""
         goal = new(UndockRobot.Goal, dock_type=dock_type)
-        return CallAction("Undock", self._undock, lambda: goal, on_failure=self.note)
+        return self._call("Undock", self._undock, lambda: goal)
 
     # Looking
 
-    def start_looking(self) -> TreeNode:
-        """Switch the detection of totes on."""
-        return self._detect("StartLooking", True)
-
-    def stop_looking(self) -> TreeNode:
-        """Switch the detection of totes off."""
-        return self._detect("StopLooking", False)
-
-    def _detect(self, name: str, enabled: bool) -> TreeNode:
+    def detect(self, name: str, *, enabled: bool) -> TreeNode:
+        """Switch the detection of totes on or off."""
         return CallService(name, self._detector, lambda: SetBool.Request(data=enabled))
 
     def look(self) -> TreeNode:
@@ -226,7 +219,7 @@ class MobileManipulationNode(MissionNode):
                 self.note(str(error))
                 return None
 
-        return CallAction(name, self._trajectory, goal, on_failure=self.note)
+        return self._call(name, self._trajectory, goal)
 
     def _trajectory_goal(self, target: dict[str, float], speed: float) -> Any:
         trajectory = plan_joint_move(self._joints, target, self._arm.limits, speed=speed)
@@ -248,12 +241,7 @@ class MobileManipulationNode(MissionNode):
 
     def open_gripper(self) -> TreeNode:
         """Open the fingers fully."""
-        return CallAction(
-            "OpenGripper",
-            self._gripper,
-            lambda: self._gripper_goal(self._gripper_open),
-            on_failure=self.note,
-        )
+        return self._call("OpenGripper", self._gripper, lambda: self._gripper_goal(self._gripper_open))
 
     def close_on(self, width: float) -> TreeNode:
         """Close the fingers; fails unless they stall on something of this width [m]."""
@@ -262,22 +250,16 @@ class MobileManipulationNode(MissionNode):
             self._grip_effort = result.effort
             if result.stalled and abs(result.position - width / 2.0) < self.skills.grip_tolerance:
                 return None
-            finger = f"finger at {result.position:.3f} m"
-            return f"gripper closed on nothing of {width:.2f} m width: {finger}"
+            return f"gripper closed on nothing of {width:.2f} m width: finger at {result.position:.3f} m"
 
-        return CallAction(
-            "CloseGripper",
-            self._gripper,
-            lambda: self._gripper_goal(0.0),
-            on_result=judge,
-            on_failure=self.note,
-        )
+        return self._call("CloseGripper", self._gripper, lambda: self._gripper_goal(0.0), judge)
 
-    def holding(self, what: str, width: float, steps: Sequence[TreeNode]) -> TreeNode:
-        """Take steps while the fingers are held apart by something of this width [m], and press on it.
+    def holding(self, tote: Tote, steps: Sequence[TreeNode]) -> TreeNode:
+        """Take steps while the fingers are held apart by a tote, and press on it.
 
         That is watched at every tick: when it is lost, the step under way is cancelled, and the node fails.
         """
+        what, width = tote.name, tote.size[1]
 
         def held() -> bool:
             fault = self._grip_fault(width)

@@ -18,7 +18,6 @@ from twin.navigation.planning.planner import with_headings
 from twin.navigation.recovery import (
     COLLISION_AHEAD,
     TIMEOUT,
-    BackUp,
     BehaviorConfig,
     BehaviorStep,
     DriveOnHeading,
@@ -242,7 +241,7 @@ def test_driving_on_a_heading(distance: float) -> None:
 
 
 def test_backing_up_by_default() -> None:
-    pose, log = execute(BackUp().update)
+    pose, log = execute(DriveOnHeading(target_distance=-0.15).update)
     assert log[-1].done
     assert (Pose2(0.0, 0.0, 0.5).inverse() @ pose).x == pytest.approx(-0.15, abs=2e-3)
 
@@ -256,7 +255,7 @@ def test_behaviours_stop_before_they_hit_something() -> None:
     assert log[-1].failed_reason == COLLISION_AHEAD
     front = pose.apply(np.array(footprint))[:, 0].max()
     assert 0.0 < front < 0.7
-    _, log = execute(BackUp(config=config).update, costmap)
+    _, log = execute(DriveOnHeading(config=config, target_distance=-0.15).update, costmap)
     assert log[-1].done
     costmap.costs[:] = 0
     costmap.costs[84, 78] = 254  # between two corners of the robot

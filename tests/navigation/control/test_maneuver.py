@@ -37,7 +37,7 @@ def line(start: tuple[float, float], end: tuple[float, float]) -> Array:
 
 def touches(costmap: Costmap, pose: Pose2) -> bool:
     at = float(pose.x), float(pose.y), float(pose.yaw)
-    return outline_cost(costmap.costs, LONG, *at, *costmap.frame) == LETHAL_OBSTACLE
+    return outline_cost(costmap.costs, LONG, at, costmap.frame) == LETHAL_OBSTACLE
 
 
 def driven(costmap: Costmap, start: Pose2, path: Array, seconds: float = 30.0) -> list[Pose2]:
@@ -94,7 +94,7 @@ def test_a_robot_gets_on_to_its_path_without_touching_anything_more(name: str) -
     if not touches(costmap, start):
         assert not any(touches(costmap, pose) for pose in poses)
     else:
-        hits = [footprint_hits(costmap.costs, LONG, *pose, *costmap.frame) for pose in poses]
+        hits = [footprint_hits(costmap.costs, LONG, tuple(pose), costmap.frame) for pose in poses]
         assert max(hits) <= hits[0] * 1.3 + 10, "a cell or two deeper, by the samples of half a cell"
         assert hits[-1] == 0
 

@@ -8,6 +8,7 @@ import pytest
 from twin.navigation.costmaps.kernels import escapes, outline_cost
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 
+HERE, FRAME = (0.0, 0.0, 0.0), (-1.0, -1.0, 0.025)
 CORNERS = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
 
 
@@ -24,7 +25,7 @@ def test_from_the_surface_of_a_thing_at_the_left_front_corner(v: float, w: float
     costs = np.zeros((80, 80), dtype=np.uint8)
     costs[44:54, 47] = 254  # seen from the front: x 0.175 to 0.2, y 0.1 to 0.35
     costs[45, 44:47] = 254  # and from the side: y 0.125 to 0.15, x from 0.1 on
-    assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, v, w, 0.05, 20, -1.0, -1.0, 0.025) is expected
+    assert escapes(costs, CORNERS, HERE, (v, w), 0.05, 20, FRAME) is expected
 
 
 def test_a_robot_whose_outlines_cells_touch_something_may_back_off() -> None:
@@ -32,7 +33,7 @@ def test_a_robot_whose_outlines_cells_touch_something_may_back_off() -> None:
     costs = np.zeros((80, 80), dtype=np.uint8)
     x, y = CORNERS.max(axis=0)
     costs[int((y + 0.01 + 1.0) / 0.025), int((x + 0.01 + 1.0) / 0.025)] = 254
-    assert escapes(costs, CORNERS, 0.0, 0.0, 0.0, -0.15, 0.0, 0.05, 20, -1.0, -1.0, 0.025)
+    assert escapes(costs, CORNERS, HERE, (-0.15, 0.0), 0.05, 20, FRAME)
 
 
 @pytest.mark.parametrize(("v", "expected"), [(-0.15, True), (0.15, False)])
@@ -41,8 +42,8 @@ def test_an_outline_that_grazes_a_cell_which_no_sample_of_the_inside_hits(v: flo
     costs = np.zeros((40, 40), dtype=np.uint8)
     costs[:, 24] = 254  # from x = 0.205 m on
     frame = (-0.995, -1.0, 0.05)
-    assert outline_cost(costs, corners, 0.0, 0.0, 0.0, *frame) == 254
-    assert escapes(costs, corners, 0.0, 0.0, 0.0, v, 0.0, 0.05, 20, *frame) is expected
+    assert outline_cost(costs, corners, HERE, frame) == 254
+    assert escapes(costs, corners, HERE, (v, 0.0), 0.05, 20, frame) is expected
 
 
 def test_what_is_known_of_a_map_is_marked_without_a_ray_and_cleared_by_one() -> None:

@@ -105,7 +105,7 @@ def test_a_reading_changes_probabilities_by_nav2s_model() -> None:
         prior = (233 if [column, row] == target.astype(int).tolist() else 127) / 254
         sensed = nav2_model(distance, phi, theta, half, 1.2, 0.05) if abs(theta) <= half else 0.5
         want = sensed * prior / (sensed * prior + (1 - sensed) * (1 - prior)) * 254
-        got = layer.probabilities[row, column]
+        got = layer.cells[row, column]
         assert abs(int(got) - want) < 1.0001, (row, column)
         changed += got != 127
     assert changed > 50
@@ -140,7 +140,7 @@ def test_readings_that_are_none_change_nothing() -> None:
     layered.update_range(sensor, 0.5, (0.5, 0.5), 0.3)
     assert not layered.costmap.costs.any()
     assert layered._ranges is not None
-    assert (layered._ranges.probabilities == 127).all()
+    assert (layered._ranges.cells == 127).all()
 
 
 def test_a_sensor_that_tells_only_near_or_not_marks_at_its_range() -> None:

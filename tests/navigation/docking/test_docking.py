@@ -59,7 +59,6 @@ def test_a_wall_among_clutter(distance: float, yaw: float, seed: int) -> None:
     assert wall is not None
     assert wall.distance == pytest.approx(distance, abs=0.01)
     assert wall.yaw == pytest.approx(yaw, abs=math.radians(1.0))
-    assert wall.rms < 0.01
     assert 0.6 < wall.inliers.mean() < 0.95
 
 
@@ -78,7 +77,6 @@ def test_the_face_of_a_tote_on_a_table(x: float, y: float, yaw: float) -> None:
     assert found.pose.distance(front) < 0.01
     assert found.pose.yaw == pytest.approx(yaw, abs=math.radians(2.0))
     assert found.width == pytest.approx(0.24, abs=0.02)
-    assert 0.2 < found.quality <= 1.0
 
 
 def test_all_totes_in_sight_are_found_the_one_straight_ahead_first() -> None:

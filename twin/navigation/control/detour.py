@@ -26,27 +26,23 @@ _PATIENCE = 8
 """Control periods between two searches, if the first finds nothing."""
 
 
-class DetouringPathHandler:
+class DetouringPathHandler(PathHandler):
     """A path handler that leads around what stands on the path, as long as nobody plans anew."""
 
-    def __init__(self, config: PathHandlerConfig, *, detours: bool = True) -> None:
-        self._handler = PathHandler(config=config)
+    def __init__(
+        self, config: PathHandlerConfig, *, to_cusps: bool, prune_distance: float, detours: bool
+    ) -> None:
         self._planner = Planner(config=PlannerConfig(tolerance=0.0, cost_factor=3.0))
         self._smoother = SimpleSmoother(config=SmootherConfig(max_its=50))
         self._detours = detours
-        self.reset()
+        super().__init__(config, to_cusps=to_cusps, prune_distance=prune_distance)
 
     def reset(self) -> None:
         """Forget the path."""
-        self._handler.reset()
+        super().reset()
         self._wait = 0
 
-    def accept(self, path: Array) -> None:
-        """Start over with a path; see `PathHandler.accept`."""
-        self._handler.accept(path)
-        self._wait = 0
-
-    def local(self, pose: Pose2, costmap: Costmap | None, at: Pose2) -> LocalPath:
+    def local_around(self, pose: Pose2, costmap: Costmap | None, at: Pose2) -> LocalPath:
         """Return what lies ahead of the robot, or the way around it; moves on along the path.
 
         Args:
@@ -54,7 +50,7 @@ class DetouringPathHandler:
             costmap: Where obstacles are; None: there are none.
             at: Of the base, in the costmap's frame.
         """
-        local = self._handler.local(pose)
+        local = self.local(pose)
         if not self._detours or costmap is None or local.reversing:
             return local
         to_grid = at @ pose.inverse()
@@ -69,8 +65,8 @@ class DetouringPathHandler:
         except PlanningFailure:
             self._wait = _PATIENCE
             return local
-        self._handler.lead(to_grid.inverse().apply(around), target)
-        return self._handler.local(pose)
+        self.lead(to_grid.inverse().apply(around), target)
+        return self.local(pose)
 
     def _around(self, costmap: Costmap, start: Pose2, target: Array) -> Array:
         """Return the smoothed cheapest way, shape (n, 2); raises PlanningFailure."""

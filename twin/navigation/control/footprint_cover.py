@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.navigation._jit import fast_jit
-from twin.navigation.costmaps.costmap import Costmap, inflation_costs
-from twin.navigation.costmaps.footprint import radii
+from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.footprint import padded, radii
 
 F32 = NDArray[np.float32]
 
@@ -32,34 +32,6 @@ class FootprintCover(NamedTuple):
     """The least cost of the centre at which a collision is possible."""
     circle_cost: int
     """That of a circle's centre."""
-
-    @staticmethod
-    def of(
-        footprint: Array, costmap: Costmap, *, consider_footprint: bool, padding: float = 0.0
-    ) -> FootprintCover:
-        """Return the cover of a footprint, shape (n, 2) [m], for a costmap.
-
-        Args:
-            footprint: Corners in the base frame; a single corner is a robot known by its radius alone.
-            costmap: Its inflation tells how far from an obstacle a cell is; where it ends too early to tell,
-                every look is at the outline.
-            consider_footprint: False checks the centre for inscribed cost alone.
-            padding: Put around `padded` [m]; the circles cover that.
-        """
-        if not consider_footprint or len(footprint) < 3:
-            none = np.zeros((0, 2), dtype=np.float32)
-            return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
-        padded = _padded(footprint, padding)
-        centres, radius = _circles(padded)
-        outside = radii(padded)[1]
-        spacing = costmap.resolution / 2.0
-        return FootprintCover(
-            outline=(_outline(footprint, spacing) / costmap.resolution).astype(np.float32),
-            padded=(_outline(padded, spacing) / costmap.resolution).astype(np.float32),
-            circles=(centres / costmap.resolution).astype(np.float32),
-            centre_cost=_cost(costmap, outside),
-            circle_cost=_cost(costmap, radius),
-        )
 
 
 @fast_jit
@@ -111,40 +83,41 @@ class CoverOf:
     """The cover of a footprint, made again only when a costmap is inflated or resolved otherwise."""
 
     def __init__(self, footprint: Array, *, consider_footprint: bool, padding: float = 0.0) -> None:
-        self._footprint = footprint
-        self._consider_footprint, self._padding = consider_footprint, padding
+        """Take a footprint.
+
+        Args:
+            footprint: Corners in the base frame, shape (n, 2) [m]; a single corner is a robot known by its
+                radius alone.
+            consider_footprint: False checks the centre for inscribed cost alone.
+            padding: Put around `FootprintCover.padded` [m]; the circles cover that.
+        """
+        self._footprint, self._padding = footprint, padding
+        self._centre_alone = not consider_footprint or len(footprint) < 3
         self._key: tuple[float, ...] | None = None
 
     def on(self, costmap: Costmap) -> FootprintCover:
-        """Return `FootprintCover.of`."""
+        """Return the cover for a costmap: its inflation tells how far from an obstacle a cell is.
+
+        Where that ends too early to tell, every look is at the outline.
+        """
         key = (costmap.resolution, costmap.inscribed_radius, costmap.cost_scaling_factor)
         if key != self._key:
-            self._key = key
-            self._cover = FootprintCover.of(
-                self._footprint,
-                costmap,
-                consider_footprint=self._consider_footprint,
-                padding=self._padding,
-            )
+            self._key, self._cover = key, self._made(costmap)
         return self._cover
 
-
-def _cost(costmap: Costmap, distance: float) -> int:
-    """Return the least cost of cells that may have an obstacle within `distance` [m]."""
-    farthest = distance + _SLACK * costmap.resolution
-    return int(
-        inflation_costs(
-            farthest,
-            inscribed_radius=costmap.inscribed_radius,
-            inflation_radius=math.inf,
-            cost_scaling_factor=costmap.cost_scaling_factor,
+    def _made(self, costmap: Costmap) -> FootprintCover:
+        if self._centre_alone:
+            none = np.zeros((0, 2), dtype=np.float32)
+            return FootprintCover(outline=none, padded=none, circles=none, centre_cost=253, circle_cost=253)
+        wider, cell = padded(self._footprint, self._padding), costmap.resolution
+        centres, radius = _circles(wider)
+        return FootprintCover(
+            outline=(_outline(self._footprint, cell / 2.0) / cell).astype(np.float32),
+            padded=(_outline(wider, cell / 2.0) / cell).astype(np.float32),
+            circles=(centres / cell).astype(np.float32),
+            centre_cost=costmap.cost_within(radii(wider)[1] + _SLACK * cell),
+            circle_cost=costmap.cost_within(radius + _SLACK * cell),
         )
-    )
-
-
-def _padded(corners: Array, padding: float) -> Array:
-    """Return the corners moved out by the padding along x and along y (nav2_costmap_2d padFootprint)."""
-    return corners + padding * np.sign(corners)
 
 
 def _outline(corners: Array, spacing: float) -> Array:

@@ -19,7 +19,7 @@ from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.maneuver_config import ManeuverConfig
 from twin.navigation.control.maneuver_kernel import contact, keeps_clear, most_contact, search
 from twin.navigation.control.rotation import turn_rate
-from twin.navigation.costmaps.costmap import Costmap
+from twin.navigation.costmaps.costmap import Costmap, triple
 from twin.navigation.costmaps.footprint import padded
 
 _BINS = 48
@@ -78,11 +78,7 @@ class Move:
 
 
 def find_maneuver(
-    costmap: Costmap,
-    footprint: ArrayLike,
-    start: Pose2,
-    path: Array,
-    config: ManeuverConfig | None = None,
+    costmap: Costmap, footprint: ArrayLike, start: Pose2, path: Array, config: ManeuverConfig | None = None
 ) -> list[Move]:
     """Return the moves, in order, that lead from a blocked pose on to the path; none if there are none.
 
@@ -145,8 +141,7 @@ class Maneuver:
 
     def begin(self, costmap: Costmap, at: Pose2, path: Array) -> bool:
         """Look for a way on; return whether there is one. Arguments as those of `find_maneuver`."""
-        pose = float(at.x), float(at.y), float(at.yaw)
-        touched = contact(costmap.costs, self.footprint, *pose, costmap.frame)
+        touched = contact(costmap.costs, self.footprint, triple(at), costmap.frame)
         # A way along a thing is never driven exactly.
         self._most, self._nearest = most_contact(most_contact(touched)), 0
         self._moves = find_maneuver(costmap, self.footprint, at, path, self.config)
@@ -167,8 +162,7 @@ class Maneuver:
             costmap: Around the robot.
             dt: Control period [s].
         """
-        pose = float(at.x), float(at.y), float(at.yaw)
-        if not contact(costmap.costs, self.footprint, *pose, costmap.frame):
+        if not contact(costmap.costs, self.footprint, triple(at), costmap.frame):
             self._most = 0
         while self._moves:
             move = self._moves[0]
@@ -178,21 +172,18 @@ class Maneuver:
                 self._moves.pop(0)
                 self._nearest = 0
                 continue
-            command = (
-                self._drive(move, at, left, velocity, dt) if move.gear else self._turn(left, velocity, dt)
-            )
+            command = self._drive(move, at, left, velocity, dt)
             if self._is_free(at, command, left, costmap):
                 return command
             self._moves = []
         return None
 
-    def _turn(self, left: float, velocity: tuple[float, float], dt: float) -> tuple[float, float]:
-        limits = {"max_rate": self.config.turn_speed, "acceleration": self.config.turn_acceleration}
-        return 0.0, turn_rate(left, velocity[1], dt, **limits)
-
     def _drive(
         self, move: Move, at: Pose2, left: float, velocity: tuple[float, float], dt: float
     ) -> tuple[float, float]:
+        if not move.gear:
+            limits = {"max_rate": self.config.turn_speed, "acceleration": self.config.turn_acceleration}
+            return 0.0, turn_rate(left, velocity[1], dt, **limits)
         local = at.inverse().apply(move.poses[:, :2])
         nearest = self._nearest
         ahead = nearest + int(np.argmax(np.hypot(*local[nearest:].T) > _LOOKAHEAD))
@@ -216,10 +207,8 @@ class Maneuver:
         v, w = command
         size = abs(v) or max(abs(w), 1e-6)
         dt = min(_LOOK if v else _LOOK_TURN, abs(left)) / size / 5.0
-        pose = float(at.x), float(at.y), float(at.yaw)
-        return bool(
-            keeps_clear(costmap.costs, self.footprint, self._most, pose, command, dt, 5, costmap.frame)
-        )
+        costs, frame = costmap.costs, costmap.frame
+        return bool(keeps_clear(costs, self.footprint, self._most, triple(at), command, dt, 5, frame))
 
 
 def _moves_of(poses: Array, gears: list[int], step: float) -> list[Move]:
@@ -247,11 +236,9 @@ def _targets(costmap: Costmap, corners: Array, path: Array, config: ManeuverConf
     """Return where on the path the robot may stand and go on, shape (m, 3)."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))])
     wanted = (along >= min(config.ahead_min, along[-1])) & (along <= config.ahead_max)
-    height, width = costmap.costs.shape
-    free = []
-    for x, y, yaw in path[wanted]:
-        column, row = costmap.world_to_cell(x, y)
-        inside = 0 <= column < width and 0 <= row < height
-        if inside and not contact(costmap.costs, corners, x, y, yaw, costmap.frame):
-            free.append((x, y, yaw))
+    free = [
+        (x, y, yaw)
+        for x, y, yaw in path[wanted]
+        if costmap.contains(x, y) and not contact(costmap.costs, corners, (x, y, yaw), costmap.frame)
+    ]
     return np.array(free).reshape(-1, 3)

@@ -11,49 +11,30 @@ from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.kernels import footprint_hits, outline_cost
-
-Cells = NDArray[np.uint8]
+from twin.navigation.costmaps.kernels import Cells, Triple, footprint_hits, outline_cost
 
 _TIGHT = 5.0
 """A metre on which the wider footprint touches something counts as so many."""
 
 
 @jit
-def contact(
-    costs: Cells, corners: Array, x: float, y: float, yaw: float, frame: tuple[float, float, float]
-) -> int:
+def contact(costs: Cells, corners: Array, pose: Triple, frame: Triple) -> int:
     """Return 0 if a pose is free, else how much it touches: 2 at least."""
-    if outline_cost(costs, corners, x, y, yaw, *frame) != 254:
+    if outline_cost(costs, corners, pose, frame) != 254:
         return 0
-    return 2 + footprint_hits(costs, corners, x, y, yaw, *frame)
+    return 2 + footprint_hits(costs, corners, pose, frame)
 
 
 @jit
-def _tightness(
-    costs: Cells,
-    corners: Array,
-    wider: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    frame: tuple[float, float, float],
-) -> int:
+def _tightness(costs: Cells, corners: Array, wider: Array, pose: Triple, frame: Triple) -> int:
     """Return `contact`, but 1 for a free pose at which the wider footprint touches something."""
-    touched = contact(costs, corners, x, y, yaw, frame)
-    return touched if touched else int(outline_cost(costs, wider, x, y, yaw, *frame) == 254)
+    touched = contact(costs, corners, pose, frame)
+    return touched if touched else int(outline_cost(costs, wider, pose, frame) == 254)
 
 
 @jit
 def _swept(
-    costs: Cells,
-    corners: Array,
-    wider: Array,
-    at: Array,
-    way: float,
-    turn: float,
-    parts: int,
-    frame: tuple[float, float, float],
+    costs: Cells, corners: Array, wider: Array, at: Array, way: float, turn: float, parts: int, frame: Triple
 ) -> tuple[int, int]:
     """Return the most that a move from a pose touches, and what it touches at its end."""
     most = last = 0
@@ -61,7 +42,7 @@ def _swept(
         part = step / parts
         heading = at[2] + part * turn / 2.0
         x, y = at[0] + part * way * math.cos(heading), at[1] + part * way * math.sin(heading)
-        last = _tightness(costs, corners, wider, x, y, at[2] + part * turn, frame)
+        last = _tightness(costs, corners, wider, (x, y, at[2] + part * turn), frame)
         most = max(most, last)
     return most, last
 
@@ -80,11 +61,11 @@ def keeps_clear(
     costs: Cells,
     corners: Array,
     most: int,
-    at: tuple[float, float, float],
+    at: Triple,
     command: tuple[float, float],
     dt: float,
     steps: int,
-    frame: tuple[float, float, float],
+    frame: Triple,
 ) -> bool:
     """Return whether a command, for some steps, touches at most so much."""
     x, y, yaw = at
@@ -93,7 +74,7 @@ def keeps_clear(
         x += command[0] * dt * math.cos(yaw)
         y += command[0] * dt * math.sin(yaw)
         yaw += command[1] * dt / 2.0
-        if contact(costs, corners, x, y, yaw, frame) > most:
+        if contact(costs, corners, (x, y, yaw), frame) > most:
             return False
     return True
 
@@ -128,7 +109,7 @@ def search(
     costs: Cells,
     corners: Array,
     wider: Array,
-    frame: tuple[float, float, float],
+    frame: Triple,
     start: Array,
     targets: Array,
     moves: Array,
@@ -174,7 +155,7 @@ def search(
     first = _bin(start[0], start[1], start[2], start, cell, side, bins)
     g[first] = 0.0
     poses[first, 0], poses[first, 1], poses[first, 2] = start[0], start[1], start[2]
-    bound[first] = most_contact(contact(costs, corners, start[0], start[1], start[2], frame))
+    bound[first] = most_contact(contact(costs, corners, (start[0], start[1], start[2]), frame))
     heap = [(0.0, first)]
     last = -1
     while len(heap) > 0:
@@ -184,7 +165,7 @@ def search(
         closed[here] = True
         x, y, yaw = poses[here, 0], poses[here, 1], poses[here, 2]
         _, reached = _away(x, y, yaw, targets, near, turned)
-        if reached and here != first and not contact(costs, corners, x, y, yaw, frame):
+        if reached and here != first and not contact(costs, corners, (x, y, yaw), frame):
             last = here
             break
         for m in range(moves.shape[0]):

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +26,19 @@ SPACING = 0.05
 class PathHandlerConfig:
     """Parameters; names and defaults are Nav2's."""
 
-    prune_distance: float = 2.0
-    """How far ahead the local path reaches [m]."""
     max_robot_pose_search_dist: float = 3.0
     """How far along the path the nearest pose is searched each time [m]."""
-    enforce_path_inversion: bool = True
-    """Whether the local path ends at a cusp until that is reached."""
     inversion_xy_tolerance: float = 0.2
-    """[m]"""
+    """How near a cusp is reached [m] ..."""
     inversion_yaw_tolerance: float = 0.4
-    """[rad]"""
+    """... and in which heading [rad]."""
+
+    @staticmethod
+    def of(config: Any) -> PathHandlerConfig:
+        """Return those that are among a controller's parameters."""
+        return PathHandlerConfig(
+            **{each.name: getattr(config, each.name) for each in fields(PathHandlerConfig)}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +55,21 @@ class LocalPath:
     """Whether the last pose is the path's, not a cusp or the end of the window."""
 
 
-@dataclass(kw_only=True)
 class PathHandler:
     """Follows one path at a time."""
 
-    config: PathHandlerConfig = field(default_factory=PathHandlerConfig)
+    def __init__(
+        self, config: PathHandlerConfig | None = None, *, to_cusps: bool, prune_distance: float = 2.0
+    ) -> None:
+        """Begin without a path.
 
-    def __post_init__(self) -> None:
+        Args:
+            config: Distances and tolerances.
+            to_cusps: Whether the local path ends at a cusp until that is reached.
+            prune_distance: How far ahead the local path reaches [m].
+        """
+        self.config = config or PathHandlerConfig()
+        self._to_cusps, self._prune_distance = to_cusps, prune_distance
         self.reset()
 
     def reset(self) -> None:
@@ -82,7 +94,7 @@ class PathHandler:
         self.path = path
         self._poses, knots = dense(path, SPACING)
         self._along = _arc_length(self._poses)
-        turns = cusps(path) if self.config.enforce_path_inversion else []
+        turns = cusps(path) if self._to_cusps else []
         for first, last in itertools.pairwise([0, *turns, len(path) - 1]):
             self._segments.append((int(knots[last]), is_reversing(path[first : last + 1])))
 
@@ -115,7 +127,7 @@ class PathHandler:
             last, reversing = self._segments[0]
             self._advance(pose, last)
         first = self._nearest
-        reach = self._along[first] + self.config.prune_distance
+        reach = self._along[first] + self._prune_distance
         end = min(last, int(np.searchsorted(self._along, reach, side="right")))
         poses = self._poses[first : end + 1]
         return LocalPath(

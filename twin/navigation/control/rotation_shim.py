@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.controller import Controller, Situation
-from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import PathHandler
 from twin.navigation.control.rotation import turn_rate
 from twin.navigation.control.rotation_shim_config import RotationShimConfig
 from twin.navigation.costmaps.costmap import NO_INFORMATION, footprint_cost
@@ -52,7 +52,7 @@ class RotationShim(Controller):
         super().configure(config)
 
     def _build(self) -> None:
-        self._handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=self.primary.reverses))
+        self._handler = PathHandler(to_cusps=self.primary.reverses)
 
     def set_plan(self, path: Array) -> None:
         """Follow another path; see `Controller.set_plan`."""

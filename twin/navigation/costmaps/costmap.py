@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.kernels import Cells, outline_cost, steps_to_collision
+from twin.navigation.costmaps.kernels import Cells, Triple, outline_cost, steps_to_collision
 
 FREE_SPACE = 0
 MAX_NON_OBSTACLE = 252
@@ -34,7 +34,7 @@ class Costmap:
     """Of the inflation [1/m]."""
 
     @property
-    def frame(self) -> tuple[float, float, float]:
+    def frame(self) -> Triple:
         """Origin x, y and resolution [m], as floats: what compiled functions take."""
         return float(self.origin[0]), float(self.origin[1]), float(self.resolution)
 
@@ -57,9 +57,22 @@ class Costmap:
     def cost_at(self, x: float, y: float) -> int:
         """Return the cost at a point [m]; 255 (unknown) outside."""
         column, row = self.world_to_cell(x, y)
-        if 0 <= row < self.costs.shape[0] and 0 <= column < self.costs.shape[1]:
-            return int(self.costs[row, column])
-        return NO_INFORMATION
+        return int(self.costs[row, column]) if self.contains(x, y) else NO_INFORMATION
+
+    def cost_within(self, distance: float) -> int:
+        """Return the cost of a cell so far [m] from the nearest lethal one, without an inflation radius."""
+        cost = inflation_costs(
+            distance,
+            inscribed_radius=self.inscribed_radius,
+            inflation_radius=math.inf,
+            cost_scaling_factor=self.cost_scaling_factor,
+        )
+        return int(cost)
+
+
+def triple(pose: Pose2) -> Triple:
+    """Return a pose as compiled functions take it."""
+    return float(pose.x), float(pose.y), float(pose.yaw)
 
 
 def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
@@ -68,7 +81,7 @@ def footprint_cost(costmap: Costmap, footprint: Array, pose: Pose2) -> int:
     Source: nav2_costmap_2d FootprintCollisionChecker. 254 is a collision; 255 touches unknown space.
     """
     corners = np.array(footprint, dtype=np.float64, order="C")
-    return outline_cost(costmap.costs, corners, float(pose.x), float(pose.y), float(pose.yaw), *costmap.frame)
+    return outline_cost(costmap.costs, corners, triple(pose), costmap.frame)
 
 
 def collision_step(
@@ -92,9 +105,9 @@ def collision_step(
         max_steps: Where the projection ends at the latest.
         max_distance: From the pose [m]; it ends there, too.
     """
-    (x, y, yaw), (v, w) = map(float, pose), map(float, command)
+    at, velocity = triple(pose), (float(command[0]), float(command[1]))
     return steps_to_collision(
-        costmap.costs, footprint, x, y, yaw, v, w, dt, max_distance, max_steps, *costmap.frame
+        costmap.costs, footprint, at, velocity, dt, max_steps, max_distance, costmap.frame
     )
 
 

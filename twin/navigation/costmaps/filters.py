@@ -6,18 +6,17 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.geometry import Pose2
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import (
     INSCRIBED_INFLATED_OBSTACLE,
     LETHAL_OBSTACLE,
-    MAX_NON_OBSTACLE,
     NO_INFORMATION,
+    triple,
 )
 from twin.navigation.costmaps.costmap_config import KeepoutConfig
-from twin.navigation.costmaps.kernels import Cells
+from twin.navigation.costmaps.kernels import Cells, Triple
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
 
 KEEPOUT_FILTER, SPEED_FILTER_PERCENT, SPEED_FILTER_ABSOLUTE = 0, 1, 2
@@ -44,7 +43,7 @@ class KeepoutFilter:
     def costs(
         self,
         shape: tuple[int, ...],
-        frame: tuple[float, float, float],
+        frame: Triple,
         robot: Pose2 | None = None,
         T_mask_costmap: Pose2 = _SAME_FRAME,
     ) -> Cells:
@@ -58,23 +57,13 @@ class KeepoutFilter:
         """
         out = np.full(shape, NO_INFORMATION, dtype=np.uint8)
         T_grid = self.mask.origin.inverse() @ T_mask_costmap
-        _sample(
-            out,
-            self._costs,
-            float(T_grid.x),
-            float(T_grid.y),
-            float(T_grid.yaw),
-            self.mask.resolution,
-            *frame,
-        )
+        _sample(out, self._costs, triple(T_grid), self.mask.resolution, frame)
         if self.config.override_lethal_cost and robot is not None:
             here = T_mask_costmap.apply([robot.x, robot.y])
             column, row = self.mask.world_to_cell(here)
-            if bool(self.mask.contains(here)):
-                cost = self._costs[row, column]
-                if cost in (INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE):
-                    zone = (out != NO_INFORMATION) & (out > 0)
-                    out[zone] = min(self.config.lethal_override_cost, MAX_NON_OBSTACLE)
+            collision = (INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE)
+            if bool(self.mask.contains(here)) and self._costs[row, column] in collision:
+                out[(out != NO_INFORMATION) & (out > 0)] = self.config.lethal_override_cost
         return out
 
 
@@ -115,18 +104,9 @@ class SpeedFilter:
 
 
 @jit
-def _sample(
-    out: Cells,
-    mask: NDArray[np.uint8],
-    x: float,
-    y: float,
-    yaw: float,
-    mask_resolution: float,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
-) -> None:
-    """Write the mask's value at each cell's centre; (x, y, yaw) is the grid's frame in the mask's corner."""
+def _sample(out: Cells, mask: Cells, pose: Triple, mask_resolution: float, frame: Triple) -> None:
+    """Write the mask's value at each cell's centre; `pose` is the grid's frame in the mask's corner."""
+    (x, y, yaw), (origin_x, origin_y, resolution) = pose, frame
     c, s = math.cos(yaw), math.sin(yaw)
     height, width = mask.shape
     for v in range(out.shape[0]):

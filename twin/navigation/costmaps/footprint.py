@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twin.geometry import Array, Pose2
+from twin.geometry import Array
 
 
 def rectangle(length: float, width: float, *, x_offset: float = 0.0, padding: float = 0.0) -> Array:
@@ -23,10 +23,10 @@ def rectangle(length: float, width: float, *, x_offset: float = 0.0, padding: fl
     return np.array([[x_offset + a, b], [x_offset - a, b], [x_offset - a, -b], [x_offset + a, -b]])
 
 
-def circle(radius: float, *, corners: int = 16) -> Array:
-    """Return a footprint, shape (corners, 2), whose sides touch the circle from outside."""
-    angles = (np.arange(corners) + 0.5) * (2.0 * math.pi / corners)
-    return radius / math.cos(math.pi / corners) * np.column_stack([np.cos(angles), np.sin(angles)])
+def circle(radius: float) -> Array:
+    """Return a footprint, shape (16, 2), whose sides touch the circle from outside."""
+    angles = (np.arange(16) + 0.5) * (2.0 * math.pi / 16)
+    return radius / math.cos(math.pi / 16) * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def padded(footprint: ArrayLike, padding: float) -> Array:
@@ -51,11 +51,6 @@ def radii(footprint: ArrayLike) -> tuple[float, float]:
     t = np.clip(-np.einsum("ij,ij->i", a, edge) / np.where(length2 > 0.0, length2, 1.0), 0.0, 1.0)
     inscribed = float(np.hypot(*(a + t[:, None] * edge).T).min()) if _contains_origin(a, b) else 0.0
     return inscribed, float(np.hypot(a[:, 0], a[:, 1]).max())
-
-
-def place(footprint: ArrayLike, pose: Pose2) -> Array:
-    """Return the footprint's corners, shape (n, 2), with the base at `pose`."""
-    return pose.apply(footprint)
 
 
 def _contains_origin(a: Array, b: Array) -> bool:

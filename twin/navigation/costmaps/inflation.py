@@ -32,10 +32,9 @@ class Inflation:
         self.reach = math.floor(inflation_radius / resolution + 1e-9)
         """How many cells an obstacle reaches."""
         self.inflate_unknown = inflate_unknown
-        across = np.arange(-self.reach, self.reach + 1, dtype=np.float64)
-        along = np.arange(self.reach + 1, dtype=np.float64)
+        cells = np.arange(-self.reach, self.reach + 1, dtype=np.float64)
         self._profile = inflation_costs(
-            np.hypot(along[:, None], across[None, :]) * resolution,
+            np.hypot(cells[self.reach :, None], cells) * resolution,
             inscribed_radius=inscribed_radius,
             inflation_radius=inflation_radius,
             cost_scaling_factor=cost_scaling_factor,
@@ -43,9 +42,8 @@ class Inflation:
 
     def write(self, costs: Cells, master: Cells, window: Window) -> None:
         """Rewrite the window of `costs` from `master`, the combined layers; both of the same shape."""
-        inflate(
-            costs, master, self._profile, self.inflate_unknown, window.x0, window.y0, window.x1, window.y1
-        )
+        if not window.empty:
+            _inflate(costs, master, self._profile, self.inflate_unknown, window)
 
 
 @jit
@@ -77,24 +75,18 @@ def _gaps(
 
 
 @jit
-def inflate(
-    costs: Cells, master: Cells, profile: Cells, inflate_unknown: bool, x0: int, y0: int, x1: int, y1: int
-) -> None:
-    """Rewrite costs[y0:y1, x0:x1].
+def _inflate(costs: Cells, master: Cells, profile: Cells, inflate_unknown: bool, window: Window) -> None:
+    """Rewrite the window of `costs`.
 
     Args:
         costs: Written.
         master: The layers' costs: 254 is inflated, 255 unknown.
         profile: profile[g, r + k] is the cost at g cells along and k cells across, shape (r + 1, 2 r + 1).
         inflate_unknown: Whether every cost goes into unknown cells, not only 253 and above.
-        x0: First column; x1 and y1 are one past the last.
-        y0: First row.
-        x1: Column past the last.
-        y1: Row past the last.
+        window: Which cells are written.
     """
     height, width = master.shape
-    if x1 <= x0 or y1 <= y0:
-        return
+    x0, y0, x1, y1 = window
     r = profile.shape[0] - 1
     left, right = max(0, x0 - r), min(width, x1 + r)
     gaps = _gaps(master, r + 1, left, y0, right, y1, min(height, y1 + r), max(0, y0 - r))

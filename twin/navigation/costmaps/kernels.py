@@ -1,4 +1,8 @@
-"""The compiled loops of the costmap: ray tracing and footprints."""
+"""The compiled loops of the costmap: ray tracing and footprints.
+
+A pose is (x, y [m], yaw [rad]), a frame (x, y of the grid's corner, edge of a cell [m]); corners are those of
+a footprint in the base frame, shape (n, 2) [m], C-contiguous.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +15,34 @@ from twin.geometry import Array
 from twin.navigation._jit import jit
 
 Cells = NDArray[np.uint8]
+Triple = tuple[float, float, float]
 
 
 @jit
 def trace_scan(
     obstacles: Cells,
     points: Array,
-    sensor_x: float,
-    sensor_y: float,
-    obstacle_min_range: float,
-    obstacle_max_range: float,
-    raytrace_min_range: float,
-    raytrace_max_range: float,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
+    sensor: tuple[float, float],
+    marking: tuple[float, float],
+    clearing: tuple[float, float],
+    frame: Triple,
 ) -> None:
     """Clear the cells along the rays from the sensor to the points, then mark the cells of the points.
 
     All rays clear before any point marks, so that a grazing ray never deletes what its neighbour sees (nav2's
     ObstacleLayer::updateBounds). Cells are visited exactly as the ray crosses them (Amanatides and Woo 1987).
+
+    Args:
+        obstacles: Changed.
+        points: Ends of the rays, shape (n, 2), in the costmap's frame [m].
+        sensor: x, y of the sensor [m].
+        marking: obstacle_min_range, obstacle_max_range [m].
+        clearing: raytrace_min_range, raytrace_max_range [m].
+        frame: Of the grid.
     """
     height, width = obstacles.shape
-    sx, sy = (sensor_x - origin_x) / resolution, (sensor_y - origin_y) / resolution
+    origin_x, origin_y, resolution = frame
+    sx, sy = (sensor[0] - origin_x) / resolution, (sensor[1] - origin_y) / resolution
     if sx < 0.0 or sy < 0.0 or sx >= width or sy >= height:
         return
     for k in range(points.shape[0]):
@@ -42,8 +51,8 @@ def trace_scan(
         length = math.hypot(dx, dy)
         if not length > 0.0 or length == math.inf:
             continue
-        t_start = raytrace_min_range / (length * resolution)
-        t_end = min(1.0, raytrace_max_range / (length * resolution))
+        t_start = clearing[0] / (length * resolution)
+        t_end = min(1.0, clearing[1] / (length * resolution))
         ix, iy = int(sx), int(sy)
         step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
         t_dx = abs(1.0 / dx) if dx != 0.0 else math.inf
@@ -66,8 +75,8 @@ def trace_scan(
             if ix < 0 or iy < 0 or ix >= width or iy >= height:
                 break
     for k in range(points.shape[0]):
-        distance = math.hypot(points[k, 0] - sensor_x, points[k, 1] - sensor_y)
-        if not (obstacle_min_range <= distance <= obstacle_max_range):
+        distance = math.hypot(points[k, 0] - sensor[0], points[k, 1] - sensor[1])
+        if not (marking[0] <= distance <= marking[1]):
             continue
         jx = math.floor((points[k, 0] - origin_x) / resolution)
         jy = math.floor((points[k, 1] - origin_y) / resolution)
@@ -76,21 +85,13 @@ def trace_scan(
 
 
 @jit
-def outline_cost(
-    costs: Cells,
-    corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
-) -> int:
+def outline_cost(costs: Cells, corners: Array, pose: Triple, frame: Triple) -> int:
     """Return the highest cost under the outline of a footprint at a pose; 254 off the map.
 
     Lethal outranks unknown (255). The outline is sampled every half cell.
     """
     height, width = costs.shape
+    (x, y, yaw), (origin_x, origin_y, resolution) = pose, frame
     c, s = math.cos(yaw), math.sin(yaw)
     n = corners.shape[0]
     worst = 0
@@ -115,16 +116,11 @@ def outline_cost(
 
 
 @jit
-def outlines_hit(
-    costs: Cells, corners: Array, poses: Array, origin_x: float, origin_y: float, resolution: float
-) -> NDArray[np.bool_]:
+def outlines_hit(costs: Cells, corners: Array, poses: Array, frame: Triple) -> NDArray[np.bool_]:
     """Return for which poses, shape (n, 3), the outline of a footprint is lethal or off the map."""
     hit = np.zeros(poses.shape[0], dtype=np.bool_)
     for i in range(poses.shape[0]):
-        cost = outline_cost(
-            costs, corners, poses[i, 0], poses[i, 1], poses[i, 2], origin_x, origin_y, resolution
-        )
-        hit[i] = cost == 254
+        hit[i] = outline_cost(costs, corners, (poses[i, 0], poses[i, 1], poses[i, 2]), frame) == 254
     return hit
 
 
@@ -132,30 +128,25 @@ def outlines_hit(
 def steps_to_collision(
     costs: Cells,
     corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    v: float,
-    w: float,
+    pose: Triple,
+    command: tuple[float, float],
     dt: float,
-    max_distance: float,
     max_steps: int,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
+    max_distance: float,
+    frame: Triple,
 ) -> int:
-    """Return the number of steps of `dt` at constant (v, w) until the outline is lethal; -1 if never.
+    """Return the number of steps of `dt` at a constant (v, w) until the outline is lethal; -1 if never.
 
     Step 0 is the given pose itself. The projection ends after `max_steps`, or `max_distance` from the start.
     With a single corner at the origin the inscribed cost (253) of the centre counts as a collision.
     """
     radius_only = corners.shape[0] == 1
-    x0, y0 = x, y
+    (x, y, yaw), (v, w) = pose, command
     for step in range(max_steps + 1):
-        cost = outline_cost(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        cost = outline_cost(costs, corners, (x, y, yaw), frame)
         if cost == 254 or (radius_only and cost == 253):
             return step
-        if math.hypot(x - x0, y - y0) > max_distance:
+        if math.hypot(x - pose[0], y - pose[1]) > max_distance:
             return -1
         x += v * dt * math.cos(yaw)
         y += v * dt * math.sin(yaw)
@@ -164,32 +155,14 @@ def steps_to_collision(
 
 
 @jit
-def footprint_hits(
-    costs: Cells,
-    corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
-) -> int:
-    """Return how many samples of a footprint, its inside too, are lethal or off the map.
+def footprint_hits(costs: Cells, corners: Array, pose: Triple, frame: Triple) -> int:
+    """Return how many samples of a convex footprint, its inside too, are lethal or off the map.
 
     They lie half a cell apart. An outline alone would not do: a lidar sees the surface of a thing only, and
     the outline can be past it.
-
-    Args:
-        costs: The grid.
-        corners: Of a convex polygon, counter-clockwise or clockwise, shape (n, 2) [m].
-        x: Of the base [m].
-        y: Of the base [m].
-        yaw: Of the base [rad].
-        origin_x: Of the grid [m].
-        origin_y: Of the grid [m].
-        resolution: Of the grid [m].
     """
     height, width = costs.shape
+    (x, y, yaw), (origin_x, origin_y, resolution) = pose, frame
     c, s = math.cos(yaw), math.sin(yaw)
     n = corners.shape[0]
     half = resolution / 2.0
@@ -216,47 +189,33 @@ def footprint_hits(
 
 
 @jit
-def _contact(
-    costs: Cells,
-    corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
-) -> int:
+def _contact(costs: Cells, corners: Array, pose: Triple, frame: Triple) -> int:
     """Return `footprint_hits`, and one more where the outline is lethal: it may graze what no sample hits."""
-    hits = footprint_hits(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
-    return hits + int(outline_cost(costs, corners, x, y, yaw, origin_x, origin_y, resolution) == 254)
+    grazes = outline_cost(costs, corners, pose, frame) == 254
+    return footprint_hits(costs, corners, pose, frame) + int(grazes)
 
 
 @jit
 def escapes(
     costs: Cells,
     corners: Array,
-    x: float,
-    y: float,
-    yaw: float,
-    v: float,
-    w: float,
+    pose: Triple,
+    command: tuple[float, float],
     dt: float,
     steps: int,
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
+    frame: Triple,
 ) -> bool:
     """Return whether a motion leads out of obstacles: at no time further in, and in the end less than now.
 
     For a robot whose present pose is a collision by the costmap, which is coarser than the world.
     """
-    first = _contact(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
-    last = first
+    first = last = _contact(costs, corners, pose, frame)
+    (x, y, yaw), (v, w) = pose, command
     for _ in range(steps):
         x += v * dt * math.cos(yaw)
         y += v * dt * math.sin(yaw)
         yaw += w * dt
-        last = _contact(costs, corners, x, y, yaw, origin_x, origin_y, resolution)
+        last = _contact(costs, corners, (x, y, yaw), frame)
         if last > first:
             return False
     return last == 0 or last < 0.8 * first  # none at all: only the outline's cells touch something

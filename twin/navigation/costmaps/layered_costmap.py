@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.errors import MapError
 from twin.geometry import Array, Pose2
-from twin.navigation.costmaps.costmap import FREE_SPACE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION, Costmap
 from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.kernels import Cells
-from twin.navigation.costmaps.layer import Layer
+from twin.navigation.costmaps.layer import CellLayer, Layer
 from twin.navigation.costmaps.obstacle_layer import ObstacleLayer
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
-from twin.navigation.costmaps.static_layer import static_costs
-from twin.navigation.costmaps.window import NOTHING, Window, everything, raised
+from twin.navigation.costmaps.window import NOTHING, Window, everything
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.plugins import LAYERS, create
 
@@ -29,19 +28,10 @@ __all__ = ["CostmapConfig", "LayeredCostmap"]
 _SAME_FRAME = Pose2(0.0, 0.0, 0.0)
 
 
-class _Zones(Layer):
+class _Zones(CellLayer):
     """The mask of a keep-out filter on the grid."""
 
     is_known = True
-
-    def __init__(self, cells: Cells) -> None:
-        super().__init__()
-        self._cells = cells
-
-    def update_costs(self, grid: Costmap, window: Window) -> None:
-        """Raise the costs to the mask's."""
-        at = window.slices
-        grid.costs[at] = raised(grid.costs[at], self._cells[at])
 
 
 @dataclass(kw_only=True)
@@ -62,28 +52,27 @@ class LayeredCostmap:
         config, static = self.config, self.static_map
         if static is not None and (static.origin.yaw != 0.0 or config.rolling_window):
             raise MapError("a costmap takes a static map only with origin yaw 0 and without rolling_window")
-        self._resolution = config.resolution if static is None else static.resolution
-        if static is not None and "static_layer" not in config.plugins:
-            unknown = NO_INFORMATION if config.track_unknown_space else FREE_SPACE
-            self._static: Cells = np.full(static.data.shape, unknown, dtype=np.uint8)
-            origin = (static.origin.x, static.origin.y)
-        elif static is None:
-            shape = round(config.height / self._resolution), round(config.width / self._resolution)
-            unknown = config.track_unknown_space and not config.rolling_window
-            self._static = np.full(shape, NO_INFORMATION if unknown else FREE_SPACE, dtype=np.uint8)
+        resolution = config.resolution if static is None else static.resolution
+        unknown = NO_INFORMATION if config.track_unknown_space and not config.rolling_window else FREE_SPACE
+        if static is None:
+            shape = round(config.height / resolution), round(config.width / resolution)
             origin = (-config.width / 2.0, -config.height / 2.0)
         else:
-            self._static = static_costs(
-                static,
-                lethal_cost_threshold=config.lethal_cost_threshold,
-                trinary_costmap=config.trinary_costmap,
-                track_unknown_space=config.track_unknown_space,
-            )
-            origin = (static.origin.x, static.origin.y)
-        self._inscribed_radius = config.inscribed_radius
+            shape, origin = static.data.shape, (static.origin.x, static.origin.y)
+        self._static: Cells = np.full(shape, unknown, dtype=np.uint8)
+        if static is not None and "static_layer" in config.plugins:
+            self._static = _static_costs(static, config)
+        self._grid = Costmap(
+            costs=np.empty_like(self._static),
+            resolution=resolution,
+            origin=origin,
+            inscribed_radius=config.inscribed_radius,
+            cost_scaling_factor=config.cost_scaling_factor,
+        )
+        self._master = self._empty()
         self._inflation = Inflation(
-            resolution=self._resolution,
-            inscribed_radius=self._inscribed_radius,
+            resolution=resolution,
+            inscribed_radius=self._grid.inscribed_radius,
             inflation_radius=config.inflation_radius,
             cost_scaling_factor=config.cost_scaling_factor,
             inflate_unknown=config.inflate_unknown,
@@ -92,8 +81,6 @@ class LayeredCostmap:
         self._obstacles = ObstacleLayer(self.shape)
         self._ranges: RangeSensorLayer | None = None
         self._keepout: Cells | None = None
-        self._grid = self._wrap(np.empty_like(self._static), origin)
-        self._master = self._wrap(np.empty_like(self._static), origin)
         self._known: Costmap | None = None
         self._dirty = everything(self.shape)
         self._all_costs_stale = True
@@ -129,8 +116,7 @@ class LayeredCostmap:
     def known(self) -> Costmap:
         """What the map and the masks say without anything that a sensor has seen; kept until one changes."""
         if self._known is None:
-            whole, origin = everything(self.shape), self._grid.origin
-            master, known = (self._wrap(np.empty_like(self._static), origin) for _ in range(2))
+            whole, master, known = everything(self.shape), self._empty(), self._empty()
             below, above = ([one for one in layers if one.is_known] for layers in self._layers())
             self._combine(master, below, whole)
             self._finish(known, master, above, whole)
@@ -149,29 +135,16 @@ class LayeredCostmap:
         points = np.array(scan_points, dtype=np.float64, order="C").reshape(-1, 2)
         x, y = np.asarray(sensor_origin, dtype=np.float64).tolist()
         config = self.config
-        limits = np.array(
-            [
-                config.obstacle_min_range,
-                config.obstacle_max_range,
-                config.raytrace_min_range,
-                config.raytrace_max_range,
-            ]
-        )
-        self._touch(self._obstacles.trace(points, (x, y), limits, self._grid.frame))
+        marking = float(config.obstacle_min_range), float(config.obstacle_max_range)
+        clearing = float(config.raytrace_min_range), float(config.raytrace_max_range)
+        self._touch(self._obstacles.trace(points, (x, y), marking, clearing, self._grid.frame))
         if robot is not None and config.footprint_clearing_enabled:
             self._touch(self._obstacles.clear_polygon(robot.apply(config.polygon), self._grid.frame))
 
     def update_range(
         self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float
     ) -> None:
-        """Take a reading of a sonar or infrared sensor.
-
-        Args:
-            sensor: Pose in the costmap's frame; the cone opens along its x.
-            distance: What was measured [m].
-            limits: The sensor's least and greatest range [m]; if equal it tells only -inf (something) or inf.
-            field_of_view: Full angle of the cone [rad].
-        """
+        """Take a reading of a sonar or infrared sensor; arguments as those of `RangeSensorLayer.add`."""
         if self._ranges is None:
             self._ranges = RangeSensorLayer(self.shape, self.config.range_sensor_layer)
         self._touch(self._ranges.add(sensor, distance, limits, field_of_view, self._grid.frame))
@@ -181,10 +154,7 @@ class LayeredCostmap:
     ) -> None:
         """Lay a keep-out mask over the costmap, or take it away; call it again when the frames have moved.
 
-        Args:
-            keepout: The mask.
-            robot: Pose in the costmap's frame, for `override_lethal_cost`.
-            T_mask_costmap: Pose of the costmap's frame in the mask's.
+        Arguments as those of `KeepoutFilter.costs`.
         """
         layer = (
             None if keepout is None else keepout.costs(self.shape, self._grid.frame, robot, T_mask_costmap)
@@ -205,19 +175,18 @@ class LayeredCostmap:
         """
         if not self.config.rolling_window:
             raise ValueError("move_to needs rolling_window")
-        height, width = self.shape
-        old = self._grid.origin
-        dx = math.floor((x - old[0]) / self._resolution) - width // 2
-        dy = math.floor((y - old[1]) / self._resolution) - height // 2
+        (height, width), old = self.shape, self._grid
+        column, row = old.world_to_cell(x, y)
+        dx, dy = column - width // 2, row - height // 2
         if dx == 0 and dy == 0:
             return
         self._obstacles.move(dx, dy)
         if self._ranges is not None:
             self._ranges.move(dx, dy)
         self._keepout = None  # the mask stays where it is: whoever has it lays it anew
-        origin = (old[0] + dx * self._resolution, old[1] + dy * self._resolution)
-        self._grid = self._wrap(np.empty_like(self._static), origin)
-        self._master = self._wrap(self._master.costs, origin)
+        origin = (old.origin[0] + dx * old.resolution, old.origin[1] + dy * old.resolution)
+        self._grid = replace(self._empty(), origin=origin)
+        self._master = replace(self._master, origin=origin)
         self._known = None
         self._stale()
 
@@ -230,19 +199,17 @@ class LayeredCostmap:
                 self._known = None if layer.is_known else self._known
 
     def adopt(self, old: LayeredCostmap) -> None:
-        """Take what sensors have seen on another costmap in the same frame, where it lies on this one.
+        """Take what sensors saw on the last map's costmap, in the same frame, where it lies on this one.
 
         So obstacles stay when a new map comes, as in Nav2 where its geometry is the same; a map that grows
         while it is made has another one each time. Of cells of another size nothing is taken.
-
-        Args:
-            old: The costmap of the map before.
         """
         self._own = old._own
-        if not math.isclose(old._resolution, self._resolution, rel_tol=1e-6):
+        resolution = self._grid.resolution
+        if not math.isclose(old._grid.resolution, resolution, rel_tol=1e-6):
             return
         dx, dy = (
-            round((mine - others) / self._resolution)
+            round((mine - others) / resolution)
             for mine, others in zip(self._grid.origin, old._grid.origin, strict=True)
         )
         self._obstacles.adopt(old._obstacles, dx, dy)
@@ -256,11 +223,7 @@ class LayeredCostmap:
         self._forget(everything(self.shape), outside=False)
 
     def mark(self, points: Array) -> None:
-        """Mark what is known from elsewhere, a map for instance; a ray through it clears it as ever.
-
-        Args:
-            points: Shape (n, 2), in the costmap's frame [m].
-        """
+        """Mark points, shape (n, 2) [m], of a map for instance; a ray through one clears it as ever."""
         self._touch(self._obstacles.mark(points, self._grid.frame))
 
     def clear_area(self, x: float, y: float, size: float, *, outside: bool = False) -> None:
@@ -290,14 +253,9 @@ class LayeredCostmap:
         if self._ranges is not None:
             self._touch(self._ranges.forget(window, outside=outside))
 
-    def _wrap(self, costs: Cells, origin: tuple[float, float]) -> Costmap:
-        return Costmap(
-            costs=costs,
-            resolution=self._resolution,
-            origin=origin,
-            inscribed_radius=self._inscribed_radius,
-            cost_scaling_factor=self.config.cost_scaling_factor,
-        )
+    def _empty(self) -> Costmap:
+        """Return a grid whose costs are to be written."""
+        return replace(self._grid, costs=np.empty_like(self._static))
 
     def _touch(self, window: Window) -> None:
         self._dirty = self._dirty.joined(window)
@@ -330,3 +288,15 @@ class LayeredCostmap:
             grid.costs[window.slices] = master.costs[window.slices]
         for layer in layers:
             layer.update_costs(grid, window)
+
+
+def _static_costs(occupancy: OccupancyMap, config: CostmapConfig) -> Cells:
+    """Return the costs of a map's cells, before inflation: nav2's StaticLayer::interpretValue."""
+    threshold, levels = config.lethal_cost_threshold, np.arange(101)
+    table = np.zeros(256, dtype=np.uint8)
+    if not config.trinary_costmap:
+        table[:101] = levels / threshold * LETHAL_OBSTACLE * (levels < threshold)
+    table[:101][levels >= threshold] = LETHAL_OBSTACLE
+    table[255] = NO_INFORMATION if config.track_unknown_space else FREE_SPACE
+    costs: Cells = table[occupancy.data.view(np.uint8)]
+    return costs

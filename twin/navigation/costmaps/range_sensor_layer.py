@@ -9,23 +9,24 @@ from numpy.typing import NDArray
 
 from twin.geometry import Pose2
 from twin.navigation._jit import jit
-from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import FREE_SPACE, LETHAL_OBSTACLE, NO_INFORMATION, triple
 from twin.navigation.costmaps.costmap_config import RangeSensorConfig
-from twin.navigation.costmaps.kernels import Cells
-from twin.navigation.costmaps.layer import Layer
-from twin.navigation.costmaps.window import NOTHING, Window, cut_out, everything, raised, shifted
-
-_EVEN = int(0.5 * LETHAL_OBSTACLE)
-"""A probability of one half, as nav2's layer stores it."""
+from twin.navigation.costmaps.kernels import Cells, Triple
+from twin.navigation.costmaps.layer import SensedLayer
+from twin.navigation.costmaps.window import NOTHING, Window
 
 
-class RangeSensorLayer(Layer):
-    """Bayes' rule per cell, with the sensor model of nav2's RangeSensorLayer (van der Poel's sonar layer)."""
+class RangeSensorLayer(SensedLayer):
+    """Bayes' rule per cell, with the sensor model of nav2's RangeSensorLayer (van der Poel's sonar layer).
+
+    A cell is 254 times the probability that it is occupied.
+    """
+
+    unseen = int(0.5 * LETHAL_OBSTACLE)
 
     def __init__(self, shape: tuple[int, int], config: RangeSensorConfig | None = None) -> None:
+        super().__init__(shape)
         self.config = config or RangeSensorConfig()
-        self.probabilities: Cells = np.full(shape, _EVEN, dtype=np.uint8)
-        """254 times the probability that a cell is occupied."""
         mark, clear = (
             int(t * LETHAL_OBSTACLE) for t in (self.config.mark_threshold, self.config.clear_threshold)
         )
@@ -35,12 +36,7 @@ class RangeSensorLayer(Layer):
         self._table[255] = NO_INFORMATION
 
     def add(
-        self,
-        sensor: Pose2,
-        distance: float,
-        limits: tuple[float, float],
-        field_of_view: float,
-        frame: tuple[float, float, float],
+        self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float, frame: Triple
     ) -> Window:
         """Take a reading; return the window that may have changed.
 
@@ -61,25 +57,12 @@ class RangeSensorLayer(Layer):
         half = 0.5 * field_of_view or math.atan2(frame[2], distance)
         # As nav2, a fifth further than the reading, so that the far side of the object is weighed, too.
         columns, rows = _triangle(sensor, 1.2 * distance, half, frame)
-        window = Window(min(columns), min(rows), max(columns) + 1, max(rows) + 1).clipped(
-            self.probabilities.shape
-        )
+        window = Window(min(columns), min(rows), max(columns) + 1, max(rows) + 1).clipped(self.cells.shape)
         if window.empty:
             return NOTHING
-        _update_cone(
-            self.probabilities,
-            float(sensor.x),
-            float(sensor.y),
-            float(sensor.yaw),
-            float(distance),
-            half,
-            self.config.phi,
-            clearing,
-            self.config.inflate_cone,
-            np.array([columns, rows], dtype=np.int64),
-            np.array([window.x0, window.y0, window.x1, window.y1], dtype=np.int64),
-            *frame,
-        )
+        model = (float(distance), half, float(self.config.phi))
+        triangle, inflate = np.array([columns, rows], dtype=np.int64), float(self.config.inflate_cone)
+        _update_cone(self.cells, triple(sensor), model, clearing, inflate, triangle, window, frame)
         return window
 
     def _reading(self, distance: float, least: float, greatest: float) -> tuple[float, bool] | None:
@@ -92,38 +75,13 @@ class RangeSensorLayer(Layer):
             return None
         return distance, distance >= greatest and self.config.clear_on_max_reading
 
-    def update_costs(self, grid: Costmap, window: Window) -> None:
-        """Raise the costs where the readings decide."""
-        at = window.slices
-        grid.costs[at] = raised(grid.costs[at], self.costs(window))
-
     def costs(self, window: Window) -> Cells:
         """Return the costs of a window's cells: lethal, free, or unknown where the readings do not decide."""
-        costs: Cells = self._table[self.probabilities[window.slices]]
+        costs: Cells = self._table[self.cells[window.slices]]
         return costs
 
-    def forget(self, window: Window, *, outside: bool = False) -> Window:
-        """Forget what is in a window, or outside of it; return where that may matter."""
-        if not outside:
-            self.probabilities[window.slices] = _EVEN
-            return window
-        kept = self.probabilities[window.slices].copy()
-        self.probabilities.fill(_EVEN)
-        self.probabilities[window.slices] = kept
-        return everything(self.probabilities.shape)
 
-    def move(self, dx: int, dy: int) -> None:
-        """Follow a grid that rolls by (dx, dy) cells."""
-        self.probabilities = shifted(self.probabilities, dx, dy, _EVEN)
-
-    def adopt(self, old: RangeSensorLayer, dx: int, dy: int) -> None:
-        """Take what was measured on another grid, from whose corner this one's is (dx, dy) cells away."""
-        self.probabilities = cut_out(old.probabilities, self.probabilities.shape, dx, dy, _EVEN)
-
-
-def _triangle(
-    sensor: Pose2, reach: float, half: float, frame: tuple[float, float, float]
-) -> tuple[list[int], list[int]]:
+def _triangle(sensor: Pose2, reach: float, half: float, frame: Triple) -> tuple[list[int], list[int]]:
     """Return columns and rows of the corners of a cone of half an angle [rad], the sensor first."""
     xs = [sensor.x, *(sensor.x + reach * math.cos(sensor.yaw + side * half) for side in (-1, 1))]
     ys = [sensor.y, *(sensor.y + reach * math.sin(sensor.yaw + side * half) for side in (-1, 1))]
@@ -153,21 +111,20 @@ def sensor_model(distance: float, phi: float, theta: float, half: float, phi_v: 
 @jit
 def _update_cone(
     cells: Cells,
-    x: float,
-    y: float,
-    yaw: float,
-    distance: float,
-    half: float,
-    phi_v: float,
+    sensor: Triple,
+    model: Triple,
     clearing: bool,
     inflate_cone: float,
     triangle: NDArray[np.int64],
-    window: NDArray[np.int64],
-    origin_x: float,
-    origin_y: float,
-    resolution: float,
+    window: Window,
+    frame: Triple,
 ) -> None:
-    """Apply Bayes' rule to the cells of a window; `triangle` holds the cone's corners: columns, then rows."""
+    """Apply Bayes' rule to the cells of a window.
+
+    `model` is what was measured [m], half of the cone's angle [rad] and the distance that counts half [m];
+    `triangle` has the cone's corners: columns, then rows.
+    """
+    (x, y, yaw), (distance, half, phi_v), (origin_x, origin_y, resolution) = sensor, model, frame
     tx, ty = (
         math.floor((x + distance * math.cos(yaw) - origin_x) / resolution),
         math.floor((y + distance * math.sin(yaw) - origin_y) / resolution),
@@ -179,8 +136,8 @@ def _update_cone(
     slack = -inflate_cone * doubled / 2.0
     sense = 1 if (bx - ax) * (oy - ay) - (by - ay) * (ox - ax) >= 0 else -1
     margin = math.sqrt(0.5) * resolution  # from a cell's centre to its corners
-    for v in range(window[1], window[3]):
-        for u in range(window[0], window[2]):
+    for v in range(window.y0, window.y1):
+        for u in range(window.x0, window.x1):
             if inflate_cone < 1.0:
                 w0 = sense * ((bx - ax) * (v - ay) - (by - ay) * (u - ax))
                 w1 = sense * ((ox - bx) * (v - by) - (oy - by) * (u - bx))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from twin.navigation.costmaps.kernels import Cells
 
 
-@dataclass(frozen=True)
-class Window:
+class Window(NamedTuple):
     """A rectangle of cells, its ends exclusive; empty if an end is not behind its beginning."""
 
     x0: int
@@ -35,13 +34,8 @@ class Window:
 
     def clipped(self, shape: tuple[int, ...]) -> Window:
         """Return the part that lies on a grid of `shape` (height, width)."""
-        height, width = shape
-        return Window(
-            min(max(0, self.x0), width),
-            min(max(0, self.y0), height),
-            min(max(0, self.x1), width),
-            min(max(0, self.y1), height),
-        )
+        limits = (shape[1], shape[0]) * 2
+        return Window(*(min(max(0, edge), most) for edge, most in zip(self, limits, strict=True)))
 
     def joined(self, other: Window) -> Window:
         """Return the smallest window that holds both."""
@@ -62,16 +56,11 @@ def everything(shape: tuple[int, ...]) -> Window:
 
 def differing(before: NDArray[np.uint8], after: NDArray[np.uint8], window: Window) -> Window:
     """Return the smallest window, of the grid that `window` was cut out of, in which two cuts differ."""
-    changed = before != after
-    ys, xs = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    ys, xs = np.nonzero(before != after)
     if not ys.size:
         return NOTHING
-    return Window(
-        window.x0 + int(xs[0]),
-        window.y0 + int(ys[0]),
-        window.x0 + int(xs[-1]) + 1,
-        window.y0 + int(ys[-1]) + 1,
-    )
+    x0, y0 = window.x0 + int(xs.min()), window.y0 + int(ys[0])
+    return Window(x0, y0, window.x0 + int(xs.max()) + 1, window.y0 + int(ys[-1]) + 1)
 
 
 def raised(costs: Cells, layer: Cells) -> Cells:
@@ -79,11 +68,6 @@ def raised(costs: Cells, layer: Cells) -> Cells:
     one = np.uint8(1)
     higher: Cells = np.maximum(costs + one, layer + one) - one
     return higher
-
-
-def shifted(cells: Cells, dx: int, dy: int, fill: int) -> Cells:
-    """Return the cells as seen from a window moved by (dx, dy) cells; new cells get `fill`."""
-    return cut_out(cells, cells.shape, dx, dy, fill)
 
 
 def cut_out(cells: Cells, shape: tuple[int, ...], dx: int, dy: int, fill: int) -> Cells:

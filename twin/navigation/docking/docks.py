@@ -94,11 +94,7 @@ class DockDatabase:
     """Docks by the name that `dock_robot` has in `dock_id`."""
 
     def find(self, dock_id: str) -> Dock:
-        """Return a dock.
-
-        Raises:
-            DockError: there is none of this name.
-        """
+        """Return a dock; raises DockError if there is none of this name."""
         if dock_id not in self.docks:
             valid = nearest(dock_id, self.docks) if self.docks else "the database is empty"
             raise DockError(DOCK_NOT_IN_DB, f"there is no dock '{dock_id}'; {valid}")

@@ -12,6 +12,12 @@ from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 
 CORNER = 0.02
 """A chain of points that leaves its chord by more than this has a corner [m]."""
+_ON_LINE = 0.02
+"""Points within this of a line belong to it [m]."""
+_MAX_GAP = 0.05
+"""Neighbouring points farther apart than this belong to different things [m]."""
+_MAX_YAW = math.radians(40.0)
+"""A face of a box that is turned away farther than this is not looked at [rad]."""
 HYPOTHESIS_POINTS = 40
 """Lines through every pair of so many points are tried."""
 
@@ -24,8 +30,6 @@ class WallFit:
     """From the base origin, perpendicular to the wall [m]."""
     yaw: float
     """Direction of the perpendicular in the base frame [rad]; 0 when the robot faces the wall squarely."""
-    rms: float
-    """Of the points' distances from the line [m]."""
     inliers: NDArray[np.bool_]
     """Which points belong to the wall, shape (n,)."""
 
@@ -38,19 +42,10 @@ class BoxFace:
     """Of the face's centre in the base frame, x into the box: yaw 0 when the robot faces it squarely."""
     width: float
     """As measured [m]."""
-    rms: float
-    """Of the points' distances from the face [m]."""
-    quality: float
-    """1 perfect ... 0: width at the edge of the tolerance, or rms 3 cm."""
 
 
 def fit_wall(
-    points: ArrayLike,
-    *,
-    tolerance: float = 0.02,
-    facing: float = 0.0,
-    max_yaw: float = math.pi,
-    min_length: float = 0.0,
+    points: ArrayLike, *, facing: float = 0.0, max_yaw: float = math.pi, min_length: float = 0.0
 ) -> WallFit | None:
     """Return the line that most points lie on, among lines that may be the wall, or None if there is none.
 
@@ -59,7 +54,6 @@ def fit_wall(
 
     Args:
         points: Shape (n, 2), in the base frame [m].
-        tolerance: Points within this of the line belong to it [m].
         facing: Expected direction of the perpendicular in the base frame [rad].
         max_yaw: A line turned further than this against it is another thing [rad].
         min_length: So is a line whose points reach less far along it [m].
@@ -67,31 +61,29 @@ def fit_wall(
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     if len(xy) < 5:
         return None
-    line = _best_line(xy, tolerance, facing, max_yaw)
+    line = _best_line(xy, facing, max_yaw)
     if line is None:
         return None
     normal, offset = line
     for _ in range(3):
-        inliers = np.abs(xy @ normal - offset) <= tolerance
+        inliers = np.abs(xy @ normal - offset) <= _ON_LINE
         if np.count_nonzero(inliers) < 5:
             return None
-        normal, offset, rms = _total_least_squares(xy[inliers])
-    if offset < 0.0:
-        normal, offset = -normal, -offset
-    yaw = math.atan2(normal[1], normal[0])
+        normal, offset, _ = _total_least_squares(xy[inliers])
+    normal, offset, yaw = _facing(normal, offset)
     reach = float(np.ptp(xy[inliers] @ np.array([-normal[1], normal[0]])))
     if abs(wrap_angle(yaw - facing)) > max_yaw or reach < min_length:
         return None
-    return WallFit(distance=offset, yaw=yaw, rms=rms, inliers=inliers)
+    return WallFit(distance=offset, yaw=yaw, inliers=inliers)
 
 
-def _best_line(points: Array, tolerance: float, facing: float, max_yaw: float) -> tuple[Array, float] | None:
+def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, float] | None:
     """Return unit normal and offset [m] of the line through two points that most lie on; see `fit_wall`."""
     some = points[np.linspace(0, len(points) - 1, min(HYPOTHESIS_POINTS, len(points))).astype(np.int64)]
     i, j = np.triu_indices(len(some), k=1)
     along = some[j] - some[i]
     length = np.hypot(along[:, 0], along[:, 1])
-    apart = length > 2.0 * tolerance
+    apart = length > 2.0 * _ON_LINE
     i, along, length = i[apart], along[apart], length[apart]
     normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     offsets = np.einsum("ij,ij->i", normals, some[i])
@@ -103,18 +95,11 @@ def _best_line(points: Array, tolerance: float, facing: float, max_yaw: float) -
         return None
     normals, offsets = normals[may_be], offsets[may_be]
     squared = (normals @ some.T - offsets[:, None]) ** 2
-    best = int(np.argmin(np.minimum(squared, tolerance**2).sum(axis=1)))
+    best = int(np.argmin(np.minimum(squared, _ON_LINE**2).sum(axis=1)))
     return normals[best], float(offsets[best])
 
 
-def find_box_faces(
-    points: ArrayLike,
-    width: float,
-    *,
-    width_tolerance: float = 0.03,
-    max_gap: float = 0.05,
-    max_yaw: float = math.radians(40.0),
-) -> list[BoxFace]:
+def find_box_faces(points: ArrayLike, width: float, *, width_tolerance: float = 0.03) -> list[BoxFace]:
     """Return the faces of boxes of known width, that nearest to straight ahead first.
 
     The scan is cut where neighbours are far apart and at corners; a piece is a face if its width fits.
@@ -123,18 +108,16 @@ def find_box_faces(
         points: Shape (n, 2), in the base frame, in the order of the beams [m].
         width: Of the face [m].
         width_tolerance: [m].
-        max_gap: Neighbouring points farther apart than this belong to different things [m].
-        max_yaw: A face turned away farther than this is not looked at [rad].
     """
     xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     xy = xy[np.isfinite(xy).all(axis=1)]
     if len(xy) < 5:
         return []
-    gaps = np.flatnonzero(np.hypot(*np.diff(xy, axis=0).T) > max_gap) + 1
+    gaps = np.flatnonzero(np.hypot(*np.diff(xy, axis=0).T) > _MAX_GAP) + 1
     faces = []
     for segment in np.split(xy, gaps):
         for first, last in _split_at_corners(segment, 0, len(segment) - 1):
-            face = _face(_grown(segment, first, last), width, width_tolerance, max_yaw)
+            face = _face(_grown(segment, first, last), width, width_tolerance)
             if face is not None:
                 faces.append(face)
     return sorted(faces, key=lambda face: abs(face.pose.y))
@@ -146,6 +129,13 @@ def _total_least_squares(points: Array) -> tuple[Array, float, float]:
     values, vectors = np.linalg.eigh((points - centre).T @ (points - centre) / len(points))
     normal: Array = vectors[:, 0]
     return normal, float(normal @ centre), math.sqrt(max(float(values[0]), 0.0))
+
+
+def _facing(normal: Array, offset: float) -> tuple[Array, float, float]:
+    """Return the normal that points away from the robot, its offset, which is positive, and its direction."""
+    if offset < 0.0:
+        normal, offset = -normal, -offset
+    return normal, offset, math.atan2(normal[1], normal[0])
 
 
 def _split_at_corners(points: Array, first: int, last: int) -> list[tuple[int, int]]:
@@ -175,24 +165,18 @@ def _grown(points: Array, first: int, last: int) -> Array:
     return points[start:end]
 
 
-def _face(points: Array, width: float, tolerance: float, max_yaw: float) -> BoxFace | None:
+def _face(points: Array, width: float, tolerance: float) -> BoxFace | None:
     """Return the face that these points would be, or None if the width or the direction does not fit."""
     if len(points) < 5:
         return None
     normal, offset, rms = _total_least_squares(points)
-    if offset < 0.0:
-        normal, offset = -normal, -offset
-    yaw = math.atan2(normal[1], normal[0])
+    normal, offset, yaw = _facing(normal, offset)
     tangent = np.array([-normal[1], normal[0]])
     at = points @ tangent
     low, high = float(at.min()), float(at.max())
     # The edges lie, on average, half a beam outside the first and last point.
     measured = (high - low) * len(points) / (len(points) - 1)
-    misfit = abs(measured - width)
-    if misfit > tolerance or rms > 0.03 or abs(wrap_angle(yaw)) > max_yaw:
+    if abs(measured - width) > tolerance or rms > 0.03 or abs(wrap_angle(yaw)) > _MAX_YAW:
         return None
     centre = offset * normal + 0.5 * (low + high) * tangent
-    quality = (1.0 - misfit / tolerance) * (1.0 - rms / 0.03)
-    return BoxFace(
-        pose=Pose2(float(centre[0]), float(centre[1]), yaw), width=measured, rms=rms, quality=quality
-    )
+    return BoxFace(pose=Pose2(float(centre[0]), float(centre[1]), yaw), width=measured)

@@ -68,7 +68,7 @@ class LineApproach:
         left, lateral, yaw_error = self.errors(pose)
         self._elapsed += dt
         if self._elapsed > config.time_allowance:
-            return BehaviorStep(0.0, 0.0, failed_reason=TIMEOUT)
+            return BehaviorStep(failed_reason=TIMEOUT)
         if self._phase is _Phase.TURN_TO_LINE:
             # A turn once begun goes on to the end.
             enough = config.yaw_tolerance if self._w else config.turn_first_above
@@ -80,10 +80,10 @@ class LineApproach:
                 return self._drive(left, lateral, yaw_error, dt)
             self._phase = _Phase.TURN_AT_POSE
         if abs(lateral) > config.lateral_tolerance:
-            return BehaviorStep(0.0, 0.0, failed_reason=MISSED)
+            return BehaviorStep(failed_reason=MISSED)
         if abs(yaw_error) > config.yaw_tolerance:
             return self._turn(yaw_error, dt)
-        return BehaviorStep(0.0, 0.0, done=True)
+        return BehaviorStep(done=True)
 
     def _turn(self, yaw_error: float, dt: float) -> BehaviorStep:
         config = self.config

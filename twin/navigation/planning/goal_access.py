@@ -15,6 +15,7 @@ from twin.navigation.costmaps.costmap import (
     NO_INFORMATION,
     Costmap,
     footprint_cost,
+    triple,
 )
 from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import footprint_hits
@@ -103,8 +104,7 @@ class GoalAccess:
             return False
         if footprint_cost(costmap, self._corners, pose) == LETHAL_OBSTACLE:
             return False
-        at = float(pose.x), float(pose.y), float(pose.yaw)
-        return footprint_hits(costmap.costs, self._corners, *at, *costmap.frame) == 0
+        return footprint_hits(costmap.costs, self._corners, triple(pose), costmap.frame) == 0
 
     def _without_visitors(self, costmap: Costmap, known: Costmap, goal: Pose2) -> Costmap:
         around = self._around(costmap, goal, self.config.goal_surroundings)

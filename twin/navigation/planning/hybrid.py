@@ -13,7 +13,6 @@ from twin.navigation.costmaps.costmap import (
     MAX_NON_OBSTACLE,
     NO_INFORMATION,
     Costmap,
-    inflation_costs,
 )
 from twin.navigation.failures import GoalOccupied, NoValidPath, PlanningTimeout, StartOccupied
 from twin.navigation.planning.config import HybridConfig
@@ -78,15 +77,7 @@ class HybridPlanner(GlobalPlanner):
         config, corners = self.config, self.footprint
         reach = float(np.hypot(corners[:, 0], corners[:, 1]).max())
         reach += costmap.resolution  # for costs are those of the cells' centres
-        clear_below = 0
-        if self.inflation_radius >= reach:
-            cost = inflation_costs(
-                reach,
-                inscribed_radius=costmap.inscribed_radius,
-                inflation_radius=math.inf,
-                cost_scaling_factor=costmap.cost_scaling_factor,
-            )
-            clear_below = int(cost)
+        clear_below = costmap.cost_within(reach) if self.inflation_radius >= reach else 0
         turning = (config.non_straight_penalty, config.change_penalty)
         return Drive(
             costs=costmap.costs,

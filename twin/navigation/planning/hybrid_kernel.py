@@ -56,7 +56,7 @@ def pose_cost(drive: Drive, x: float, y: float, yaw: float) -> int:
         return -1
     if cost < drive.clear_below or drive.corners.shape[0] < 2:
         return cost
-    worst = outline_cost(costs, drive.corners, x, y, yaw, 0.0, 0.0, 1.0)
+    worst = outline_cost(costs, drive.corners, (x, y, yaw), (0.0, 0.0, 1.0))
     if worst == 254 or (worst == 255 and not drive.allow_unknown):
         return -1
     return cost

@@ -48,8 +48,8 @@ def blocked_poses(
         # Where the robot stands it is turned otherwise than its path, perhaps.
         reach = float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
         near = (away[nearest:] < _NEAR) & (away[nearest:] > reach)
-        seen = outlines_hit(_unmapped(costmap, known), footprint, ahead[near], *costmap.frame)
-        blocked[near] |= seen & ~outlines_hit(known.costs, footprint, ahead[near], *known.frame)
+        seen = outlines_hit(_unmapped(costmap, known), footprint, ahead[near], costmap.frame)
+        blocked[near] |= seen & ~outlines_hit(known.costs, footprint, ahead[near], known.frame)
     return (nearest + np.flatnonzero(blocked)).astype(np.int32)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, GoalHandle
@@ -19,6 +19,7 @@ from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
 
 Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.AssistedTeleop
+B = TypeVar("B", bound=Behavior)
 
 _POSE_TIMEOUT_NS = 1_000_000_000
 """How long odometry is waited for."""
@@ -60,7 +61,6 @@ class BehaviorServerNode:
         *,
         costmap: CostmapNode | None = None,
         cmd_vel: str = "cmd_vel_nav",
-        cmd_vel_teleop: str = "cmd_vel_assisted_teleop",
         period_ns: int = 20_000_000,
         namespace: str = "",
     ) -> None:
@@ -72,7 +72,7 @@ class BehaviorServerNode:
         self._period_ns = period_ns
         self._publisher = self.node.create_publisher(Twist, cmd_vel, 1)
         self._teleop: recovery.AssistedTeleop | None = None
-        self.node.create_subscription(Twist, cmd_vel_teleop, self._on_teleop, 10)
+        self.node.create_subscription(Twist, "cmd_vel_assisted_teleop", self._on_teleop, 10)
         self.node.create_subscription(Empty, "preempt_teleop", self._on_preempt_teleop, 10)
         for name, served in self._behaviors().items():
             ActionServer(self.node, served.action, name, self._execution(name, served), _is_finite)
@@ -100,34 +100,26 @@ class BehaviorServerNode:
             ),
         }
 
+    def _made(self, behavior: Callable[..., B], goal: Any, **wanted: float) -> B:
+        return behavior(config=self.config, time_allowance=ns(goal.time_allowance) * 1e-9, **wanted)
+
     def _spin(self, goal: Any) -> Behavior:
-        return recovery.Spin(
-            config=self.config, target_yaw=goal.target_yaw, time_allowance=ns(goal.time_allowance) * 1e-9
-        )
+        return self._made(recovery.Spin, goal, target_yaw=goal.target_yaw)
 
     def _backup(self, goal: Any) -> Behavior:
-        return recovery.BackUp(
-            config=self.config,
-            target_distance=-abs(goal.target.x),
-            speed=abs(goal.speed),
-            time_allowance=ns(goal.time_allowance) * 1e-9,
-        )
+        return self._straight(goal, -abs(goal.target.x))
 
     def _drive(self, goal: Any) -> Behavior:
-        return recovery.DriveOnHeading(
-            config=self.config,
-            target_distance=goal.target.x,
-            speed=abs(goal.speed),
-            time_allowance=ns(goal.time_allowance) * 1e-9,
-        )
+        return self._straight(goal, goal.target.x)
+
+    def _straight(self, goal: Any, x: float) -> Behavior:
+        return self._made(recovery.DriveOnHeading, goal, target_distance=x, speed=abs(goal.speed))
 
     def _wait(self, goal: Any) -> Behavior:
-        return recovery.Wait(config=self.config, duration=ns(goal.time) * 1e-9, time_allowance=0.0)
+        return recovery.Wait(duration=ns(goal.time) * 1e-9)
 
     def _assisted_teleop(self, goal: Any) -> Behavior:
-        self._teleop = recovery.AssistedTeleop(
-            config=self.config, time_allowance=ns(goal.time_allowance) * 1e-9
-        )
+        self._teleop = self._made(recovery.AssistedTeleop, goal)
         return self._teleop
 
     def _on_teleop(self, message: Twist) -> None:
@@ -135,8 +127,7 @@ class BehaviorServerNode:
         if self._teleop is not None and all(map(math.isfinite, values)):
             self._teleop.steered = values
 
-    def _on_preempt_teleop(self, message: Empty) -> None:
-        del message
+    def _on_preempt_teleop(self, _message: Empty) -> None:
         if self._teleop is not None:
             self._teleop.is_over = True
 

@@ -6,6 +6,8 @@ Nav2's own, a user's. A goal may name one in its field `behavior_tree`.
 
 from __future__ import annotations
 
+from functools import partial
+
 from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
@@ -78,26 +80,27 @@ class BtNavigatorNode:
 
     @staticmethod
     def _setups(config: BtNavigatorConfig) -> tuple[NavigatorSetup, NavigatorSetup]:
+        setup = partial(
+            NavigatorSetup,
+            error_code_name_prefixes=config.error_code_name_prefixes,
+            tick_ns=config.bt_loop_duration * _MS,
+        )
         return (
-            NavigatorSetup(
+            setup(
                 action=NavigateToPose,
                 name="navigate_to_pose",
                 default_tree=config.default_nav_to_pose_bt_xml,
                 codes=9000,
                 poses=lambda goal: [goal.pose],
                 entry=lambda poses: ("goal", poses[0]),
-                error_code_name_prefixes=config.error_code_name_prefixes,
-                tick_ns=config.bt_loop_duration * _MS,
             ),
-            NavigatorSetup(
+            setup(
                 action=NavigateThroughPoses,
                 name="navigate_through_poses",
                 default_tree=config.default_nav_through_poses_bt_xml,
                 codes=9100,
                 poses=lambda goal: list(goal.poses),
                 entry=lambda poses: ("goals", poses),
-                error_code_name_prefixes=config.error_code_name_prefixes,
-                tick_ns=config.bt_loop_duration * _MS,
             ),
         )
 

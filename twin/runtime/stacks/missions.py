@@ -51,7 +51,6 @@ from twin.scenario.missions import (
 from twin.strict_yaml import StrictModel
 from twin.warehouse.arena import Arena
 from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
-from twin.warehouse.skills import Station
 
 
 class IdleMission:
@@ -205,24 +204,14 @@ def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNod
             raise ScenarioError(
                 f"zone '{task.to}' has room for {len(zone.slots)} totes; the mission brings it more"
             )
-        place = zone.slots[index]
-        depth, width, height = tote.size
-        tasks.append(
-            PickAndPlaceTask(
-                tote=task.tote,
-                box_depth=depth,
-                tote_width=width,
-                tote_height=height,
-                pick=Station(name=tote.slot.name, face=tote.slot.approach(0.0), surface_z=tote.slot.height),
-                place=Station(name=place.name, face=place.approach(0.0), surface_z=place.height),
-            )
-        )
-    return PickAndPlaceNode(
+        tasks.append(PickAndPlaceTask(tote=tote, place=zone.slots[index]))
+    node = PickAndPlaceNode(
         context.bus,
-        tasks,
         stack.manipulator.arm,
         gripper_joint=stack.manipulator.gripper_joint,
         gripper_open=stack.manipulator.gripper_open,
         robot_pose=stack.robot_pose,
         namespace=context.namespace,
     )
+    node.carry(tasks)
+    return node

@@ -19,7 +19,7 @@ from twin.navigation.control.dwb import kernels
 from twin.navigation.control.dwb.config import DWBConfig, ObstacleConfig
 from twin.navigation.control.dwb.oscillation import Oscillation
 from twin.navigation.control.footprint_cover import CoverOf
-from twin.navigation.control.path_handler import LocalPath, PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import LocalPath, PathHandler
 from twin.navigation.failures import NoValidControl
 from twin.navigation.plugins import own_critics
 
@@ -47,14 +47,10 @@ class DWB(Controller):
 
     def _build(self) -> None:
         config = self.config
-        self._oscillation = Oscillation(config=config.Oscillation)
+        self._oscillation = Oscillation(config.Oscillation)
         self._critics = own_critics(config)
         self._cover = CoverOf(self.footprint, consider_footprint="ObstacleFootprint" in config.critics)
-        self._handler = PathHandler(
-            config=PathHandlerConfig(
-                prune_distance=config.prune_distance, enforce_path_inversion=self.reverses
-            )
-        )
+        self._handler = PathHandler(to_cusps=self.reverses, prune_distance=config.prune_distance)
 
     def set_plan(self, path: Array) -> None:
         """Follow another path; see `Controller.set_plan`."""

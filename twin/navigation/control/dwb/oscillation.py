@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,11 @@ from twin.geometry import Array, Pose2, wrap_angle
 from twin.navigation.control.dwb.config import OscillationConfig
 
 
-@dataclass(kw_only=True)
 class Oscillation:
     """After a change of sign the old sign is forbidden until the robot has got somewhere."""
 
-    config: OscillationConfig = field(default_factory=OscillationConfig)
-
-    def __post_init__(self) -> None:
+    def __init__(self, config: OscillationConfig) -> None:
+        self.config = config
         self.reset()
 
     def reset(self) -> None:

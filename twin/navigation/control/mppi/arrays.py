@@ -13,22 +13,12 @@ from numpy.typing import NDArray
 
 from twin.navigation.control.footprint_cover import F32, FootprintCover
 
-(
-    CONSTRAINT,
-    COST,
-    OBSTACLES,
-    GOAL,
-    GOAL_ANGLE,
-    ALIGN,
-    FOLLOW,
-    ANGLE,
-    FORWARD,
-    TWIRLING,
-    DEADBAND,
-    SPEED,
-    LAG,
-) = range(13)
-"""Rows of the critics' raw scores; LAG, mean distance that is left of the local path, is a part of FOLLOW."""
+CONSTRAINT, COST, OBSTACLES, GOAL, GOAL_ANGLE, ALIGN, FOLLOW, ANGLE, FORWARD = range(9)
+TWIRLING, DEADBAND, SPEED, LAG = range(9, 13)
+"""Rows of the critics' raw scores, as `MPPIConfig` orders the critics.
+
+LAG, mean distance that is left of the local path, is a part of FOLLOW.
+"""
 CRITIC_COUNT = 13
 
 X, Y, COS, SIN, YAW, V, W, LENGTH = range(8)

@@ -8,6 +8,7 @@ controls by the noise that did well. What Nav2 does differently is named where i
 from __future__ import annotations
 
 import math
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from twin.navigation.control.mppi.noise import NoiseBank
 from twin.navigation.control.mppi.pursuit import pursue
 from twin.navigation.control.mppi.rollouts import Rollouts
 from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
-from twin.navigation.control.mppi.scoring import CostTables
+from twin.navigation.control.mppi.scoring import cost_tables
 from twin.navigation.control.mppi.sent_commands import SentCommands
 from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.failures import NoValidControl
@@ -76,19 +77,15 @@ class MPPI(Controller):
         config, critic = self.config, self.config.CostCritic
         self._noise = NoiseBank(config)
         self._rollouts = Rollouts(config)
-        self._tables = CostTables(config)
+        self._tables = lru_cache(maxsize=1)(partial(cost_tables, config))
         self._leads = np.zeros((config.time_steps, 3))
         self._cover = CoverOf(
             self.footprint, consider_footprint=critic.consider_footprint, padding=critic.footprint_padding
         )
         self._handler = DetouringPathHandler(
-            PathHandlerConfig(
-                prune_distance=config.prune_distance,
-                max_robot_pose_search_dist=config.max_robot_pose_search_dist,
-                enforce_path_inversion=self.reverses,
-                inversion_xy_tolerance=config.inversion_xy_tolerance,
-                inversion_yaw_tolerance=config.inversion_yaw_tolerance,
-            ),
+            PathHandlerConfig.of(config),
+            to_cusps=self.reverses,
+            prune_distance=config.prune_distance,
             detours=config.detours,
         )
 
@@ -135,7 +132,7 @@ class MPPI(Controller):
         self._noise.reset()
 
     def _look(self, now: Situation) -> Scene:
-        local = self._handler.local(now.pose, now.costmap, now.at)
+        local = self._handler.local_around(now.pose, now.costmap, now.at)
         grid, limits = now.grid, limits_of(self.config, self._limit)
         to_grid = now.at_grid @ now.pose.inverse()
         points = to_grid.apply(local.poses[:, :2])
@@ -153,7 +150,9 @@ class MPPI(Controller):
             ground=Ground(
                 costs=grid.costs,
                 per_metre=np.float32(1.0 / grid.resolution),
-                tables=self._tables.of(grid, near_goal=near_goal, vx_max=float(limits.vx_max)),
+                tables=self._tables(
+                    grid.inscribed_radius, grid.cost_scaling_factor, near_goal, float(limits.vx_max)
+                ),
                 cover=self._cover.on(grid),
             ),
             costmap=grid,
@@ -213,9 +212,8 @@ class MPPI(Controller):
 
     def _smooth(self) -> None:
         """Filter the controls; what was sent before them is their past (Nav2's savitskyGolayFilter)."""
-        if self.config.time_steps <= 20:
-            return
-        controls.smooth(self._mean, self._sent.latest(_SMOOTHED), _FILTERS[self.config.sgf_order])
+        if self.config.time_steps > 20:
+            controls.smooth(self._mean, self._sent.latest(_SMOOTHED), _FILTERS[self.config.sgf_order])
 
     def _constrain(self, scene: Scene, dt: float) -> None:
         model_dt = np.float32(self.config.model_dt)

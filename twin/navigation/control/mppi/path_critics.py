@@ -161,17 +161,9 @@ def _align_to_path(
 ) -> None:
     """Score PathAlignCritic: mean distance to the pose as far along the path as the rollout has come.
 
-    Args:
-        points: Of the rollouts, shape (3, time_steps, batch).
-        start: x, y where they begin.
-        path: Shape (3, n).
-        along: Distance along the path, shape (n).
-        valid: Which of its poses are free.
-        segments: Only poses before this one count.
-        step: Every so many points of a rollout are looked at.
-        orientations: Whether the difference in heading [rad] counts as a distance too.
-        hit: Which rollouts collide: they are lost anyway, and score nothing here.
-        raw: Shape (CRITIC_COUNT, batch), written.
+    Arguments are those of `score_align`, of `Scene` and of the critic. Only poses before `segments` count;
+    with `orientations` the difference in heading [rad] counts as a distance, too. Rollouts that collide are
+    lost anyway, and score nothing here.
     """
     _, steps, batch = points.shape
     score = raw[arrays.ALIGN]

@@ -12,31 +12,8 @@ import numpy as np
 
 from twin.navigation._jit import fast_jit
 from twin.navigation.control.footprint_cover import F32, collides, outline_hits
-from twin.navigation.control.mppi.arrays import (
-    CONSTRAINT,
-    COS,
-    COST,
-    DEADBAND,
-    FORWARD,
-    GOAL,
-    GOAL_ANGLE,
-    LAG,
-    LENGTH,
-    OBSTACLES,
-    SIN,
-    SPEED,
-    TWIRLING,
-    YAW,
-    Batch,
-    Commands,
-    Ground,
-    Limits,
-    V,
-    W,
-    Wanted,
-    X,
-    Y,
-)
+from twin.navigation.control.mppi import arrays
+from twin.navigation.control.mppi.arrays import Batch, Commands, Ground, Limits, Wanted
 
 _ONE, _HALF, _ZERO = np.float32(1.0), np.float32(0.5), np.float32(0.0)
 _PI, _TURN, _PER_TURN = np.float32(math.pi), np.float32(2.0 * math.pi), np.float32(0.5 / math.pi)
@@ -81,9 +58,9 @@ def _begin(start: F32, batch: Batch) -> None:
     state, raw, hit = batch.state, batch.raw, batch.hit
     c, s = np.cos(start[2]), np.sin(start[2])
     for k in range(hit.shape[0]):
-        state[X, k], state[Y, k], state[YAW, k] = start[0], start[1], start[2]
-        state[COS, k], state[SIN, k] = c, s
-        state[V, k], state[W, k], state[LENGTH, k] = start[3], start[4], _ZERO
+        state[arrays.X, k], state[arrays.Y, k], state[arrays.YAW, k] = start[0], start[1], start[2]
+        state[arrays.COS, k], state[arrays.SIN, k] = c, s
+        state[arrays.V, k], state[arrays.W, k], state[arrays.LENGTH, k] = start[3], start[4], _ZERO
         hit[k] = 0
     for row in range(raw.shape[0]):
         for k in range(hit.shape[0]):
@@ -95,7 +72,7 @@ def _accelerate(t: int, commands: Commands, limits: Limits, dt: np.float32, stat
     """Change the speeds towards what was commanded, as far as the accelerations let them."""
     dv_up, dv_down, dw_max = limits.ax_max * dt, -limits.ax_min * dt, limits.az_max * dt
     noise, mean, history = commands.noise, commands.mean, commands.history
-    v, w = state[V], state[W]
+    v, w = state[arrays.V], state[arrays.W]
     tv, tw = t - commands.delays[0], t - commands.delays[1]
     if tv < 0:
         for k in range(v.shape[0]):
@@ -119,8 +96,8 @@ def _accelerate(t: int, commands: Commands, limits: Limits, dt: np.float32, stat
 @fast_jit
 def _score_speeds(limits: Limits, wanted: Wanted, dt: np.float32, state: F32, raw: F32) -> None:
     """Add up ConstraintCritic, PreferForwardCritic, TwirlingCritic, VelocityDeadbandCritic, and the lag."""
-    v, w, length = state[V], state[W], state[LENGTH]
-    constraint, forward, lag = raw[CONSTRAINT], raw[FORWARD], raw[LAG]
+    v, w, length = state[arrays.V], state[arrays.W], state[arrays.LENGTH]
+    constraint, forward, lag = raw[arrays.CONSTRAINT], raw[arrays.FORWARD], raw[arrays.LAG]
     batch = v.shape[0]
     for k in range(batch):
         constraint[k] += max(v[k] - limits.vx_max, _ZERO) + max(limits.vx_min - v[k], _ZERO)
@@ -132,12 +109,12 @@ def _score_speeds(limits: Limits, wanted: Wanted, dt: np.float32, state: F32, ra
             radius = abs(v[k]) / max(abs(w[k]), np.float32(1e-6))
             constraint[k] += max(limits.min_turning_r - radius, _ZERO)
     if wanted.twirling:
-        twirling = raw[TWIRLING]
+        twirling = raw[arrays.TWIRLING]
         for k in range(batch):
             twirling[k] += abs(w[k])
     dead_v, dead_w = wanted.deadband[0], wanted.deadband[1]
     if dead_v > _ZERO or dead_w > _ZERO:
-        dead = raw[DEADBAND]
+        dead = raw[arrays.DEADBAND]
         for k in range(batch):
             dead[k] += max(dead_v - abs(v[k]), _ZERO) + max(dead_w - abs(w[k]), _ZERO)
     for k in range(batch):
@@ -147,8 +124,8 @@ def _score_speeds(limits: Limits, wanted: Wanted, dt: np.float32, state: F32, ra
 @fast_jit
 def _drive(dt: np.float32, state: F32, points: F32) -> None:
     """Drive one step along the arcs; write where that ends."""
-    x, y, c, s = state[X], state[Y], state[COS], state[SIN]
-    yaw, v, w = state[YAW], state[V], state[W]
+    x, y, c, s = state[arrays.X], state[arrays.Y], state[arrays.COS], state[arrays.SIN]
+    yaw, v, w = state[arrays.YAW], state[arrays.V], state[arrays.W]
     for k in range(v.shape[0]):
         # The arc's chord has the heading of its middle.
         a = _HALF * w[k] * dt
@@ -169,15 +146,15 @@ def _drive(dt: np.float32, state: F32, points: F32) -> None:
 @fast_jit
 def _score_pose(wanted: Wanted, state: F32, raw: F32) -> None:
     """Add up GoalCritic and GoalAngleCritic."""
-    x, y, yaw = state[X], state[Y], state[YAW]
+    x, y, yaw = state[arrays.X], state[arrays.Y], state[arrays.YAW]
     goal_x, goal_y, goal_yaw = wanted.goal[0], wanted.goal[1], wanted.goal[2]
     if wanted.position:
-        distance = raw[GOAL]
+        distance = raw[arrays.GOAL]
         for k in range(x.shape[0]):
             gx, gy = x[k] - goal_x, y[k] - goal_y
             distance[k] += np.sqrt(gx * gx + gy * gy)
     if wanted.heading:
-        angle = raw[GOAL_ANGLE]
+        angle = raw[arrays.GOAL_ANGLE]
         for k in range(x.shape[0]):
             off = yaw[k] - goal_yaw
             off = abs(off - _TURN * np.floor(off * _PER_TURN + _HALF))
@@ -191,7 +168,7 @@ def _look(ground: Ground, near_cost: np.float32, batch: Batch) -> None:
     """Look at the costmap: who collides, CostCritic, ObstaclesCritic and SpeedCritic."""
     costs, per_metre, tables, cover = ground.costs, ground.per_metre, ground.tables, ground.cover
     state, raw, hit = batch.state, batch.raw, batch.hit
-    x, y, c, s, v = state[X], state[Y], state[COS], state[SIN], state[V]
+    x, y, c, s, v = state[arrays.X], state[arrays.Y], state[arrays.COS], state[arrays.SIN], state[arrays.V]
     height, width = costs.shape
     for k in range(hit.shape[0]):
         if hit[k] != 0:
@@ -207,25 +184,25 @@ def _look(ground: Ground, near_cost: np.float32, batch: Batch) -> None:
             if alone or outline_hits(costs, cover.outline, ux, uy, c[k], s[k]):
                 hit[k] = 1
                 continue
-            raw[COST, k] += near_cost
-        raw[COST, k] += tables[0, cost]
-        raw[OBSTACLES, k] += tables[1, cost]
-        raw[SPEED, k] += max(abs(v[k]) - tables[2, cost], _ZERO)
+            raw[arrays.COST, k] += near_cost
+        raw[arrays.COST, k] += tables[0, cost]
+        raw[arrays.OBSTACLES, k] += tables[1, cost]
+        raw[arrays.SPEED, k] += max(abs(v[k]) - tables[2, cost], _ZERO)
 
 
 @fast_jit
 def _take_means(dt: np.float32, wanted: Wanted, batch: Batch) -> None:
     """Make integrals over time, or means over the steps and looks, of the sums."""
-    raw, length, steps = batch.raw, batch.state[LENGTH], batch.points.shape[1]
+    raw, length, steps = batch.raw, batch.state[arrays.LENGTH], batch.points.shape[1]
     looks = steps // wanted.look_every if wanted.look_every > 0 else 0
     per_step, per_look = _ONE / np.float32(steps), _ONE / np.float32(max(1, looks))
-    for row in (CONSTRAINT, FORWARD, DEADBAND):
+    for row in (arrays.CONSTRAINT, arrays.FORWARD, arrays.DEADBAND):
         for k in range(length.shape[0]):
             raw[row, k] *= dt
-    for row in (GOAL, GOAL_ANGLE, TWIRLING, LAG):
+    for row in (arrays.GOAL, arrays.GOAL_ANGLE, arrays.TWIRLING, arrays.LAG):
         for k in range(length.shape[0]):
             raw[row, k] *= per_step
-    for row in (COST, OBSTACLES, SPEED):
+    for row in (arrays.COST, arrays.OBSTACLES, arrays.SPEED):
         for k in range(length.shape[0]):
             raw[row, k] *= per_look
     for k in range(length.shape[0]):

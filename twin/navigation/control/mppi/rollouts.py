@@ -87,8 +87,6 @@ class Rollouts:
         furthest = furthest_reached(state, scene.path, scene.along, stride)
         at = follow_target(config, scene, furthest)
         active = {
-            "GoalCritic": length <= config.GoalCritic.threshold_to_consider,
-            "GoalAngleCritic": length <= config.GoalAngleCritic.threshold_to_consider,
             "PathAlignCritic": score_align(config, scene, furthest, points, hit, raw),
             "PathFollowCritic": score_follow(config, scene, at, state, raw),
             "PathAngleCritic": score_angle(config, scene, furthest, state, raw),

@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.navigation._jit import fast_jit
 from twin.navigation.control.footprint_cover import F32
-from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION, Costmap
+from twin.navigation.costmaps.costmap import FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, NO_INFORMATION
 
-ROWS = {
-    "ConstraintCritic": arrays.CONSTRAINT,
-    "CostCritic": arrays.COST,
-    "ObstaclesCritic": arrays.OBSTACLES,
-    "GoalCritic": arrays.GOAL,
-    "GoalAngleCritic": arrays.GOAL_ANGLE,
-    "PathAlignCritic": arrays.ALIGN,
-    "PathFollowCritic": arrays.FOLLOW,
-    "PathAngleCritic": arrays.ANGLE,
-    "PreferForwardCritic": arrays.FORWARD,
-    "TwirlingCritic": arrays.TWIRLING,
-    "VelocityDeadbandCritic": arrays.DEADBAND,
-    "SpeedCritic": arrays.SPEED,
-}
+NAMES = [field.name for field in fields(MPPIConfig) if field.name.endswith("Critic")]
+"""Of the critics, in the order of their rows."""
 
 
-def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
+def cost_tables(
+    config: MPPIConfig, inscribed_radius: float, cost_scaling_factor: float, near_goal: bool, vx_max: float
+) -> F32:
     """Return, by cost, shape (3, 256): CostCritic, ObstaclesCritic, and the speed that is allowed [m/s]."""
     cost = np.arange(256, dtype=np.float64)
     critic = config.CostCritic
-    clearance = costmap.inscribed_radius - np.log(np.maximum(cost, 1.0) / 252.0) / costmap.cost_scaling_factor
+    clearance = inscribed_radius - np.log(np.maximum(cost, 1.0) / 252.0) / cost_scaling_factor
     clearance = np.where(cost >= INSCRIBED_INFLATED_OBSTACLE, 0.0, clearance)
     pointwise = np.where(cost >= critic.near_collision_cost, critic.critical_cost, 0.0 if near_goal else cost)
     obstacles, speed = config.ObstaclesCritic, config.SpeedCritic
-    surface = clearance - costmap.inscribed_radius
+    surface = clearance - inscribed_radius
     margin = np.maximum(obstacles.collision_margin_distance - surface, 0.0)
     repulsion = 0.0 if near_goal else obstacles.repulsion_weight
     # Scores matter by their differences: Nav2's inflation radius in the repulsion drops out.
@@ -49,32 +39,15 @@ def cost_tables(config: MPPIConfig, costmap: Costmap, *, near_goal: bool, vx_max
     return tables.astype(np.float32)
 
 
-class CostTables:
-    """`cost_tables`, kept until something that they depend on changes."""
-
-    def __init__(self, config: MPPIConfig) -> None:
-        self._config = config
-        self._key: tuple[float, ...] | None = None
-        self._tables: F32 = np.zeros((3, 256), dtype=np.float32)
-
-    def of(self, costmap: Costmap, *, near_goal: bool, vx_max: float) -> F32:
-        """Return the tables; see `cost_tables`."""
-        key = (costmap.inscribed_radius, costmap.cost_scaling_factor, near_goal, vx_max)
-        if key != self._key:
-            self._key = key
-            self._tables = cost_tables(self._config, costmap, near_goal=near_goal, vx_max=vx_max)
-        return self._tables
-
-
 class Totals:
     """The weighted sum of the critics that score."""
 
     def __init__(self, config: MPPIConfig) -> None:
         self._names = [
-            name for name in ROWS if config.scores(name) and getattr(config, name).cost_weight != 0.0
+            name for name in NAMES if config.scores(name) and getattr(config, name).cost_weight != 0.0
         ]
         critics = [getattr(config, name) for name in self._names]
-        rows = [ROWS[name] for name in self._names]
+        rows = [NAMES.index(name) for name in self._names]
         # Nav2 weighs costs as fractions of 254.
         weights = [critic.cost_weight / (254.0 if critic is config.CostCritic else 1.0) for critic in critics]
         powers = [critic.cost_power for critic in critics]

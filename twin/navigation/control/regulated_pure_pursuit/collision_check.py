@@ -17,6 +17,7 @@ from twin.navigation.costmaps.costmap import (
     Costmap,
     collision_step,
     footprint_cost,
+    triple,
 )
 from twin.navigation.costmaps.footprint import radii
 from twin.navigation.costmaps.kernels import escapes
@@ -73,11 +74,10 @@ class CollisionCheck:
         try:
             self.check(v, w, pose, costmap, carrot, least)
         except NoValidControl:
-            at = float(pose.x), float(pose.y), float(pose.yaw)
             if footprint_cost(costmap, self._footprint, pose) == LETHAL_OBSTACLE:
                 ways = ((creep, w * creep / v), (0.0, _ESCAPE_TURN), (0.0, -_ESCAPE_TURN), (-creep, 0.0))
                 for way in ways:
-                    if escapes(costmap.costs, self._footprint, *at, *way, 0.05, 10, *costmap.frame):
+                    if escapes(costmap.costs, self._footprint, triple(pose), way, 0.05, 10, costmap.frame):
                         return way
                 raise
             for way in ((0.0, turn), (creep, w * creep / v)):

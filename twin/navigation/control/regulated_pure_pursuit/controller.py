@@ -35,13 +35,7 @@ class RegulatedPurePursuit(Controller):
         self._tolerance = config.xy_goal_tolerance
         self._collisions = CollisionCheck(config, self.footprint)
         self._handler = PathHandler(
-            config=PathHandlerConfig(
-                prune_distance=math.inf,
-                max_robot_pose_search_dist=config.max_robot_pose_search_dist,
-                enforce_path_inversion=config.allow_reversing,
-                inversion_xy_tolerance=config.inversion_xy_tolerance,
-                inversion_yaw_tolerance=config.inversion_yaw_tolerance,
-            )
+            PathHandlerConfig.of(config), to_cusps=config.allow_reversing, prune_distance=math.inf
         )
 
     def set_plan(self, path: Array) -> None:
@@ -109,11 +103,7 @@ class RegulatedPurePursuit(Controller):
     def _turn_in_place(self, now: Situation, ahead: LocalPath, off: float, bearing: float) -> float | None:
         """Return the rate of a turn to the goal's heading, or to a carrot aside; None: drive.
 
-        Args:
-            now: The situation.
-            ahead: The local path.
-            off: Distance to its end [m].
-            bearing: Of the carrot [rad].
+        `off` is the distance to the local path's end [m], `bearing` the carrot's [rad].
         """
         self._reached_xy = self._is_there(self._reached_xy, off, at_end=ahead.ends_at_goal)
         if not self.config.use_rotate_to_heading:

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import TypeVar
 
 from twin.geometry import Array, Pose2
 from twin.navigation.control.controller import Controller
 from twin.navigation.control.goal_checker import GoalChecker
-from twin.navigation.control.path_handler import PathHandler, PathHandlerConfig
+from twin.navigation.control.path_handler import PathHandler
 from twin.navigation.control.progress_checker import ProgressChecker
-from twin.navigation.failures import ControlFailure
-from twin.navigation.plugins import GOAL_CHECKERS, PROGRESS_CHECKERS, create
-from twin.nodes.navigation.controller_server.config import ControllerServerConfig
-from twin.nodes.navigation.robot_pose import RobotPose
 
 P = TypeVar("P")
 
@@ -57,60 +51,7 @@ class FollowGoal:
     """Whether the robot stands because it is not."""
 
 
-def follow_goal(
-    request: Any,
-    controllers: Mapping[str, Controller],
-    config: ControllerServerConfig,
-    before: FollowGoal | None,
-    robot_pose: RobotPose,
-    now_ns: int,
-) -> FollowGoal:
-    """Return what a request asks for.
-
-    Args:
-        request: The goal of the action.
-        controllers: By name.
-        config: With the checkers, by name.
-        before: The goal that this one preempts: it is no new chance, its patience is used up, too.
-        robot_pose: Knows the frame of the path.
-        now_ns: The time.
-
-    Raises:
-        Abort: a plugin is unknown, or the path cannot be followed.
-    """
-    controller = _chosen("controller", controllers, request.controller_id)
-    goal_checker = create(
-        GOAL_CHECKERS, _chosen("goal checker", config.goal_checkers, request.goal_checker_id)
-    )
-    progress = _chosen("progress checker", config.progress_checkers, request.progress_checker_id)
-    path = robot_pose.path_in_map(request.path)
-    if path is None:
-        frame = request.path.header.frame_id
-        raise Abort(TF_ERROR, f"the path's frame {frame!r} has no transform to {robot_pose.frames.map!r}")
-    if not len(path) or not np.isfinite(path).all():
-        raise Abort(INVALID_PATH, "the path is empty or not finite")
-    handler = PathHandler(config=PathHandlerConfig(enforce_path_inversion=False))
-    handler.accept(path)
-    controller.set_goal_tolerance(goal_checker.xy_tolerance)
-    try:
-        controller.set_plan(path)
-    except ControlFailure as failure:
-        raise Abort(failure.error_code, str(failure)) from failure
-    return FollowGoal(
-        path=path,
-        controller=controller,
-        goal_checker=goal_checker,
-        progress_checker=before.progress_checker if before else create(PROGRESS_CHECKERS, progress),
-        handler=handler,
-        last_valid_ns=before.last_valid_ns if before else now_ns,
-        searched_ns=before.searched_ns if before else now_ns,
-        blocked_ns=before.blocked_ns if before else None,
-        freed_at=before.freed_at if before else None,
-        current_ns=now_ns,
-    )
-
-
-def _chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:
+def chosen(kind: str, plugins: Mapping[str, P], name: str) -> P:
     """Return the plugin that a goal names; without a name the first."""
     if not name:
         return next(iter(plugins.values()))

@@ -1,7 +1,7 @@
 """`/controller_server`: the `follow_path` action; publishes `cmd_vel_nav`, as in Nav2.
 
-A goal becomes a `controller_goal.py:FollowGoal`; each period `controller_command.py:Commander` finds the
-command for it, and `controller_display.py:ControllerDisplay` shows what is followed.
+A goal becomes a `goal.py:FollowGoal`; each period `command.py:Commander` finds the command for it, and
+`display.py:ControllerDisplay` shows what is followed.
 """
 
 from __future__ import annotations
@@ -17,16 +17,19 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Odometry, SpeedLimit, Twist, new
 from twin.geometry import Array, Pose2
-from twin.navigation.plugins import CONTROLLERS, create
+from twin.navigation.control.path_handler import PathHandler
+from twin.navigation.failures import ControlFailure
+from twin.navigation.plugins import CONTROLLERS, GOAL_CHECKERS, PROGRESS_CHECKERS, create
 from twin.nodes.navigation.controller_server.command import Commander
 from twin.nodes.navigation.controller_server.config import ControllerServerConfig
 from twin.nodes.navigation.controller_server.display import ControllerDisplay
 from twin.nodes.navigation.controller_server.goal import (
     FAILED_TO_MAKE_PROGRESS,
+    INVALID_PATH,
     TF_ERROR,
     Abort,
     FollowGoal,
-    follow_goal,
+    chosen,
 )
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -137,12 +140,42 @@ class ControllerServerNode:
                     controller.reset()
 
     def _begin(self, request: Any) -> FollowGoal:
-        before = self._preempted
-        goal = follow_goal(request, self.controllers, self.config, before, self._robot_pose, self.node.now_ns)
-        if before is not None and not np.array_equal(before.path[-1], goal.path[-1]):
+        """Return what a request asks for; raises Abort if a plugin is unknown, or the path is none to follow.
+
+        A goal that preempts another is no new chance: that one's patience is used up, too.
+        """
+        config, before, now = self.config, self._preempted, self.node.now_ns
+        controller = chosen("controller", self.controllers, request.controller_id)
+        checker = create(GOAL_CHECKERS, chosen("goal checker", config.goal_checkers, request.goal_checker_id))
+        progress = chosen("progress checker", config.progress_checkers, request.progress_checker_id)
+        path = self._robot_pose.path_in_map(request.path)
+        if path is None:
+            frames = f"{request.path.header.frame_id!r} has no transform to {self._robot_pose.frames.map!r}"
+            raise Abort(TF_ERROR, f"the path's frame {frames}")
+        if not len(path) or not np.isfinite(path).all():
+            raise Abort(INVALID_PATH, "the path is empty or not finite")
+        handler = PathHandler(to_cusps=False)
+        handler.accept(path)
+        controller.set_goal_tolerance(checker.xy_tolerance)
+        try:
+            controller.set_plan(path)
+        except ControlFailure as failure:
+            raise Abort(failure.error_code, str(failure)) from failure
+        if before is not None and not np.array_equal(before.path[-1], path[-1]):
             self._commander.maneuver.drop()  # it leads to another goal
-        self._preempted = goal
-        return goal
+        self._preempted = FollowGoal(
+            path=path,
+            controller=controller,
+            goal_checker=checker,
+            progress_checker=before.progress_checker if before else create(PROGRESS_CHECKERS, progress),
+            handler=handler,
+            last_valid_ns=before.last_valid_ns if before else now,
+            searched_ns=before.searched_ns if before else now,
+            blocked_ns=before.blocked_ns if before else None,
+            freed_at=before.freed_at if before else None,
+            current_ns=now,
+        )
+        return self._preempted
 
     def _control(self, goal: FollowGoal, handle: GoalHandle) -> bool:
         """Command the base once; return whether the goal is reached."""

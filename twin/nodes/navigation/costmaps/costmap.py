@@ -196,23 +196,21 @@ class CostmapNode:
         watch.take(points, odom, stamp_ns)
 
     def _update(self) -> None:
-        layers = self._layers
+        layers, ranges = self._layers, [*self._ranges]
+        self._ranges.clear()
         if layers is None:
-            self._ranges.clear()
             return
         robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
         if self.config.layers.rolling_window:
             if robot is None:
-                self._ranges.clear()
                 return
             layers.move_to(robot.x, robot.y)
         for source in self._scans.values():
             if source.fresh is not None:
                 source.last, source.fresh = source.fresh, None
                 self._take_scan(layers, source.last)
-        for message in self._ranges:
+        for message in ranges:
             self._take_range(layers, message)
-        self._ranges.clear()
         layers.update_layers(robot, self.node.now_ns)
         if self._keepout is not None:
             self._keepout.update(layers, robot)

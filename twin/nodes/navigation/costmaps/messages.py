@@ -5,21 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import Costmap as CostmapMessage
-from twin.bridge.msgs import (
-    CostmapMetaData,
-    OccupancyGrid,
-    Point32,
-    Polygon,
-    PolygonStamped,
-    header,
-    stamp,
-)
+from twin.bridge.msgs import CostmapMetaData, OccupancyGrid, Point32, Polygon, PolygonStamped, header, stamp
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
+    FREE_SPACE,
     INSCRIBED_INFLATED_OBSTACLE,
     LETHAL_OBSTACLE,
     NO_INFORMATION,
@@ -27,18 +19,9 @@ from twin.navigation.costmaps.costmap import (
 )
 from twin.nodes.navigation.mapping.map_server import grid_msg
 
-
-def _occupancy_of_costs() -> NDArray[np.int8]:
-    """Return nav2_costmap_2d's table from costs to the values of an OccupancyGrid."""
-    table = 1 + (97 * (np.arange(256) - 1)) // 251
-    table[0] = 0
-    table[INSCRIBED_INFLATED_OBSTACLE] = 99
-    table[LETHAL_OBSTACLE] = 100
-    table[NO_INFORMATION] = -1
-    return table.astype(np.int8)
-
-
-_OCCUPANCY = _occupancy_of_costs()
+_OCCUPANCY = (1 + (97 * (np.arange(256) - 1)) // 251).astype(np.int8)
+"""nav2_costmap_2d's table from costs to the values of an OccupancyGrid."""
+_OCCUPANCY[[FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, NO_INFORMATION]] = 0, 99, 100, -1
 
 
 def occupancy_grid(grid: Costmap, frame: str, time_ns: int) -> OccupancyGrid:

@@ -71,14 +71,12 @@ class CostmapServices:
         return new(ClearCostmapExceptRegion.Response)
 
     def _clear_around_pose(self, request: Any) -> Any:
-        pose = pose2_from_pose(request.pose.pose)
         frame = request.pose.header.frame_id
+        T: Pose2 | None = Pose2(0.0, 0.0, 0.0)
         if frame and frame != self._frame:
             T = self._pose.relative(self._frame, frame)
-            pose_here = None if T is None else T @ pose
-        else:
-            pose_here = pose
-        self._clear(pose_here, request.reset_distance, outside=False)
+        pose = None if T is None else T @ pose2_from_pose(request.pose.pose)
+        self._clear(pose, request.reset_distance, outside=False)
         return new(ClearCostmapAroundPose.Response)
 
     def _robot(self) -> Pose2 | None:
@@ -97,15 +95,11 @@ class CostmapServices:
     def _get_cost(self, request: Any) -> Any:
         """Answer the cost at a point, or the worst under the footprint's outline; -1 off the costmap."""
         layers = self._layers()
-        cost = -1.0
         at = Pose2(float(request.x), float(request.y), float(request.theta))
-        if layers is not None and all(map(math.isfinite, at)) and layers.costmap.contains(at.x, at.y):
-            grid = layers.costmap
-            cost = (
-                footprint_cost(grid, layers.config.polygon, at)
-                if request.use_footprint
-                else grid.cost_at(at.x, at.y)
-            )
+        if layers is None or not all(map(math.isfinite, at)) or not layers.costmap.contains(at.x, at.y):
+            return new(GetCost.Response, cost=-1.0)
+        grid, outlined = layers.costmap, request.use_footprint
+        cost = footprint_cost(grid, layers.config.polygon, at) if outlined else grid.cost_at(at.x, at.y)
         return new(GetCost.Response, cost=float(cost))
 
     def _get_costmap(self, _request: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from twin.bridge.action_types import DockRobot
+from twin.bridge.action_types import DockRobot, UndockRobot
 from twin.bridge.actions import GoalHandle
 from twin.bridge.msgs import duration, new
 
@@ -39,8 +39,9 @@ class Attempt:
                 new(DockRobot.Feedback, state=state, docking_time=time, num_retries=self.retries)
             )
 
-    def failed(self, code: int, reason: str) -> Any:
-        """Return the result of a docking that failed."""
-        return new(
-            DockRobot.Result, success=False, error_code=code, num_retries=self.retries, error_msg=reason
-        )
+    def result(self, error_code: int = 0, reason: str = "") -> Any:
+        """Return the action's result; without an error code it is a success."""
+        told = {"success": not error_code, "error_code": error_code, "error_msg": reason}
+        if isinstance(self.handle.request, DockRobot.Goal):
+            return new(DockRobot.Result, num_retries=self.retries, **told)
+        return new(UndockRobot.Result, **told)

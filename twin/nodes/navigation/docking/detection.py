@@ -39,10 +39,7 @@ class DockDetection:
         if type_.detection != "none" and not type_.use_external_detection_pose:
             face = docked @ type_.T_detected_docked.inverse()
             self._estimate = DockEstimate(
-                face,
-                self._config,
-                wants_box=type_.detection == "box",
-                face_width=type_.face_width,
+                face, self._config, wants_box=type_.detection == "box", face_width=type_.face_width
             )
 
     def end(self) -> None:

@@ -79,31 +79,39 @@ class DockingServerNode:
         )
         self._navigator = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
         self.node.create_subscription(BatteryState, "battery_state", self._on_battery_state, 1)
-        ActionServer(self.node, DockRobot, "dock_robot", self._dock_robot, _is_finite)
-        ActionServer(self.node, UndockRobot, "undock_robot", self._undock_robot, _is_finite)
+        ActionServer(self.node, DockRobot, "dock_robot", self._serving(self._dock_robot), _is_finite)
+        ActionServer(self.node, UndockRobot, "undock_robot", self._serving(self._undock_robot), _is_finite)
 
     def _on_battery_state(self, message: BatteryState) -> None:
         self._current = message.current
 
+    def _serving(self, work: Callable[[Attempt], Work]) -> Callable[[GoalHandle], Work]:
+        """Return what serves an action: it ends as its work ends, and the robot stands."""
+
+        def serve(handle: GoalHandle) -> Work:
+            attempt = Attempt(handle, self.node.now_ns)
+            try:
+                yield from work(attempt)
+                return attempt.result()
+            except Cancelled:
+                handle.canceled()
+                return attempt.result(FAILED_TO_CONTROL, "canceled")
+            except DockError as error:
+                handle.abort()
+                return attempt.result(error.code, str(error))
+            finally:
+                self._drive.stop()
+
+        return serve
+
     # Docking
 
-    def _dock_robot(self, handle: GoalHandle) -> Work:
-        attempt = Attempt(handle, self.node.now_ns)
-        try:
-            dock = self._requested(handle.request)
-            type_ = self.config.database.type_of(dock.type)
-            yield from self._stage(attempt, dock, type_)
-            yield from self._dock_at(attempt, self._in_odom(dock), type_)
-            self._docked_type = dock.type
-            return new(DockRobot.Result, success=True, num_retries=attempt.retries)
-        except Cancelled:
-            handle.canceled()
-            return attempt.failed(FAILED_TO_CONTROL, "canceled")
-        except DockError as error:
-            handle.abort()
-            return attempt.failed(error.code, str(error))
-        finally:
-            self._drive.stop()
+    def _dock_robot(self, attempt: Attempt) -> Work:
+        dock = self._requested(attempt.handle.request)
+        type_ = self.config.database.type_of(dock.type)
+        yield from self._stage(attempt, dock, type_)
+        yield from self._dock_at(attempt, self._in_odom(dock), type_)
+        self._docked_type = dock.type
 
     def _requested(self, goal: Any) -> Dock:
         if goal.use_dock_id:
@@ -217,28 +225,16 @@ class DockingServerNode:
 
     # Undocking
 
-    def _undock_robot(self, handle: GoalHandle) -> Work:
-        goal = handle.request
-        attempt = Attempt(handle, self.node.now_ns)
-        try:
-            type_ = self.config.database.type_of(goal.dock_type or self._docked_type)
-            pose = self._robot_pose.in_odom()
-            if pose is None:
-                raise DockError(FAILED_TO_CONTROL, "no odometry")
-            target = pose @ Pose2(-self._way_to_staging(pose, type_), 0.0, 0.0)
-            config = replace(self.config.undock, time_allowance=goal.max_undocking_time)
-            docked = self._left_for or pose
-            yield from self._drive.drive(attempt, lambda: target, config, backward=True, docked=docked)
-        except Cancelled:
-            handle.canceled()
-            return new(UndockRobot.Result, success=False, error_code=FAILED_TO_CONTROL, error_msg="canceled")
-        except DockError as error:
-            handle.abort()
-            return new(UndockRobot.Result, success=False, error_code=error.code, error_msg=str(error))
-        finally:
-            self._drive.stop()
+    def _undock_robot(self, attempt: Attempt) -> Work:
+        goal, pose = attempt.handle.request, self._robot_pose.in_odom()
+        type_ = self.config.database.type_of(goal.dock_type or self._docked_type)
+        if pose is None:
+            raise DockError(FAILED_TO_CONTROL, "no odometry")
+        target = pose @ Pose2(-self._way_to_staging(pose, type_), 0.0, 0.0)
+        config = replace(self.config.undock, time_allowance=goal.max_undocking_time)
+        docked = self._left_for or pose
+        yield from self._drive.drive(attempt, lambda: target, config, backward=True, docked=docked)
         self._left_for, self._docked_type = None, ""
-        return new(UndockRobot.Result, success=True)
 
     def _way_to_staging(self, pose: Pose2, type_: DockType) -> float:
         """Return how far to back off [m]: none if the robot never left the staging pose for the dock."""

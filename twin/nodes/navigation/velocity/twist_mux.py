@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Twist
@@ -11,7 +11,7 @@ from twin.controllers.twist_mux import MuxInput, TwistMux
 
 _WHEELS = "cmd_vel"
 
-DEFAULT_INPUTS = (
+_INPUTS = (
     MuxInput(name="navigation", topic="cmd_vel_smoothed", priority=10),
     MuxInput(name="docking", topic="cmd_vel_docking", priority=20, guarded=False),
     MuxInput(name="teleop", topic="cmd_vel_teleop", priority=100),
@@ -24,20 +24,13 @@ class TwistMuxNode:
     Docking goes past a collision monitor behind it: it is meant to come near to things, and looks at them.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        *,
-        inputs: Sequence[MuxInput] = DEFAULT_INPUTS,
-        output: str = _WHEELS,
-        namespace: str = "",
-    ) -> None:
+    def __init__(self, bus: Bus, *, output: str = _WHEELS, namespace: str = "") -> None:
         self.node = bus.create_node("twist_mux", namespace)
-        self.mux = TwistMux(inputs)
+        self.mux = TwistMux(_INPUTS)
         guarded = direct = self.node.create_publisher(Twist, output, 10)
-        if output != _WHEELS and not all(source.guarded for source in inputs):
+        if output != _WHEELS:
             direct = self.node.create_publisher(Twist, _WHEELS, 10)
-        for source in inputs:
+        for source in _INPUTS:
             publisher = guarded if source.guarded else direct
             self.node.create_subscription(Twist, source.topic, self._callback(source.name, publisher), 10)
 

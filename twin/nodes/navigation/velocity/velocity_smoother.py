@@ -13,12 +13,7 @@ class VelocitySmootherNode:
     """Publishes at a fixed rate while there is something to follow or to bring to rest."""
 
     def __init__(
-        self,
-        bus: Bus,
-        config: VelocitySmootherConfig,
-        *,
-        period_ns: int = 20_000_000,
-        namespace: str = "",
+        self, bus: Bus, config: VelocitySmootherConfig, *, period_ns: int = 20_000_000, namespace: str = ""
     ) -> None:
         self.node = bus.create_node("velocity_smoother", namespace)
         self.smoother = VelocitySmoother(config)
