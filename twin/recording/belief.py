@@ -16,7 +16,7 @@ import rerun as rr
 
 from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
 from twin.periods import Period, next_due
-from twin.recording.columns import ScalarColumns, TrailColumns, TransformColumns
+from twin.recording.columns import Columns, TrailColumns, TransformColumns, scalars
 from twin.recording.frames import WORLD, Frames
 from twin.recording.placing import Placed
 
@@ -87,18 +87,13 @@ class Belief:
                 rr.CoordinateFrame(WORLD),
                 static=True,
             )
-        self._error_xy = ScalarColumns(f"/localisation/{robot}/position_error")
-        self._error_yaw = ScalarColumns(f"/localisation/{robot}/yaw_error")
-        recording.log(
-            self._error_xy.entity,
-            rr.SeriesLines(names=["position error [m]"], colors=[ESTIMATE_COLOUR]),
-            static=True,
-        )
-        recording.log(
-            self._error_yaw.entity,
-            rr.SeriesLines(names=["yaw error [rad]"], colors=[ODOMETRY_COLOUR]),
-            static=True,
-        )
+        self._error_xy = Columns(f"/localisation/{robot}/position_error", scalars)
+        self._error_yaw = Columns(f"/localisation/{robot}/yaw_error", scalars)
+        for columns, name, colour in (
+            (self._error_xy, "position error [m]", ESTIMATE_COLOUR),
+            (self._error_yaw, "yaw error [rad]", ODOMETRY_COLOUR),
+        ):
+            recording.log(columns.entity, rr.SeriesLines(names=[name], colors=[colour]), static=True)
 
     def on_transform(self, time_ns: int, parent: str, child: str, transform: Any) -> None:
         """Take one transform of `/tf` whose parent is `map` or `odom`.
@@ -138,13 +133,13 @@ class Belief:
             self._anchor = self._start(time_ns, odom, child, T_odom_base)
             self._draw_ghost(time_ns, self._frames.belief(self._namespace, child), transform.translation.z)
         odometry = self._anchor @ T_odom_base
-        self._trails["odometry"].append(time_ns, odometry.x, odometry.y, FLOOR_HEIGHT)
+        self._trails["odometry"].visit(time_ns, odometry.x, odometry.y, FLOOR_HEIGHT)
         estimate = None if self._T_map_odom is None else self._T_map_odom @ T_odom_base
         if estimate is not None:
-            self._trails["estimate"].append(time_ns, estimate.x, estimate.y, FLOOR_HEIGHT + 0.01)
+            self._trails["estimate"].visit(time_ns, estimate.x, estimate.y, FLOOR_HEIGHT + 0.01)
         if self._base is not None:
             truth = self._true_pose(self._base).to_pose2()
-            self._trails["truth"].append(time_ns, truth.x, truth.y, FLOOR_HEIGHT - 0.01)
+            self._trails["truth"].visit(time_ns, truth.x, truth.y, FLOOR_HEIGHT - 0.01)
             if estimate is not None:
                 error = truth.inverse() @ estimate
                 self._error_xy.append(time_ns, math.hypot(error.x, error.y))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import rerun as rr
 
@@ -12,7 +12,9 @@ from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 from twin.recording.frames import WORLD
 from twin.recording.meshes import declare_mesh
 from twin.recording.solids import Rgba8, Solid
-from twin.recording.sources import BodyShape
+
+if TYPE_CHECKING:
+    from twin.sim.shapes import BodyShape
 
 FLOOR_COLOUR = (96, 100, 106, 255)
 FLOOR_MARGIN = 1.0

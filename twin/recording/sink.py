@@ -14,7 +14,7 @@ import numpy as np
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
 from twin.recording.frames import WORLD, Frames
-from twin.recording.sources import Sample, World
+from twin.recording.sources import Sample
 
 if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays for it
     import rerun as rr
@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays f
     from twin.recording.channels.channel import Channel, Context
     from twin.recording.columns import TransformColumns
     from twin.recording.extents import RobotBox, Stage
+    from twin.sim.world import World
 
 _NS = 1_000_000_000
 _RING_RADIUS = 0.3
