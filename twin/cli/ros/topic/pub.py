@@ -39,6 +39,7 @@ class PublishPlan:
     print_every: Annotated[
         int, typer.Option("--print", "-p", min=0, metavar="N", help="Print every N-th message.")
     ] = 1
+    """0: never."""
     wait: Annotated[
         int | None,
         typer.Option(
