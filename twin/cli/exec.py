@@ -6,19 +6,12 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Factory, Joining, joins
 
 
 @joins
 def execute(
-    place: Annotated[
-        str,
-        typer.Argument(
-            metavar="FILE.py:FACTORY",
-            help="A function that takes the bus and returns a node, or a list of them.",
-            show_default=False,
-        ),
-    ],
+    place: Factory,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="Be stepped by a run that waits for a node of this process.")
     ] = False,
@@ -40,6 +33,6 @@ def execute(
         return
     from twin.bridge import lockstep as stepped
 
-    with stepped.join(joining.connect, config=joining.config, domain_id=joining.domain_id) as process:
+    with stepped.join(joining.connect or None, config=joining.config, domain_id=joining.domain) as process:
         create_nodes(process.bus, place)
         process.spin()

@@ -7,8 +7,9 @@ is sent once a block. Importing this module imports rerun (0.6 s): only a run th
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
+from typing import Generic, TypeVarTuple
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
@@ -19,6 +20,9 @@ TIMELINE = "sim_time"
 """The one timeline: simulated time as a duration, from integer nanoseconds."""
 
 Points = NDArray[np.float32]
+"""Shape (n, 3) [m] in the frame of the entity."""
+Point = tuple[float, float, float]
+Row = TypeVarTuple("Row")
 
 
 def sim_time(times_ns: Sequence[int]) -> rr.TimeColumn:
@@ -26,198 +30,105 @@ def sim_time(times_ns: Sequence[int]) -> rr.TimeColumn:
     return rr.TimeColumn(TIMELINE, duration=np.array(times_ns, dtype="timedelta64[ns]"))
 
 
-class Columns(ABC):
+class Columns(Generic[*Row]):
     """Rows of one entity that wait to be sent."""
 
-    def __init__(self, entity: str) -> None:
+    def __init__(
+        self, entity: str, make: Callable[[list[tuple[*Row]]], Iterable[rr.ComponentColumn]]
+    ) -> None:
+        """Start empty; `make` turns rows into Rerun's columns."""
         self.entity = entity
+        self._make = make
         self._times: list[int] = []
+        self._rows: list[tuple[*Row]] = []
 
-    def __len__(self) -> int:
-        return len(self._times)
+    def append(self, time_ns: int, *row: *Row) -> None:
+        """Add a row at a time [ns]."""
+        self._times.append(time_ns)
+        self._rows.append(row)
 
     def send(self, recording: rr.RecordingStream) -> None:
         """Send and forget the rows."""
-        if self._times:
-            recording.send_columns(self.entity, [sim_time(self._times)], self._take())
+        if self._rows:
+            recording.send_columns(self.entity, [sim_time(self._times)], self._make(self._rows))
             self._times.clear()
-
-    @abstractmethod
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        """Return the columns of all rows and clear them."""
+            self._rows.clear()
 
 
-class TransformColumns(Columns):
+def points(rows: list[tuple[Points]]) -> Iterable[rr.ComponentColumn]:
+    """Return a point cloud per row."""
+    clouds = [cloud for (cloud,) in rows]
+    return rr.Points3D.columns(positions=np.concatenate(clouds)).partition(list(map(len, clouds)))
+
+
+def arrows(rows: list[tuple[Points, Points]]) -> Iterable[rr.ComponentColumn]:
+    """Return a bundle of arrows per row, of origins and vectors."""
+    origins, vectors = zip(*rows, strict=True)
+    columns = rr.Arrows3D.columns(origins=np.concatenate(origins), vectors=np.concatenate(vectors))
+    return columns.partition(list(map(len, origins)))
+
+
+def strips(rows: list[tuple[Points]]) -> Iterable[rr.ComponentColumn]:
+    """Return one line strip per row."""
+    return rr.LineStrips3D.columns(strips=[strip for (strip,) in rows])
+
+
+def scalars(rows: list[tuple[float]]) -> Iterable[rr.ComponentColumn]:
+    """Return a number per row."""
+    return rr.Scalars.columns(scalars=np.array(rows, dtype=np.float64).ravel())
+
+
+def states(rows: list[tuple[str]]) -> Iterable[rr.ComponentColumn]:
+    """Return the name of a state that is entered per row."""
+    return rr.StateChange.columns(state=[state for (state,) in rows])
+
+
+def log_lines(rows: list[tuple[str, str]]) -> Iterable[rr.ComponentColumn]:
+    """Return a line and its `rerun.TextLogLevel` per row."""
+    texts, levels = zip(*rows, strict=True)
+    return rr.TextLog.columns(text=texts, level=levels)
+
+
+class TransformColumns(Columns[str, list[str], ArrayLike, ArrayLike]):
     """Poses of many named frames in one entity; one row is one frame at one time."""
 
     def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._parents: list[str] = []
-        self._children: list[str] = []
-        self._xyz: list[ArrayLike] = []
-        self._quat_xyzw: list[ArrayLike] = []
+        super().__init__(entity, _poses)
 
     def append(
         self, time_ns: int, parent: str, children: list[str], xyz: ArrayLike, quat_xyzw: ArrayLike
     ) -> None:
         """Add the poses of `children` in `parent` at one time; `xyz` (n, 3) [m], `quat_xyzw` (n, 4)."""
-        n = len(children)
-        self._times += [time_ns] * n
-        self._parents += [parent] * n
-        self._children += children
-        self._xyz.append(xyz)
-        self._quat_xyzw.append(quat_xyzw)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.Transform3D.columns(
-            translation=np.concatenate(self._xyz, dtype=np.float32),
-            quaternion=np.concatenate(self._quat_xyzw, dtype=np.float32),
-            parent_frame=pa.array(self._parents, pa.string()),
-            child_frame=pa.array(self._children, pa.string()),
-        )
-        for rows in (self._parents, self._children, self._xyz, self._quat_xyzw):
-            rows.clear()
-        return columns
+        self._times += [time_ns] * len(children)
+        self._rows.append((parent, children, xyz, quat_xyzw))
 
 
-class PointColumns(Columns):
-    """A point cloud per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._clouds: list[Points] = []
-
-    def append(self, time_ns: int, points: Points) -> None:
-        """Add a cloud, shape (n, 3) [m] in the frame of the entity."""
-        self._times.append(time_ns)
-        self._clouds.append(points)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        lengths = [len(cloud) for cloud in self._clouds]
-        columns = rr.Points3D.columns(positions=np.concatenate(self._clouds)).partition(lengths)
-        self._clouds.clear()
-        return columns
+def _poses(rows: list[tuple[str, list[str], ArrayLike, ArrayLike]]) -> Iterable[rr.ComponentColumn]:
+    _, children, xyz, quat_xyzw = zip(*rows, strict=True)
+    return rr.Transform3D.columns(
+        translation=np.concatenate(xyz, dtype=np.float32),
+        quaternion=np.concatenate(quat_xyzw, dtype=np.float32),
+        parent_frame=pa.array([parent for parent, names, *_ in rows for _ in names], pa.string()),
+        child_frame=pa.array(list(chain.from_iterable(children)), pa.string()),
+    )
 
 
-class ArrowColumns(Columns):
-    """A bundle of arrows per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._origins: list[Points] = []
-        self._vectors: list[Points] = []
-
-    def append(self, time_ns: int, origins: Points, vectors: Points) -> None:
-        """Add a bundle; both shape (n, 3) [m] in the frame of the entity."""
-        self._times.append(time_ns)
-        self._origins.append(origins)
-        self._vectors.append(vectors)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        lengths = [len(origins) for origins in self._origins]
-        columns = rr.Arrows3D.columns(
-            origins=np.concatenate(self._origins), vectors=np.concatenate(self._vectors)
-        ).partition(lengths)
-        self._origins.clear()
-        self._vectors.clear()
-        return columns
-
-
-class StripColumns(Columns):
-    """One line strip per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._strips: list[Points] = []
-
-    def append(self, time_ns: int, points: Points) -> None:
-        """Add a strip, shape (n, 3) [m] in the frame of the entity."""
-        self._times.append(time_ns)
-        self._strips.append(points)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.LineStrips3D.columns(strips=list(self._strips))
-        self._strips.clear()
-        return columns
-
-
-class TrailColumns(Columns):
+class TrailColumns(Columns[Point, Point]):
     """A path travelled, one segment per row; the view shows every segment up to the cursor."""
 
     def __init__(self, entity: str, step_m: float) -> None:
-        super().__init__(entity)
+        super().__init__(entity, _segments)
         self._step_m = step_m
-        self._last: tuple[float, float, float] | None = None
-        self._segments: list[tuple[tuple[float, float, float], tuple[float, float, float]]] = []
+        self._last: Point | None = None
 
-    def append(self, time_ns: int, x: float, y: float, z: float) -> None:
+    def visit(self, time_ns: int, *point: *Point) -> None:
         """Add a position [m]; ignored until it is a step away from the last one kept."""
-        point = (x, y, z)
         if self._last is None:
             self._last = point
         elif math.dist(point, self._last) >= self._step_m:
-            self._times.append(time_ns)
-            self._segments.append((self._last, point))
+            self.append(time_ns, self._last, point)
             self._last = point
 
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.LineStrips3D.columns(strips=np.array(self._segments, dtype=np.float32))
-        self._segments.clear()
-        return columns
 
-
-class ScalarColumns(Columns):
-    """A number per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._rows: list[float] = []
-
-    def append(self, time_ns: int, value: float) -> None:
-        """Add a number."""
-        self._times.append(time_ns)
-        self._rows.append(value)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.Scalars.columns(scalars=np.array(self._rows, dtype=np.float64))
-        self._rows.clear()
-        return columns
-
-
-class StateColumns(Columns):
-    """The name of a state per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._states: list[str] = []
-
-    def append(self, time_ns: int, state: str) -> None:
-        """Add the state entered at this time."""
-        self._times.append(time_ns)
-        self._states.append(state)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.StateChange.columns(state=self._states.copy())
-        self._states.clear()
-        return columns
-
-
-class LogColumns(Columns):
-    """A log line per row."""
-
-    def __init__(self, entity: str) -> None:
-        super().__init__(entity)
-        self._texts: list[str] = []
-        self._levels: list[str] = []
-
-    def append(self, time_ns: int, text: str, level: str) -> None:
-        """Add a line; `level` is a `rerun.TextLogLevel`."""
-        self._times.append(time_ns)
-        self._texts.append(text)
-        self._levels.append(level)
-
-    def _take(self) -> Iterable[rr.ComponentColumn]:
-        columns = rr.TextLog.columns(text=self._texts.copy(), level=self._levels.copy())
-        self._texts.clear()
-        self._levels.clear()
-        return columns
+def _segments(rows: list[tuple[Point, Point]]) -> Iterable[rr.ComponentColumn]:
+    return rr.LineStrips3D.columns(strips=np.array(rows, dtype=np.float32))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,10 @@ from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.models.mesh.meshes import read_mesh
 from twin.models.shapes import Geometry, Mesh
 from twin.models.solids import reach
-from twin.recording.sources import BodyShape, World
+
+if TYPE_CHECKING:
+    from twin.sim.shapes import BodyShape
+    from twin.sim.world import World
 
 _LEAST_ROBOT = 0.05
 """Edge of the box around a robot without shapes [m]."""

@@ -9,9 +9,7 @@ from twin.bridge.conversions import transform_from_pose3
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
 from twin.bridge.qos import LATCHED, QoS
-from twin.bridge.tf.buffer import (
-    TransformBuffer,
-)
+from twin.bridge.tf.buffer import TransformBuffer
 from twin.bridge.tf.cache import UNKNOWN_AUTHORITY
 from twin.bridge.tf.wait import TransformFuture
 from twin.geometry import Pose3
@@ -61,7 +59,7 @@ class TransformListener:
     """Fills a buffer from /tf and /tf_static, in the node's spin."""
 
     def __init__(self, buffer: TransformBuffer, node: Node) -> None:
-        self._buffer = buffer
+        self.buffer = buffer
         self._node = node
         self._refused: set[str] = set()
         self._broadcasters: dict[bytes, Broadcaster] = {}
@@ -88,7 +86,7 @@ class TransformListener:
                 with the reason. None: for ever.
         """
         deadline_ns = None if timeout_ns is None else self._node.now_ns + timeout_ns
-        future = self._buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
+        future = self.buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
         if deadline_ns is not None and not self._expires:
             self._expires = True
             self._node.create_timer(_EXPIRY_NS, self._expire)
@@ -102,7 +100,7 @@ class TransformListener:
         subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
 
     def _expire(self) -> None:
-        self._buffer.waiting.expire(self._node.now_ns)
+        self.buffer.waiting.expire(self._node.now_ns)
 
     def _on_message(self, message: TFMessage, static: bool, gid: bytes | None) -> None:
         authority = self._broadcaster(gid)
@@ -111,7 +109,7 @@ class TransformListener:
         for item in message.transforms:
             try:
                 t, q = item.transform.translation, item.transform.rotation
-                self._buffer.set_rigid(
+                self.buffer.set_rigid(
                     item.header.frame_id,
                     item.child_frame_id,
                     ns(item.header.stamp),

@@ -4,41 +4,14 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from twin.bridge.msgs import (
-    LaserScan,
-    Quaternion,
-    Time,
-    Transform,
-    TransformStamped,
-    Vector3,
-    header,
-    ns,
-)
+from twin.bridge.msgs import LaserScan, Quaternion, Time, Transform, TransformStamped, Vector3, header, ns
 from twin.bridge.tf.core import BufferCore
-from twin.bridge.tf.errors import (
-    DisconnectedFramesError,
-    ExtrapolationError,
-    InvalidFrameError,
-    TransformError,
-    TransformTimeoutError,
-    UnknownFrameError,
-)
 from twin.bridge.tf.laser import transform_laser_scan
 from twin.bridge.tf.report import frame_infos, frames_as_string, frames_as_yaml
 from twin.bridge.tf.rigid import Rigid
 from twin.bridge.tf.transforms import do_transform
 from twin.bridge.tf.wait import TransformFuture, Waiting
 from twin.errors import BridgeError
-
-__all__ = [
-    "DisconnectedFramesError",
-    "ExtrapolationError",
-    "InvalidFrameError",
-    "TransformBuffer",
-    "TransformError",
-    "TransformTimeoutError",
-    "UnknownFrameError",
-]
 
 M = TypeVar("M")
 AnyTime = int | Time | None
@@ -95,8 +68,7 @@ class TransformBuffer(BufferCore):
         if isinstance(message, LaserScan):
             raise BridgeError("a LaserScan becomes a cloud in another frame: use transform_laser_scan")
         here = self.lookup_transform(target_frame, stamped.header.frame_id, stamped.header.stamp)
-        transformed: M = do_transform(message, here)
-        return transformed
+        return do_transform(message, here)
 
     def transform_full(self, message: M, target_frame: str, target_time: AnyTime, fixed_frame: str) -> M:
         """Return a stamped message as seen from a frame at another time, while `fixed_frame` did not move.
@@ -106,12 +78,9 @@ class TransformBuffer(BufferCore):
             BridgeError: messages of this type cannot be transformed.
         """
         stamped: Any = message
-        source = stamped.header
-        transformed: M = do_transform(
-            message,
-            self.lookup_transform_full(target_frame, target_time, source.frame_id, source.stamp, fixed_frame),
-        )
-        return transformed
+        frame, time = stamped.header.frame_id, stamped.header.stamp
+        there = self.lookup_transform_full(target_frame, target_time, frame, time, fixed_frame)
+        return do_transform(message, there)
 
     def transform_laser_scan(self, scan: LaserScan, target_frame: str, *, range_cutoff: float = -1.0) -> Any:
         """Return a scan as a PointCloud2 in another frame; see `tf_laser.transform_laser_scan`.

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
 from twin.cli.console import print_error, stderr, stdout
-from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
+from twin.cli.interrupted import sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import run_folder
 from twin.cli.run.options import RunOptions
 from twin.cli.run.progress import run_progress
 from twin.errors import TwinError
 
-if TYPE_CHECKING:
-    from twin.runtime import Progress
 
-
-def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
+def run_once(options: RunOptions) -> int:
     """Run, write the verdict, print it, and return the exit code."""
     from twin.bridge.programs.console_log import show_warnings
 
@@ -30,23 +24,23 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         options.scenario,
         overrides=options.overrides,
         params_file=options.params_file,
-        out=out or run_folder,
-        record=options.record,
+        out=options.out or run_folder,
+        record=not options.no_record,
         bag=options.bag,
-        bag_hidden_topics=options.bag_hidden_topics,
+        bag_hidden_topics=options.include_hidden_topics,
         save_model=options.save_model,
-        pace=options.pace,
+        pace=options.speed,
         network=options.network,
-        nodes=options.nodes,
-        wait_for=options.wait_for,
+        nodes=options.node or (),
+        wait_for=options.wait_for or (),
         wait_timeout=options.wait_timeout,
         free=options.free,
         on_execute=lambda file: stderr().print(f"executes {file}"),
     )
     fault = None
     try:
-        with run_progress(options.scenario.stem) as bar:
-            simulation.run(_progress(bar))
+        with run_progress(options.scenario.stem) as progress:
+            simulation.run(progress)
     except TwinError as error:
         fault = error
         print_error(error)
@@ -55,7 +49,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
             replace(simulation.verdict, error="interrupted").write(simulation.folder)
         raise
     verdict = simulation.verdict
-    if as_json:
+    if options.json:
         sys.stdout.write(verdict.to_json())
     elif fault is None:
         from twin.cli.run.verdict_table import verdict_report
@@ -63,12 +57,3 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         assert simulation.folder is not None
         stdout().print(verdict_report(verdict.to_dict(), simulation.folder))
     return verdict.exit_code
-
-
-def _progress(bar: Callable[[Progress], None] | None) -> Callable[[Progress], None]:
-    def show(now: Progress) -> None:
-        raise_swallowed()
-        if bar is not None:
-            bar(now)
-
-    return show

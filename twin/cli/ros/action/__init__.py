@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.ros.action.goal import send_goal
-from twin.cli.ros.graph_names import absolute, unknown
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.graph_names import absolute, of_type, print_names, unknown
+from twin.cli.ros.joining import Joining, on_graph
 
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo
@@ -19,27 +19,21 @@ _Name = Annotated[str, typer.Argument(metavar="ACTION", help="Such as /fibonacci
 _Types = Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")]
 _Count = Annotated[bool, typer.Option("--count-actions", "-c", help="Only show how many.")]
 
-app.command(
+on_graph(
+    app,
     "send_goal",
+    'twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"',
     no_args_is_help=True,
-    epilog='Example: [bold]twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"[/bold]',
-)(joins(send_goal))
+)(send_goal)
 
 
-@app.command("list", epilog="Example: [bold]twin action list -t[/bold]")
-@joins
+@on_graph(app, "list", "twin action list -t")
 def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
     """List the actions that somebody offers or uses."""
-    actions = joining.graph().actions()
-    if count:
-        typer.echo(len(actions))
-        return
-    for name, types in actions.items():
-        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+    print_names(joining.graph().actions(), count=count, show_types=show_types)
 
 
-@app.command("type", no_args_is_help=True, epilog="Example: [bold]twin action type /fibonacci[/bold]")
-@joins
+@on_graph(app, "type", "twin action type /fibonacci", no_args_is_help=True)
 def show_type(action: _Name, *, joining: Joining) -> None:
     """Print the type of an action."""
     actions, name = joining.graph().actions(), absolute(action)
@@ -49,26 +43,15 @@ def show_type(action: _Name, *, joining: Joining) -> None:
         typer.echo(typename)
 
 
-@app.command(
-    "find",
-    no_args_is_help=True,
-    epilog="Example: [bold]twin action find example_interfaces/action/Fibonacci[/bold]",
-)
-@joins
+@on_graph(app, "find", "twin action find example_interfaces/action/Fibonacci", no_args_is_help=True)
 def find(
     action_type: Annotated[str, typer.Argument(metavar="TYPE")], count: _Count = False, *, joining: Joining
 ) -> None:
     """List the actions of a type."""
-    names = [name for name, types in joining.graph().actions().items() if action_type in types]
-    if count:
-        typer.echo(len(names))
-        return
-    for name in names:
-        typer.echo(name)
+    print_names(of_type(action_type, joining.graph().actions()), count=count)
 
 
-@app.command("info", no_args_is_help=True, epilog="Example: [bold]twin action info -t /fibonacci[/bold]")
-@joins
+@on_graph(app, "info", "twin action info -t /fibonacci", no_args_is_help=True)
 def info(
     action: _Name,
     show_types: _Types = False,
