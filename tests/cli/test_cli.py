@@ -25,7 +25,7 @@ from twin.cli import app as app_module
 from twin.cli.play import find_recording
 from twin.cli.run import batch, repeat
 from twin.cli.run.child import run_in_child
-from twin.cli.run.options import RunOptions, parse_overrides, parse_pace
+from twin.cli.run.options import RunOptions, parse_overrides
 from twin.errors import RecordingError, ScenarioError, SimulationError
 from twin.files.writing import written_alone
 from twin.models import catalogue
@@ -431,8 +431,10 @@ def test_wrong_options_say_what_is_valid() -> None:
         parse_overrides(["seed"], None)
     assert parse_overrides(["a.b=c=d", "seed=3"], 4) == {"a.b": "c=d", "seed": "4"}
     with pytest.raises(ScenarioError, match=r"--pace fast: must be max or a number greater than 0"):
-        parse_pace("fast")
-    assert (parse_pace("max"), parse_pace("0.5")) == (None, 0.5)
+        RunOptions(scenario=Path("a.yaml"), pace="fast")
+    paces = [(None, False), (None, True), ("max", True), ("0.5", True)]
+    options = [RunOptions(scenario=Path("a.yaml"), pace=pace, free=free) for pace, free in paces]
+    assert [each.speed for each in options] == [None, 1.0, None, 0.5]
 
 
 @pytest.mark.parametrize(
@@ -441,21 +443,22 @@ def test_wrong_options_say_what_is_valid() -> None:
         RunOptions(scenario=Path("a.yaml")),
         RunOptions(
             scenario=Path("a.yaml"),
-            overrides={"x": "1", "seed": "3"},
+            sets=["x=1", "y=a=b"],
+            seed=3,
             params_file=Path(__file__),
-            pace=0.5,
-            listen=("tcp/1",),
-            nodes=("n.py:make",),
-            wait_for=("/cmd_vel", "/controller"),
+            pace="0.5",
+            listen=["tcp/1"],
+            node=["n.py:make"],
+            wait_for=["/cmd_vel", "/controller"],
             wait_timeout=2.5,
             free=True,
-            connect=("tcp/2", "tcp/3"),
+            connect=["tcp/2", "tcp/3"],
             wire="humble",
             zenoh_config=Path(__file__),
-            domain_id=7,
-            record=False,
+            domain=7,
+            no_record=True,
             bag=True,
-            bag_hidden_topics=True,
+            hidden=True,
             save_model=Path("model"),
         ),
     ],
@@ -465,12 +468,10 @@ def test_options_survive_the_way_to_a_child(
     options: RunOptions, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     understood: list[RunOptions] = []
-    monkeypatch.setattr(
-        "twin.cli.run.once.run_once", lambda options, out, as_json: understood.append(options) or 0
-    )
+    monkeypatch.setattr("twin.cli.run.once.run_once", lambda options: understood.append(options) or 0)
     code, _, err = invoke(*options.arguments(Path("out")))
     assert (code, err) == (0, "")
-    assert understood == [options]
+    assert understood == [replace(options, out=Path("out"), json=True)]
 
 
 def test_another_parameter_file_for_the_robots_that_navigate(

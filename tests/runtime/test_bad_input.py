@@ -251,7 +251,7 @@ def test_a_diverging_run_is_exit_2_and_leaves_a_readable_recording(
     monkeypatch.setattr(Run, "actuate", kick)
     (tmp_path / "s.yaml").write_text(IDLE.replace("MODEL", "diff_bot"), encoding="utf-8")
     out = tmp_path / "out"
-    assert run_once(RunOptions(scenario=tmp_path / "s.yaml"), out, as_json=False) == 2
+    assert run_once(RunOptions(scenario=tmp_path / "s.yaml", out=out)) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "diverged at t = 1.00" in said
     assert json.loads((out / "verdict.json").read_text(encoding="utf-8"))["verdict"] == "error"

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-
-def scenarios() -> list[str]:
-    """Return the names of scenarios."""
-    from twin.scenario.catalogue import catalogue
-
-    return list(catalogue())
+from collections.abc import Callable
+from importlib import import_module
 
 
-def robots() -> list[str]:
-    """Return the names of robots."""
-    from twin.models.catalogue import catalogue
-
-    return list(catalogue())
+def _names(module: str) -> Callable[[], list[str]]:
+    """Return what lists the names of a module's catalogue, which is loaded when they are asked for."""
+    return lambda: list(import_module(module).catalogue())
 
 
-def arenas() -> list[str]:
-    """Return the names of arenas."""
-    from twin.warehouse.catalogue import catalogue
-
-    return list(catalogue())
-
-
-def examples() -> list[str]:
-    """Return the names of example programs."""
-    from twin.cli.examples import catalogue
-
-    return list(catalogue())
+scenarios = _names("twin.scenario.catalogue")
+robots = _names("twin.models.catalogue")
+arenas = _names("twin.warehouse.catalogue")
+examples = _names("twin.cli.examples")

@@ -40,6 +40,6 @@ def execute(
         return
     from twin.bridge import lockstep as stepped
 
-    with stepped.join(joining.connect, config=joining.config, domain_id=joining.domain_id) as process:
+    with stepped.join(joining.connect or None, config=joining.config, domain_id=joining.domain) as process:
         create_nodes(process.bus, place)
         process.spin()

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import ArrayLike
 
 from twin.recording.columns import TIMELINE
 from twin.recording.extents import RobotBox, Stage
@@ -15,7 +16,7 @@ from twin.recording.frames import WORLD
 from twin.recording.map_eye import MAP_EYE, MAP_IMAGE
 
 _RASTERS = ("map", "global_costmap/costmap", "local_costmap/costmap")
-_DARK = rrb.Background(kind="SolidColor", color=(38, 42, 48))
+DARK = rrb.Background(kind="SolidColor", color=(38, 42, 48))
 _LEAST_STAGE = 2.5
 """Size of the floor that the camera looks at [m], at least."""
 _CLOSE_UP = np.array((-0.62, 0.62, 0.48))
@@ -71,21 +72,36 @@ def _simulation(stage: Stage, robots: Sequence[str]) -> rrb.Spatial3DView:
     centre = (stage.low + stage.high) / 2.0
     width, length = stage.high - stage.low
     size = float(max(0.85 * width, 1.1 * length, _LEAST_STAGE))  # the view is wider than high
+    position = (centre[0] - 0.1 * size, centre[1] - 0.7 * size, 0.52 * size)
+    grid = rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110))
+    return _world("Simulation", robots, WORLD, grid, orbit(position, (*centre, 0.0)))
+
+
+def _close_up(box: RobotBox) -> rrb.Spatial3DView:
+    """Return a view that travels with a robot, in the frame of its base, from as far as its size asks for."""
+    eye = orbit(box.centre + _CLOSE_UP_DISTANCE * box.size * _CLOSE_UP, box.centre)
+    return _world(box.robot, [box.robot], box.base, rrb.LineGrid3D(visible=False), eye)
+
+
+def _world(
+    name: str, robots: Sequence[str], frame: str, grid: rrb.LineGrid3D, eye: rrb.EyeControls3D
+) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        name="Simulation",
+        name=name,
         origin="/",
-        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters(robots, "-")],
+        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters(robots)],
         overrides=_whole_trails(robots),
-        background=_DARK,
-        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110)),
-        spatial_information=rrb.SpatialInformation(target_frame=WORLD),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital",
-            position=(centre[0] - 0.1 * size, centre[1] - 0.7 * size, 0.52 * size),
-            look_target=(*centre, 0.0),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
+        background=DARK,
+        line_grid=grid,
+        spatial_information=rrb.SpatialInformation(target_frame=frame),
+        eye_controls=eye,
     )
+
+
+def orbit(position: ArrayLike, look_target: ArrayLike) -> rrb.EyeControls3D:
+    """Return an eye at a position that looks at another [m], and that the user can take around it."""
+    up = (0.0, 0.0, 1.0)
+    return rrb.EyeControls3D(kind="Orbital", position=position, look_target=look_target, eye_up=up)
 
 
 def _from_above(robots: Sequence[str]) -> rrb.Spatial2DView:
@@ -93,34 +109,10 @@ def _from_above(robots: Sequence[str]) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         name="Map",
         origin=MAP_EYE,
-        contents=[
-            "+ /ros/**",
-            "+ /estimate/**",
-            "+ /trails/**",
-            *(f"+ /world/{robot}/**" for robot in robots),
-        ],
+        contents=["+ /ros/**", "+ /estimate/**", "+ /trails/**", *(f"+ /world/{name}/**" for name in robots)],
         overrides=_whole_trails(robots),
         background=rrb.Background(kind="SolidColor", color=(60, 66, 70)),
         spatial_information=rrb.SpatialInformation(target_frame=MAP_IMAGE),
-    )
-
-
-def _close_up(box: RobotBox) -> rrb.Spatial3DView:
-    """Return a view that travels with a robot, in the frame of its base, from as far as its size asks for."""
-    return rrb.Spatial3DView(
-        name=box.robot,
-        origin="/",
-        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters([box.robot], "-")],
-        overrides=_whole_trails([box.robot]),
-        background=_DARK,
-        line_grid=rrb.LineGrid3D(visible=False),
-        spatial_information=rrb.SpatialInformation(target_frame=box.base),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital",
-            position=box.centre + _CLOSE_UP_DISTANCE * box.size * _CLOSE_UP,
-            look_target=box.centre,
-            eye_up=(0.0, 0.0, 1.0),
-        ),
     )
 
 
@@ -158,9 +150,10 @@ def _time_axis(end_ns: int | None, room: float) -> rrb.TimeAxis | None:
     return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
 
 
-def _rasters(robots: Sequence[str], sign: str) -> list[str]:
+def _rasters(robots: Sequence[str]) -> list[str]:
+    """Return what leaves maps out."""
     spaces = ("", *(f"/{robot}" for robot in robots))
-    return [f"{sign} /ros{space}/{raster}" for space in spaces for raster in _RASTERS]
+    return [f"- /ros{space}/{raster}" for space in spaces for raster in _RASTERS]
 
 
 def _whole_trails(robots: Sequence[str]) -> dict[Any, Any]:

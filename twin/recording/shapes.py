@@ -47,10 +47,29 @@ def declare_shapes(
         entity = body_entity(body, static)
         T_frame_body = pose_of(body) if static else Pose3.from_xyz_rpy()
         drawn = [Solid(s.geometry, T_frame_body @ s.T_body_geometry, rgba8(s.rgba)) for s in group]
-        frame = rr.CoordinateFrame(WORLD if static else body)
-        recording.log(entity, frame, *primitives(drawn, "solid"), static=True)
-        for i, solid in enumerate(drawn):
-            declare_mesh(recording, f"{entity}/mesh_{i}", frame, solid, own_colours=True)
+        draw_solids(recording, entity, WORLD if static else body, drawn)
+
+
+def draw_solids(
+    recording: rr.RecordingStream,
+    entity: str,
+    frame: str,
+    solids: Sequence[Solid],
+    *,
+    see_through: bool = False,
+) -> None:
+    """Log shapes in a frame, each mesh below `entity`; those that are seen through have their edges, too.
+
+    Raises:
+        ModelError: A mesh cannot be read.
+    """
+    if not solids:
+        return
+    at = rr.CoordinateFrame(frame)
+    fill_mode: FillMode = "transparentfillmajorwireframe" if see_through else "solid"
+    recording.log(entity, at, *_primitives(solids, fill_mode), static=True)
+    for i, solid in enumerate(solids):
+        declare_mesh(recording, f"{entity}/mesh_{i}", at, solid, own_colours=not see_through)
 
 
 def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
@@ -71,42 +90,32 @@ def rgba8(rgba: Sequence[float]) -> Rgba8:
     return r, g, b, a
 
 
-def primitives(solids: Sequence[Solid], fill_mode: FillMode) -> list[rr.AsComponents]:
+def _primitives(solids: Sequence[Solid], fill_mode: FillMode) -> list[rr.AsComponents]:
     """Return one archetype for each kind of primitive among `solids`; meshes are left out."""
     found: list[rr.AsComponents] = []
-    boxes = [(s, s.geometry) for s in solids if isinstance(s.geometry, Box)]
-    if boxes:
+    if boxes := [(s, s.geometry) for s in solids if isinstance(s.geometry, Box)]:
         sizes = [box.size for _, box in boxes]
-        found.append(
-            rr.Boxes3D(sizes=sizes, centers=[s.pose.xyz for s, _ in boxes], **_look(boxes, fill_mode))
-        )
-    cylinders = [(s, s.geometry) for s in solids if isinstance(s.geometry, Cylinder)]
-    if cylinders:
-        found.append(
-            rr.Cylinders3D(
-                lengths=[cylinder.length for _, cylinder in cylinders],
-                radii=[cylinder.radius for _, cylinder in cylinders],
-                centers=[s.pose.xyz for s, _ in cylinders],
-                **_look(cylinders, fill_mode),
-            )
-        )
-    capsules = [(s, s.geometry) for s in solids if isinstance(s.geometry, Capsule)]
-    if capsules:
-        found.append(
-            rr.Capsules3D(
-                lengths=[capsule.length for _, capsule in capsules],
-                radii=[capsule.radius for _, capsule in capsules],
-                # Rerun's origin is the centre of the lower cap, URDF's the middle of the capsule.
-                translations=[s.pose.apply((0.0, 0.0, -capsule.length / 2.0)) for s, capsule in capsules],
-                **_look(capsules, fill_mode),
-            )
-        )
-    spheres = [(s, s.geometry) for s in solids if isinstance(s.geometry, Sphere)]
-    if spheres:
+        found.append(rr.Boxes3D(sizes=sizes, centers=_centres(boxes), **_look(boxes, fill_mode)))
+    if cylinders := [(s, s.geometry) for s in solids if isinstance(s.geometry, Cylinder)]:
+        size = _length_and_radius([cylinder for _, cylinder in cylinders])
+        found.append(rr.Cylinders3D(centers=_centres(cylinders), **size, **_look(cylinders, fill_mode)))
+    if capsules := [(s, s.geometry) for s in solids if isinstance(s.geometry, Capsule)]:
+        # Rerun's origin is the centre of the lower cap, URDF's the middle of the capsule.
+        origins = [s.pose.apply((0.0, 0.0, -capsule.length / 2.0)) for s, capsule in capsules]
+        size = _length_and_radius([capsule for _, capsule in capsules])
+        found.append(rr.Capsules3D(translations=origins, **size, **_look(capsules, fill_mode)))
+    if spheres := [(s, s.geometry) for s in solids if isinstance(s.geometry, Sphere)]:
         radii = [sphere.radius for _, sphere in spheres]
-        centers = [s.pose.xyz for s, _ in spheres]
-        found.append(rr.Ellipsoids3D(radii=radii, centers=centers, **_look(spheres, fill_mode)))
+        found.append(rr.Ellipsoids3D(radii=radii, centers=_centres(spheres), **_look(spheres, fill_mode)))
     return found
+
+
+def _centres(solids: Sequence[tuple[Solid, object]]) -> list[Array]:
+    return [solid.pose.xyz for solid, _ in solids]
+
+
+def _length_and_radius(geometries: Sequence[Cylinder | Capsule]) -> dict[str, Any]:
+    return {"lengths": [item.length for item in geometries], "radii": [item.radius for item in geometries]}
 
 
 def _look(solids: Sequence[tuple[Solid, object]], fill_mode: FillMode) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.map.map_files import load, told, yaml_path
+from twin.cli.option_groups import takes
 
 if TYPE_CHECKING:
     from twin.navigation.maps.map_saver import SaveParameters
@@ -19,64 +20,61 @@ Mask = Annotated[Path, typer.Argument(metavar="MASK", help="YAML file of the mas
 Of = Annotated[
     str, typer.Option("--map", metavar="MAP", help="Whose cells a new mask gets.", show_default="none")
 ]
-Rectangle = Annotated[
-    list[str] | None, typer.Option(metavar="X,Y,X,Y", help="Two opposite corners, in metres; repeatable.")
-]
-Polygon = Annotated[
-    list[str] | None, typer.Option(metavar="X,Y,X,Y,…", help="Three corners or more; repeatable.")
-]
-Circle = Annotated[list[str] | None, typer.Option(metavar="X,Y,R", help="Centre and radius; repeatable.")]
 Erase = Annotated[bool, typer.Option("--erase", help="Take the zone away instead.")]
+
+
+def _zones(
+    rectangle: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,X,Y", help="Two opposite corners, in metres; repeatable.")
+    ] = None,
+    polygon: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,X,Y,…", help="Three corners or more; repeatable.")
+    ] = None,
+    circle: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,R", help="Centre and radius; repeatable.")
+    ] = None,
+) -> list[Any]:
+    from twin.navigation.maps import zones
+
+    found: list[Any] = [zones.rectangle(*_numbers("rectangle", text, 4)) for text in rectangle or ()]
+    for text in polygon or ():
+        numbers = _numbers("polygon", text, None)
+        found.append(list(zip(numbers[::2], numbers[1::2], strict=True)))
+    found += [zones.circle(*_numbers("circle", text, 3)) for text in circle or ()]
+    if not found:
+        raise typer.BadParameter("give a zone: --rectangle, --polygon or --circle")
+    return found
 
 
 @app.command(
     no_args_is_help=True,
     epilog="Example: [bold]twin map zone keepout keepout.yaml --map warehouse --rectangle 1,1,2,3[/bold]",
 )
-def keepout(
-    mask: Mask,
-    of: Of = "",
-    rectangle: Rectangle = None,
-    polygon: Polygon = None,
-    circle: Circle = None,
-    erase: Erase = False,
-) -> None:
+@takes("zones", _zones)
+def keepout(mask: Mask, of: Of = "", *, zones: list[Any], erase: Erase = False) -> None:
     """Forbid zones: 100 in the mask that nav2's KeepoutFilter reads."""
     from twin.navigation.maps.zones import KEEPOUT_FILE
 
-    _draw(mask, of, _zones(rectangle, polygon, circle), 0 if erase else 100, KEEPOUT_FILE)
+    _draw(mask, of, zones, 0 if erase else 100, KEEPOUT_FILE)
 
 
 @app.command(
     no_args_is_help=True,
     epilog="Example: [bold]twin map zone speed slow.yaml --map warehouse --circle 2,3,1 --percent 40[/bold]",
 )
+@takes("zones", _zones)
 def speed(
     mask: Mask,
     of: Of = "",
-    rectangle: Rectangle = None,
-    polygon: Polygon = None,
-    circle: Circle = None,
+    *,
+    zones: list[Any],
     percent: Annotated[int, typer.Option(min=1, max=100, help="Of the robot's cruise speed.")] = 50,
     erase: Erase = False,
 ) -> None:
     """Limit the speed in zones: per cent in the mask that nav2's SpeedFilter reads (type 1)."""
     from twin.navigation.maps.zones import SPEED_FILE
 
-    _draw(mask, of, _zones(rectangle, polygon, circle), 0 if erase else percent, SPEED_FILE)
-
-
-def _zones(rectangles: list[str] | None, polygons: list[str] | None, circles: list[str] | None) -> list[Any]:
-    from twin.navigation.maps import zones
-
-    found: list[Any] = [zones.rectangle(*_numbers("rectangle", text, 4)) for text in rectangles or ()]
-    for text in polygons or ():
-        numbers = _numbers("polygon", text, None)
-        found.append(list(zip(numbers[::2], numbers[1::2], strict=True)))
-    found += [zones.circle(*_numbers("circle", text, 3)) for text in circles or ()]
-    if not found:
-        raise typer.BadParameter("give a zone: --rectangle, --polygon or --circle")
-    return found
+    _draw(mask, of, zones, 0 if erase else percent, SPEED_FILE)
 
 
 def _numbers(option: str, text: str, count: int | None) -> list[float]:

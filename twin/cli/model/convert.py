@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,14 +11,6 @@ from twin.cli.model.options import RobotFile, reads_robot
 from twin.models.options import ReadOptions
 
 
-class Base(StrEnum):
-    """How the root link is held."""
-
-    AUTO = "auto"
-    FREE = "free"
-    FIXED = "fixed"
-
-
 @reads_robot
 def convert(
     file: RobotFile,
@@ -27,8 +18,9 @@ def convert(
         Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.", show_default=False)
     ],
     base: Annotated[
-        Base, typer.Option(help="fixed: bolted down. auto: free, unless the base weighs nothing.")
-    ] = Base.AUTO,
+        Literal["auto", "free", "fixed"],
+        typer.Option(help="fixed: bolted down. auto: free, unless the base weighs nothing."),
+    ] = "auto",
     *,
     read: ReadOptions,
 ) -> None:
@@ -45,9 +37,12 @@ def convert(
 
     description = load(file, read)
     options = Physics(sleep=False).apply
-    by_name: dict[Base, Literal["free", "fixed"]] = {Base.FREE: "free", Base.FIXED: "fixed"}
     report = export(
-        description, output, base=by_name.get(base), set_options=options, drive_check=drive_self_check
+        description,
+        output,
+        base=None if base == "auto" else base,
+        set_options=options,
+        drive_check=drive_self_check,
     )
     tags = ", ".join(f"{number} {outcome}" for outcome, number in report["tags"].items() if number)
     size = ", ".join(counted(len(report[noun + "s"]), noun) for noun in ("link", "joint"))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -23,13 +22,6 @@ RobotFile = Annotated[
         autocompletion=completion.robots,
     ),
 ]
-
-
-class MissingMesh(StrEnum):
-    """What to do about a shape whose mesh file is missing."""
-
-    ERROR = "error"
-    SKIP = "skip"
 
 
 def _options(
@@ -56,8 +48,9 @@ def _options(
         ),
     ] = None,
     missing_mesh: Annotated[
-        MissingMesh, typer.Option(help="skip: leave out shapes whose mesh is missing or unreadable.")
-    ] = MissingMesh.ERROR,
+        Literal["error", "skip"],
+        typer.Option(help="skip: leave out shapes whose mesh is missing or unreadable."),
+    ] = "error",
     ignore_up_axis: Annotated[
         bool, typer.Option("--ignore-up-axis", help="Ignore what COLLADA meshes call up, as RViz does.")
     ] = False,
@@ -72,7 +65,7 @@ def _options(
         packages={name: Path(folder) for name, folder in folders.items()},
         allow_env=tuple(allow_env or ()),
         allow_paths=tuple(allow_path or ()),
-        missing_mesh=missing_mesh.value,
+        missing_mesh=missing_mesh,
         apply_up_axis=not ignore_up_axis,
         repair=repair,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import typer
 
@@ -23,6 +23,27 @@ def instead(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the nearest of the names that there are, and all of them."""
     names = list(known)
     return nearest(name, names) if names else f"there are no {kind}s"
+
+
+def print_names(names: Mapping[str, Sequence[str]], *, count: bool, show_types: bool = False) -> None:
+    """Print names, with their types if wanted, or only how many there are."""
+    if count:
+        typer.echo(len(names))
+        return
+    for name, types in names.items():
+        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+
+
+def of_type(wanted: str, names: Mapping[str, Sequence[str]]) -> dict[str, Sequence[str]]:
+    """Return the names that have a type."""
+    return {name: types for name, types in names.items() if wanted in types}
+
+
+def shown(names: Mapping[str, Sequence[str]], hidden: bool) -> dict[str, Sequence[str]]:
+    """Return the names without those that ROS hides, unless these are wanted too."""
+    from twin.bridge.graph import is_hidden
+
+    return {name: types for name, types in names.items() if hidden or not is_hidden(name)}
 
 
 def hint_at_nearest(kind: str, name: str, known: Iterable[str]) -> None:

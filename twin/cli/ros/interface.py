@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.option_groups import takes
 from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
@@ -15,14 +16,22 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Types: list, show, prototypes; as `ros2 interface`.")
 
-OnlyMsgs = Annotated[bool, typer.Option("--only-msgs", "-m", help="Only messages.")]
-OnlySrvs = Annotated[bool, typer.Option("--only-srvs", "-s", help="Only services.")]
-OnlyActions = Annotated[bool, typer.Option("--only-actions", "-a", help="Only actions.")]
 TypeName = Annotated[
     str, typer.Argument(metavar="TYPE", help="Such as geometry_msgs/msg/Twist; - reads it from stdin.")
 ]
 
 _HEADINGS = {"msg": "Messages:", "srv": "Services:", "action": "Actions:"}
+
+
+def _kinds(
+    only_msgs: Annotated[bool, typer.Option("--only-msgs", "-m", help="Only messages.")] = False,
+    only_srvs: Annotated[bool, typer.Option("--only-srvs", "-s", help="Only services.")] = False,
+    only_actions: Annotated[bool, typer.Option("--only-actions", "-a", help="Only actions.")] = False,
+    interfaces: Interfaces = None,
+) -> list[str]:
+    add_interfaces(interfaces)
+    chosen = {"msg": only_msgs, "srv": only_srvs, "action": only_actions}
+    return [kind for kind, wanted in chosen.items() if wanted or not any(chosen.values())]
 
 
 @app.command(epilog="Example: [bold]twin interface show geometry_msgs/msg/Twist[/bold]")
@@ -43,54 +52,43 @@ def show(
 
 
 @app.command("list", epilog="Example: [bold]twin interface list --only-actions[/bold]")
-def list_interfaces(
-    only_msgs: OnlyMsgs = False,
-    only_srvs: OnlySrvs = False,
-    only_actions: OnlyActions = False,
-    interfaces: Interfaces = None,
-) -> None:
+@takes("kinds", _kinds)
+def list_interfaces(*, kinds: list[str]) -> None:
     """List all types."""
     from twin.bridge import types
 
-    add_interfaces(interfaces)
     names = types.names()
-    for kind in _kinds(only_msgs, only_srvs, only_actions):
+    for kind in kinds:
         _print([_HEADINGS[kind], *(f"    {name}" for name in names if f"/{kind}/" in name)])
 
 
 @app.command(epilog="Example: [bold]twin interface package nav2_msgs[/bold]")
+@takes("kinds", _kinds)
 def package(
     name: Annotated[str, typer.Argument(metavar="PACKAGE", help="Such as example_interfaces.")],
-    only_msgs: OnlyMsgs = False,
-    only_srvs: OnlySrvs = False,
-    only_actions: OnlyActions = False,
-    interfaces: Interfaces = None,
+    *,
+    kinds: list[str],
 ) -> None:
     """List the types of a package."""
     from twin.bridge import types
     from twin.errors import BridgeError, nearest
 
-    add_interfaces(interfaces)
     names = [item for item in types.names() if item.startswith(f"{name}/")]
     if not names:
         packages = {item.split("/")[0] for item in types.names()}
         raise BridgeError(f"Unknown package '{name}'; {nearest(name, packages)}")
-    kinds = _kinds(only_msgs, only_srvs, only_actions)
     _print(item for kind in kinds for item in names if f"/{kind}/" in item)
 
 
 @app.command(epilog="Example: [bold]twin interface packages[/bold]")
+@takes("kinds", _kinds)
 def packages(
-    only_msgs: OnlyMsgs = False,
-    only_srvs: OnlySrvs = False,
-    only_actions: OnlyActions = False,
-    interfaces: Interfaces = None,
+    *,
+    kinds: list[str],
 ) -> None:
     """List the packages that have types."""
     from twin.bridge import types
 
-    add_interfaces(interfaces)
-    kinds = _kinds(only_msgs, only_srvs, only_actions)
     found = {name.split("/")[0] for name in types.names() if name.split("/")[1] in kinds}
     _print(sorted(found))
 
@@ -111,11 +109,6 @@ def proto(
 
 def _given(typename: str) -> str:
     return sys.stdin.readline().strip() if typename == "-" else typename
-
-
-def _kinds(msgs: bool, srvs: bool, actions: bool) -> list[str]:
-    chosen = {"msg": msgs, "srv": srvs, "action": actions}
-    return [kind for kind, wanted in chosen.items() if wanted or not any(chosen.values())]
 
 
 def _print(lines: Iterable[str]) -> None:

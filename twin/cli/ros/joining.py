@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
 
-PANEL = "Joining the graph"
 _AT_ONCE_S = 3.0
 PATIENCE_S = 60.0
 """How long a command that waits for a server waits for somebody to listen [s]: runs take a while to start."""
@@ -37,15 +37,43 @@ def whole_graph(bus: Bus) -> Graph:
     return graph
 
 
+_option = partial(typer.Option, rich_help_panel="Joining the graph")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Joining:
     """Which graph a command joins, and how."""
 
-    connect: tuple[str, ...] | None
-    config: Path | None
-    domain_id: int | None
-    use_sim_time: bool
-    wire: Wire
+    connect: Annotated[
+        list[str] | None,
+        _option(
+            metavar="ENDPOINT",
+            help="Where a run or a router listens.",
+            show_default="TWIN_CONNECT, else tcp/127.0.0.1:7447",
+        ),
+    ] = None
+    config: Annotated[
+        Path | None,
+        _option(
+            metavar="FILE",
+            envvar="ZENOH_SESSION_CONFIG_URI",
+            exists=True,
+            dir_okay=False,
+            help="Zenoh configuration.",
+        ),
+    ] = None
+    domain: Annotated[int | None, _option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.")] = None
+    use_sim_time: Annotated[bool, _option("--use-sim-time", "-s", help="Take the time from /clock.")] = False
+    wire: Annotated[Wire, _option(help="How names are spelled; all are heard.")] = "rmw_zenoh"
+    interfaces: Interfaces = None
+
+    def __post_init__(self) -> None:
+        add_interfaces(self.interfaces)
+
+    @property
+    def by_wall_time(self) -> Joining:
+        """The same, whatever --use-sim-time says."""
+        return replace(self, use_sim_time=False, interfaces=None)
 
     @contextmanager
     def open(self, patience_s: float = _AT_ONCE_S) -> Iterator[LiveBus]:
@@ -55,9 +83,9 @@ class Joining:
 
         def join(timeout_s: float) -> AbstractContextManager[LiveBus]:
             return live.join(
-                self.connect,
+                self.connect or None,
                 config=self.config,
-                domain_id=self.domain_id,
+                domain_id=self.domain,
                 use_sim_time=self.use_sim_time,
                 wire=self.wire,
                 timeout_s=timeout_s,
@@ -79,52 +107,9 @@ class Joining:
             return whole_graph(process.bus)
 
 
-def _options(
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ENDPOINT",
-            help="Where a run or a router listens.",
-            rich_help_panel=PANEL,
-            show_default="TWIN_CONNECT, else tcp/127.0.0.1:7447",
-        ),
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            envvar="ZENOH_SESSION_CONFIG_URI",
-            exists=True,
-            dir_okay=False,
-            help="Zenoh configuration.",
-            rich_help_panel=PANEL,
-        ),
-    ] = None,
-    domain: Annotated[
-        int | None,
-        typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.", rich_help_panel=PANEL),
-    ] = None,
-    use_sim_time: Annotated[
-        bool, typer.Option("--use-sim-time", "-s", help="Take the time from /clock.", rich_help_panel=PANEL)
-    ] = False,
-    wire: Annotated[
-        Wire, typer.Option(help="How names are spelled; all are heard.", rich_help_panel=PANEL)
-    ] = "rmw_zenoh",
-    interfaces: Interfaces = None,
-) -> Joining:
-    add_interfaces(interfaces)
-    return Joining(
-        connect=tuple(connect) if connect else None,
-        config=config,
-        domain_id=domain,
-        use_sim_time=use_sim_time,
-        wire=wire,
-    )
-
-
 def joins(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
-    joined = takes("joining", _options)(command)
+    joined = takes("joining", Joining)(command)
 
     @functools.wraps(joined)
     def wrapper(**given: Any) -> None:

@@ -53,7 +53,7 @@ def run_batch(
         for number, file in enumerate(files, 1):
             status.update(f"{number} of {len(files)}: {file}")
             target = folder / f"{number:02d}-{file.stem}"
-            verdicts.append(run_in_child(RunOptions(scenario=file, record=record), target))
+            verdicts.append(run_in_child(RunOptions(scenario=file, no_record=not record), target))
     if junit is not None:
         from twin.scenario.junit import junit_xml
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from twin.runtime import Progress
 
 
-def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
+def run_once(options: RunOptions) -> int:
     """Run, write the verdict, print it, and return the exit code."""
     from twin.bridge.programs.console_log import show_warnings
 
@@ -30,15 +29,15 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
         options.scenario,
         overrides=options.overrides,
         params_file=options.params_file,
-        out=out or run_folder,
-        record=options.record,
+        out=options.out or run_folder,
+        record=not options.no_record,
         bag=options.bag,
-        bag_hidden_topics=options.bag_hidden_topics,
+        bag_hidden_topics=options.hidden,
         save_model=options.save_model,
-        pace=options.pace,
+        pace=options.speed,
         network=options.network,
-        nodes=options.nodes,
-        wait_for=options.wait_for,
+        nodes=options.node or (),
+        wait_for=options.wait_for or (),
         wait_timeout=options.wait_timeout,
         free=options.free,
         on_execute=lambda file: stderr().print(f"executes {file}"),
@@ -55,7 +54,7 @@ def run_once(options: RunOptions, out: Path | None, *, as_json: bool) -> int:
             replace(simulation.verdict, error="interrupted").write(simulation.folder)
         raise
     verdict = simulation.verdict
-    if as_json:
+    if options.json:
         sys.stdout.write(verdict.to_json())
     elif fault is None:
         from twin.cli.run.verdict_table import verdict_report

@@ -1,45 +1,131 @@
-"""The options of a run, from the command line and back to one for a child process."""
+"""The options of a run, on the command line and on that of a child process."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import inspect
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from twin.bridge.wire import Wire
+from twin.cli import completion
 from twin.errors import ScenarioError
 
 if TYPE_CHECKING:
     from twin.bridge.wire.session import SessionConfig
 
+_others = partial(typer.Option, rich_help_panel="Other processes")
+_file = partial(typer.Option, metavar="FILE", exists=True, dir_okay=False)
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """What `twin run` was asked for."""
+    """What `twin run` was asked for: its argument and its options, in the order of its help."""
 
-    scenario: Path
-    overrides: Mapping[str, str] = field(default_factory=dict)
-    params_file: Path | None = None
-    """Of Nav2, for every robot that navigates."""
-    pace: float | None = None
-    """Simulated seconds per second; None: as fast as possible."""
-    listen: tuple[str, ...] = ()
-    nodes: tuple[str, ...] = ()
-    wait_for: tuple[str, ...] = ()
-    wait_timeout: float = 10.0
-    """[s] of wall time."""
-    free: bool = False
-    connect: tuple[str, ...] = ()
-    wire: Wire = "rmw_zenoh"
-    zenoh_config: Path | None = None
-    domain_id: int = 0
-    record: bool = True
-    bag: bool = False
-    """Whether a bag is written into the folder of the results."""
-    bag_hidden_topics: bool = False
-    """Whether topics of actions are in the bag too."""
-    save_model: Path | None = None
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SCENARIO",
+            help="A scenario of `twin scenarios`, or a file.",
+            show_default=False,
+            autocompletion=completion.scenarios,
+        ),
+    ]
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
+    ] = None
+    seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None
+    params_file: Annotated[
+        Path | None,
+        _file(help="A Nav2 parameter file for all robots that navigate, instead of the scenario's."),
+    ] = None
+    repeat: Annotated[int, typer.Option(min=1, help="Run this often, each time in a fresh process.")] = 1
+    expect_one_hash: Annotated[
+        bool, typer.Option("--expect-one-hash", help="Fail if the repeated runs differ in a single bit.")
+    ] = False
+    pace: Annotated[
+        str | None,
+        typer.Option(
+            help="Simulated seconds per second: a number, or max.", show_default="max; 1 with --free"
+        ),
+    ] = None
+    listen: Annotated[
+        list[str] | None,
+        _others(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
+    ] = None
+    node: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE.py:FACTORY", help="Also run these nodes, in this process."),
+    ] = None
+    wait_for: Annotated[
+        list[str] | None,
+        _others(
+            metavar="NAME", help="Run in lock-step with a node or topic of another process, e.g. /cmd_vel."
+        ),
+    ] = None
+    wait_timeout: Annotated[float, _others(help="How many seconds to wait for an answer.")] = 10.0
+    free: Annotated[
+        bool, _others("--free", help="Let others take part at their own pace; not deterministic.")
+    ] = False
+    connect: Annotated[
+        list[str] | None,
+        _others(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),
+    ] = None
+    zenoh_config: Annotated[
+        Path | None, _file(help="Join as a Zenoh configuration says.", rich_help_panel="Other processes")
+    ] = None
+    wire: Annotated[Wire, _others(help="How names are spelled; all are heard.")] = "rmw_zenoh"
+    domain: Annotated[
+        int, _others(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain, if others may join.")
+    ] = 0
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the results.", show_default="runs/<scenario>/<time>"),
+    ] = None
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no Rerun recording.")] = False
+    bag: Annotated[
+        bool, typer.Option("--bag", help="Also write a ROS 2 bag of every message: <out>/bag.")
+    ] = False
+    hidden: Annotated[
+        bool, typer.Option("--include-hidden-topics", help="With --bag: topics of actions too.")
+    ] = False
+    save_model: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
+    ] = None
+    json: Annotated[bool, typer.Option("--json", help="Print verdict.json instead of the table.")] = False
+
+    def __post_init__(self) -> None:
+        if self.hidden and not self.bag:
+            raise typer.BadParameter("--include-hidden-topics says what is in the bag; it needs --bag")
+        _ = self.overrides, self.speed  # raise ScenarioError
+
+    @property
+    def overrides(self) -> dict[str, str]:
+        """Dotted keys of the scenario -> values that go before its own."""
+        return parse_overrides(self.sets or (), self.seed)
+
+    @property
+    def speed(self) -> float | None:
+        """Simulated seconds per second; None: as fast as possible.
+
+        Who does not say it wants `max`, or real time if others live by their own clocks.
+        """
+        if self.pace is None or self.pace == "max":
+            return 1.0 if self.free and self.pace is None else None
+        try:
+            speed = float(self.pace)
+        except ValueError:
+            speed = 0.0
+        if not 0.0 < speed < float("inf"):
+            raise ScenarioError(
+                f"--pace {self.pace}: must be max or a number greater than 0, such as 1 for real time"
+            )
+        return speed
 
     @property
     def network(self) -> SessionConfig | None:
@@ -50,32 +136,25 @@ class RunOptions:
 
         return SessionConfig(
             mode="client" if self.connect and not self.listen else "peer",
-            listen=self.listen,
-            connect=self.connect,
+            listen=tuple(self.listen or ()),
+            connect=tuple(self.connect or ()),
             file=self.zenoh_config,
             wire=self.wire,
-            domain_id=self.domain_id,
+            domain_id=self.domain,
         )
 
     def arguments(self, out: Path) -> list[str]:
-        """Return the arguments of a `twin` that does the same and prints JSON."""
-        words = ["run", str(self.scenario), "--json", "--out", str(out)]
-        words += [word for key, value in self.overrides.items() for word in ("--set", f"{key}={value}")]
-        words += [] if self.params_file is None else ["--params-file", str(self.params_file)]
-        words += [] if self.pace is None else ["--pace", repr(self.pace)]
-        words += [word for endpoint in self.listen for word in ("--listen", endpoint)]
-        words += [word for place in self.nodes for word in ("--node", place)]
-        words += [word for name in self.wait_for for word in ("--wait-for", name)]
-        words += ["--wait-timeout", repr(self.wait_timeout)] if self.wait_for else []
-        words += ["--free"] * self.free
-        words += [word for endpoint in self.connect for word in ("--connect", endpoint)]
-        if self.network is not None:
-            words += ["--wire", self.wire, "--domain", str(self.domain_id)]
-        words += [] if self.zenoh_config is None else ["--zenoh-config", str(self.zenoh_config)]
-        words += [] if self.record else ["--no-record"]
-        words += ["--bag"] if self.bag else []
-        words += ["--include-hidden-topics"] if self.bag_hidden_topics else []
-        return words + ([] if self.save_model is None else ["--save-model", str(self.save_model)])
+        """Return the arguments of a `twin` that does the same once, in a folder, and prints JSON."""
+        child = replace(self, out=out, json=True, repeat=1, expect_one_hash=False)
+        words = ["run", str(self.scenario)]
+        for name, parameter in inspect.signature(RunOptions, eval_str=True).parameters.items():
+            value: Any = getattr(child, name)
+            option = parameter.annotation.__metadata__[0]
+            if name != "scenario" and value is not None and value is not False:
+                (word,) = option.param_decls or (f"--{name.replace('_', '-')}",)
+                values = value if isinstance(value, list) else [value]
+                words += [word] if value is True else [text for each in values for text in (word, str(each))]
+        return words
 
 
 def parse_overrides(sets: Sequence[str], seed: int | None) -> dict[str, str]:
@@ -85,21 +164,3 @@ def parse_overrides(sets: Sequence[str], seed: int | None) -> dict[str, str]:
         raise ScenarioError(f"--set {wrong[0]}: must be KEY=VALUE, such as --set robots.0.pose.x=1.5")
     overrides = dict(word.split("=", 1) for word in sets)
     return overrides if seed is None else {**overrides, "seed": str(seed)}
-
-
-def parse_pace(text: str | None, *, free: bool = False) -> float | None:
-    """Return simulated seconds per second, None for `max`; raises ScenarioError.
-
-    Who does not say it wants `max`, or real time if others live by their own clocks.
-    """
-    if text is None:
-        return 1.0 if free else None
-    if text == "max":
-        return None
-    try:
-        pace = float(text)
-    except ValueError:
-        pace = 0.0
-    if not 0.0 < pace < float("inf"):
-        raise ScenarioError(f"--pace {text}: must be max or a number greater than 0, such as 1 for real time")
-    return pace

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from twin.cli.console import stderr, stdout
@@ -13,25 +12,24 @@ from twin.cli.run.folders import results_folder
 from twin.cli.run.options import RunOptions
 
 
-def run_repeatedly(
-    options: RunOptions, runs: int, out: Path | None, *, as_json: bool, expect_one_hash: bool
-) -> int:
-    """Run `runs` times in fresh processes, print the digests, and return the exit code."""
+def run_repeatedly(options: RunOptions) -> int:
+    """Run some times in fresh processes, print the digests, and return the exit code."""
     from twin.scenario import schema
 
-    name = "" if out else schema.load(options.scenario, options.overrides).name
+    runs = max(2, options.repeat)  # one run has nothing to be compared with
+    name = "" if options.out else schema.load(options.scenario, options.overrides).name
     verdicts: list[dict[str, Any]] = []
-    with results_folder(out, name) as parent, stderr().status("") as status:
+    with results_folder(options.out, name) as parent, stderr().status("") as status:
         for number in range(1, runs + 1):
             status.update(f"run {number} of {runs}")
             verdicts.append(run_in_child(options, parent / str(number)))
     digests = sorted({verdict["digest"] or "none" for verdict in verdicts})
     codes = [{"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]] for verdict in verdicts]
-    if as_json:
+    if options.json:
         sys.stdout.write(json.dumps({"runs": verdicts, "digests": digests}, indent=2) + "\n")
     else:
         _report(verdicts, digests)
-    differ = expect_one_hash and (len(digests) > 1 or digests == ["none"])
+    differ = options.expect_one_hash and (len(digests) > 1 or digests == ["none"])
     return max(*codes, 1 if differ else 0)
 
 

@@ -6,7 +6,7 @@ Limits, Center, Randomize and Zero are those of joint_state_publisher_gui (ROS, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -60,35 +60,20 @@ def coordinates(description: RobotDescription) -> tuple[Coordinate, ...]:
     return tuple(coordinate for joint in free for coordinate in _of_joint(joint))
 
 
-def _of_joint(joint: Joint) -> tuple[Coordinate, ...]:
-    if joint.type in _PARTS:
-        return tuple(_part(joint, part) for part in _PARTS[joint.type])
+def _of_joint(joint: Joint) -> Iterator[Coordinate]:
     limit = joint.limit
-    reach = REACH_M if joint.type == "prismatic" else math.pi
-    limited = joint.type != "continuous" and limit.lower is not None and limit.upper is not None
-    return (
-        Coordinate(
-            name=joint.name,
+    for part in _PARTS.get(joint.type, ("",)):
+        is_length = part in ("x", "y", "z") or joint.type == "prismatic"
+        reach = REACH_M if is_length else math.pi
+        limited = not part and joint.type != "continuous" and None not in (limit.lower, limit.upper)
+        yield Coordinate(
+            name=f"{joint.name}/{part}" if part else joint.name,
             type=joint.type,
-            unit="m" if joint.type == "prismatic" else "rad",
+            unit="m" if is_length else "rad",
             lower=limit.lower if limited and limit.lower is not None else -reach,
             upper=limit.upper if limited and limit.upper is not None else reach,
             limited=limited,
-        ),
-    )
-
-
-def _part(joint: Joint, part: str) -> Coordinate:
-    turns = part in ("roll", "pitch", "yaw")
-    reach = math.pi if turns else REACH_M
-    return Coordinate(
-        name=f"{joint.name}/{part}",
-        type=joint.type,
-        unit="rad" if turns else "m",
-        lower=-reach,
-        upper=reach,
-        limited=False,
-    )
+        )
 
 
 class Posture:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 import rerun as rr
+from scipy.spatial.transform import Rotation
 
 from twin.geometry import Array, matrix_from_quat_wxyz
-from twin.models.description import Inertial, Joint, Link, RobotDescription
-from twin.recording.meshes import declare_mesh
-from twin.recording.shapes import FillMode, primitives, rgba8
+from twin.models.description import Inertial, RobotDescription
+from twin.recording.shapes import draw_solids, rgba8
 from twin.recording.solids import Rgba8, Solid
 
 COLLISION_COLOUR: Rgba8 = (255, 140, 0, 110)
@@ -37,84 +37,77 @@ class Canvas:
     size: float
     """Of the robot [m]: arrows and axes are a fraction of it."""
 
+    def draw(self, layer: str, name: str, frame: str, shape: rr.AsComponents) -> None:
+        """Log what a layer has of a link or joint, in the frame of a link."""
+        self.recording.log(entity(layer, name), rr.CoordinateFrame(frame), shape, static=True)
+
 
 def visual(canvas: Canvas, description: RobotDescription) -> None:
     """Draw what the robot looks like."""
     for link in description.links.values():
         solids = [Solid(item.geometry, item.T_link_geometry, rgba8(item.rgba)) for item in link.visuals]
-        _draw_solids(canvas, "visual", link, solids, "solid")
+        draw_solids(canvas.recording, entity("visual", link.name), link.name, solids)
 
 
 def collision(canvas: Canvas, description: RobotDescription) -> None:
     """Draw what the robot touches with."""
     for link in description.links.values():
         solids = [Solid(item.geometry, item.T_link_geometry, COLLISION_COLOUR) for item in link.collisions]
-        _draw_solids(canvas, "collision", link, solids, "transparentfillmajorwireframe")
+        path = entity("collision", link.name)
+        draw_solids(canvas.recording, path, link.name, solids, see_through=True)
 
 
 def frames(canvas: Canvas, description: RobotDescription) -> None:
     """Draw the axes of every link's frame, with its name."""
     for name in description.links:
-        canvas.recording.log(
-            entity("frames", name),
-            rr.CoordinateFrame(name),
-            rr.TransformAxes3D(0.08 * canvas.size, show_frame=True),
-            static=True,
-        )
+        canvas.draw("frames", name, name, rr.TransformAxes3D(0.08 * canvas.size, show_frame=True))
 
 
 def joint_axes(canvas: Canvas, description: RobotDescription) -> None:
     """Draw an arrow along the axis of every joint that has one."""
+    length = 0.15 * canvas.size
     for joint in description.joints.values():
         if joint.type in ("fixed", "floating"):
             continue
-        _draw_axis(canvas, joint)
+        arrow = rr.Arrows3D(
+            vectors=[length * np.array(joint.axis)],
+            colors=[AXIS_COLOURS.get(joint.type, PLANE_COLOUR)],
+            radii=[0.04 * length],
+            labels=[joint.name],
+        )
+        # The axis of a joint is fixed in the child's frame too: the motion is about or along it.
+        canvas.draw("joint_axes", joint.name, joint.child, arrow)
 
 
 def inertia(canvas: Canvas, description: RobotDescription) -> None:
     """Draw the box that has each link's inertia, if it were homogeneous."""
     for name, inertial in _masses(description):
         size, R = inertia_box(inertial)
-        canvas.recording.log(
-            entity("inertia", name),
-            rr.CoordinateFrame(name),
-            rr.Boxes3D(
-                sizes=[size],
-                centers=[inertial.T_link_com.xyz],
-                quaternions=[_quaternion(matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz) @ R)],
-                colors=[INERTIA_COLOUR],
-            ),
-            static=True,
+        axes = Rotation.from_matrix(matrix_from_quat_wxyz(inertial.T_link_com.quat_wxyz) @ R)
+        box = rr.Boxes3D(
+            sizes=[size],
+            centers=[inertial.T_link_com.xyz],
+            quaternions=[rr.Quaternion(xyzw=axes.as_quat())],
+            colors=[INERTIA_COLOUR],
         )
+        canvas.draw("inertia", name, name, box)
 
 
 def centre_of_mass(canvas: Canvas, description: RobotDescription) -> None:
     """Draw each link's mass as a ball of lead about its centre, with the mass in words."""
     for name, inertial in _masses(description):
-        radius = (3.0 * inertial.mass / (4.0 * math.pi * LEAD_DENSITY)) ** (1.0 / 3.0)
-        canvas.recording.log(
-            entity("centre_of_mass", name),
-            rr.CoordinateFrame(name),
-            rr.Ellipsoids3D(
-                centers=[inertial.T_link_com.xyz],
-                radii=[radius],
-                colors=[CENTRE_COLOUR],
-                labels=[f"{inertial.mass:.4g} kg"],
-                fill_mode="solid",
-            ),
-            static=True,
+        ball = rr.Ellipsoids3D(
+            centers=[inertial.T_link_com.xyz],
+            radii=[(3.0 * inertial.mass / (4.0 * math.pi * LEAD_DENSITY)) ** (1.0 / 3.0)],
+            colors=[CENTRE_COLOUR],
+            labels=[f"{inertial.mass:.4g} kg"],
+            fill_mode="solid",
         )
+        canvas.draw("centre_of_mass", name, name, ball)
 
 
 LAYERS: Mapping[str, Callable[[Canvas, RobotDescription], None]] = MappingProxyType(
-    {
-        "visual": visual,
-        "collision": collision,
-        "frames": frames,
-        "joint_axes": joint_axes,
-        "inertia": inertia,
-        "centre_of_mass": centre_of_mass,
-    }
+    {draw.__name__: draw for draw in (visual, collision, frames, joint_axes, inertia, centre_of_mass)}
 )
 """By name; each is the top of its entities' paths."""
 
@@ -137,51 +130,9 @@ def inertia_box(inertial: Inertial) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(squares, 0.0)), R
 
 
-def _draw_solids(
-    canvas: Canvas, layer: str, link: Link, solids: Sequence[Solid], fill_mode: FillMode
-) -> None:
-    if not solids:
-        return
-    path = entity(layer, link.name)
-    frame = rr.CoordinateFrame(link.name)
-    canvas.recording.log(path, frame, *primitives(solids, fill_mode), static=True)
-    for number, solid in enumerate(solids):
-        declare_mesh(canvas.recording, f"{path}/mesh_{number}", frame, solid, own_colours=layer == "visual")
-
-
-def _draw_axis(canvas: Canvas, joint: Joint) -> None:
-    length = 0.15 * canvas.size
-    canvas.recording.log(
-        entity("joint_axes", joint.name),
-        # The axis of a joint is fixed in the child's frame too: the motion is about or along it.
-        rr.CoordinateFrame(joint.child),
-        rr.Arrows3D(
-            vectors=[length * np.array(joint.axis)],
-            colors=[AXIS_COLOURS.get(joint.type, PLANE_COLOUR)],
-            radii=[0.04 * length],
-            labels=[joint.name],
-        ),
-        static=True,
-    )
-
-
 def _masses(description: RobotDescription) -> list[tuple[str, Inertial]]:
     return [
         (name, link.inertial)
         for name, link in description.links.items()
         if link.inertial is not None and link.inertial.mass > 0.0
     ]
-
-
-def _quaternion(R: Array) -> rr.Quaternion:
-    """Return a rotation matrix as a quaternion (Shepperd's method, by the largest component)."""
-    products = np.array(
-        [
-            [1 + R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[2, 1] - R[1, 2]],
-            [R[0, 1] + R[1, 0], 1 - R[0, 0] + R[1, 1] - R[2, 2], R[1, 2] + R[2, 1], R[0, 2] - R[2, 0]],
-            [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1 - R[0, 0] - R[1, 1] + R[2, 2], R[1, 0] - R[0, 1]],
-            [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1 + R[0, 0] + R[1, 1] + R[2, 2]],
-        ]
-    )
-    xyzw = products[int(np.argmax(np.diag(products)))]
-    return rr.Quaternion(xyzw=xyzw / np.linalg.norm(xyzw))

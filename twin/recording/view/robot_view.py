@@ -14,6 +14,7 @@ from twin.geometry import Array, matrix_from_quat_wxyz, xyzw_from_wxyz
 from twin.models.description import RobotDescription
 from twin.models.kinematics import joint_motion, link_poses
 from twin.models.solids import Shape
+from twin.recording.blueprint import DARK, orbit
 from twin.recording.extents import span
 from twin.recording.stream import FLUSH_TIMEOUT_S, end_recording, open_recording, whole_recording
 from twin.recording.view.posture import Posture
@@ -114,15 +115,10 @@ def robot_layout(
         origin="/",
         contents="/**",
         overrides={f"/{layer}": rrb.EntityBehavior(visible=layer in show) for layer in LAYERS},
-        background=rrb.Background(kind="SolidColor", color=(38, 42, 48)),
+        background=DARK,
         line_grid=rrb.LineGrid3D(visible=True, spacing=_grid_spacing(size), color=(110, 110, 110, 110)),
         spatial_information=rrb.SpatialInformation(target_frame=FLOOR_FRAME),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital",
-            position=centre + size * np.array((0.95, -0.95, 0.55)),
-            look_target=centre,
-            eye_up=(0.0, 0.0, 1.0),
-        ),
+        eye_controls=orbit(centre + size * np.array((0.95, -0.95, 0.55)), centre),
     )
     return rrb.Blueprint(
         view,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.ros.action.goal import send_goal
-from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.graph_names import absolute, of_type, print_names, unknown
 from twin.cli.ros.joining import Joining, joins
 
 if TYPE_CHECKING:
@@ -30,12 +30,7 @@ app.command(
 @joins
 def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
     """List the actions that somebody offers or uses."""
-    actions = joining.graph().actions()
-    if count:
-        typer.echo(len(actions))
-        return
-    for name, types in actions.items():
-        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+    print_names(joining.graph().actions(), count=count, show_types=show_types)
 
 
 @app.command("type", no_args_is_help=True, epilog="Example: [bold]twin action type /fibonacci[/bold]")
@@ -59,12 +54,7 @@ def find(
     action_type: Annotated[str, typer.Argument(metavar="TYPE")], count: _Count = False, *, joining: Joining
 ) -> None:
     """List the actions of a type."""
-    names = [name for name, types in joining.graph().actions().items() if action_type in types]
-    if count:
-        typer.echo(len(names))
-        return
-    for name in names:
-        typer.echo(name)
+    print_names(of_type(action_type, joining.graph().actions()), count=count)
 
 
 @app.command("info", no_args_is_help=True, epilog="Example: [bold]twin action info -t /fibonacci[/bold]")

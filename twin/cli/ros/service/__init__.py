@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from twin.cli.ros.endpoint_text import endpoint_text
-from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.service.call import call
 
@@ -36,22 +36,16 @@ def list_services(
     joining: Joining,
 ) -> None:
     """List the services that are offered."""
-    services = _services(joining, hidden)
-    if count:
-        typer.echo(len(services))
-        return
-    for name, types in services.items():
-        typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+    print_names(shown(joining.graph().services(), hidden), count=count, show_types=show_types)
 
 
 @app.command("type", no_args_is_help=True, epilog="Example: [bold]twin service type /add_two_ints[/bold]")
 @joins
 def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> None:
     """Print the type of a service."""
-    services = _services(joining, True)
-    name = absolute(service)
+    services, name = joining.graph().services(), absolute(service)
     if name not in services:
-        raise unknown("service", name, _services_shown(services, hidden))
+        raise unknown("service", name, shown(services, hidden))
     for typename in services[name]:
         typer.echo(typename)
 
@@ -68,12 +62,7 @@ def find(
     joining: Joining,
 ) -> None:
     """List the services of a type."""
-    names = [name for name, types in _services(joining, hidden).items() if service_type in types]
-    if count:
-        typer.echo(len(names))
-        return
-    for name in names:
-        typer.echo(name)
+    print_names(of_type(service_type, shown(joining.graph().services(), hidden)), count=count)
 
 
 @app.command("info", no_args_is_help=True, epilog="Example: [bold]twin service info -v /add_two_ints[/bold]")
@@ -91,7 +80,7 @@ def info(
     graph = joining.graph()
     services, name = graph.services(), absolute(service)
     if name not in services:
-        raise unknown("service", name, _services_shown(services, hidden))
+        raise unknown("service", name, shown(services, hidden))
     types = services[name]
     typer.echo(f"Type: {types[0] if len(types) == 1 else list(types)}")
     blank = "\n" if verbose else ""
@@ -99,13 +88,3 @@ def info(
         typer.echo(f"{title} count: {len(endpoints)}{blank}")
         for endpoint in endpoints if verbose else ():
             typer.echo(f"{endpoint_text(endpoint)}\n")
-
-
-def _services(joining: Joining, hidden: bool) -> dict[str, tuple[str, ...]]:
-    return _services_shown(joining.graph().services(), hidden)
-
-
-def _services_shown(services: dict[str, tuple[str, ...]], hidden: bool) -> dict[str, tuple[str, ...]]:
-    from twin.bridge.graph import is_hidden
-
-    return {name: types for name, types in services.items() if hidden or not is_hidden(name)}

@@ -10,12 +10,7 @@ import typer
 from twin.cli.option_groups import takes
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.topic.options import (
-    NodeName,
-    QosChoice,
-    TopicName,
-    subscription_qos,
-)
+from twin.cli.ros.topic.options import NodeName, SubscriptionQos, TopicName
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -27,71 +22,48 @@ if TYPE_CHECKING:
     from twin.bridge.types.fields import Field
     from twin.cli.ros.topic.process import TopicProcess
 
-TRUNCATE_LENGTH = 128
-
 
 @dataclass(frozen=True, kw_only=True)
 class EchoStyle:
     """What is printed of a message, and how."""
 
-    csv: bool
-    field: tuple[str, ...]
-    truncate_length: int | None
-    no_arr: bool
-    no_str: bool
-    flow_style: bool
-    raw: bool
-    message_info: bool
-    lost: bool
-    clear: bool
-
-
-def _style(
     csv: Annotated[
         bool, typer.Option("--csv", help="All fields on one line, separated by commas; with -i, that first.")
-    ] = False,
+    ] = False
     field: Annotated[
         str | None, typer.Option(metavar="F", help="Only a part of the message, such as pose.pose.position.")
-    ] = None,
-    full_length: Annotated[
-        bool, typer.Option("--full-length", "-f", help="Cut no arrays and texts.")
-    ] = False,
+    ] = None
+    full_length: Annotated[bool, typer.Option("--full-length", "-f", help="Cut no arrays and texts.")] = False
     truncate_length: Annotated[
         int,
         typer.Option("--truncate-length", "-l", min=0, metavar="N", help="Where to cut arrays and texts."),
-    ] = TRUNCATE_LENGTH,
-    no_arr: Annotated[bool, typer.Option("--no-arr", help="Only type and length of arrays.")] = False,
-    no_str: Annotated[bool, typer.Option("--no-str", help="Only the length of texts.")] = False,
-    flow_style: Annotated[bool, typer.Option("--flow-style", help="Lists on one line.")] = False,
-    raw: Annotated[bool, typer.Option("--raw", help="The bytes as they travel (CDR).")] = False,
-    include_message_info: Annotated[
+    ] = 128
+    no_arr: Annotated[bool, typer.Option("--no-arr", help="Only type and length of arrays.")] = False
+    no_str: Annotated[bool, typer.Option("--no-str", help="Only the length of texts.")] = False
+    flow_style: Annotated[bool, typer.Option("--flow-style", help="Lists on one line.")] = False
+    raw: Annotated[bool, typer.Option("--raw", help="The bytes as they travel (CDR).")] = False
+    message_info: Annotated[
         bool, typer.Option("--include-message-info", "-i", help="Times and sequence numbers too.")
-    ] = False,
-    no_lost_messages: Annotated[
+    ] = False
+    no_lost: Annotated[
         bool, typer.Option("--no-lost-messages", help="Do not report messages that were lost.")
-    ] = False,
-    clear: Annotated[bool, typer.Option("--clear", "-c", help="Clear the screen before a message.")] = False,
-) -> EchoStyle:
-    parts = tuple(part for part in (field or "").split(".") if part)
-    if field is not None and not parts:
-        raise BridgeError(f"Invalid field value '{field}'; valid: names separated by dots, such as pose.pose")
-    return EchoStyle(
-        csv=csv,
-        field=parts,
-        truncate_length=None if full_length else truncate_length,
-        no_arr=no_arr,
-        no_str=no_str,
-        flow_style=flow_style,
-        raw=raw,
-        message_info=include_message_info,
-        lost=not no_lost_messages,
-        clear=clear,
-    )
+    ] = False
+    clear: Annotated[bool, typer.Option("--clear", "-c", help="Clear the screen before a message.")] = False
+
+    def __post_init__(self) -> None:
+        if self.field is not None and not self.path:
+            valid = "names separated by dots, such as pose.pose"
+            raise BridgeError(f"Invalid field value '{self.field}'; valid: {valid}")
+
+    @property
+    def path(self) -> list[str]:
+        """Names of the field and what is around it; none for the whole message."""
+        return [part for part in (self.field or "").split(".") if part]
 
 
 @joins
-@takes("style", _style)
-@takes("choice", subscription_qos)
+@takes("style", EchoStyle)
+@takes("choice", SubscriptionQos)
 @endless
 def echo(
     topic: TopicName,
@@ -110,7 +82,7 @@ def echo(
     ] = None,
     *,
     style: EchoStyle,
-    choice: QosChoice,
+    choice: SubscriptionQos,
     node_name: NodeName = None,
     joining: Joining,
 ) -> None:
@@ -133,7 +105,7 @@ def echo(
         process.live.spin(lambda: once and printer.printed > 0, timeout)
 
 
-def chosen_qos(choice: QosChoice, publishers: tuple[EndpointInfo, ...]) -> QoS:
+def chosen_qos(choice: SubscriptionQos, publishers: tuple[EndpointInfo, ...]) -> QoS:
     """Return what is asked for, or what all publishers offer."""
     from dataclasses import replace
 
@@ -178,7 +150,7 @@ class EchoPrinter:
     def on_sample(self, sample: RawSample) -> None:
         """Print a sample, if the filter lets it through."""
         style = self._style
-        if style.lost:
+        if not style.no_lost:
             self._count_lost(sample)
         if style.raw and self._accepts is None:
             value: Any = sample.payload
@@ -201,13 +173,13 @@ class EchoPrinter:
         from twin.bridge.types.fields import fields_of
 
         value, field = message, None
-        for name in self._style.field:
+        for name in self._style.path:
             fields = {each.name: each for each in fields_of(value.__msgtype__)} if _is_message(value) else {}
             if name not in fields:
                 owner = value.__msgtype__ if _is_message(value) else type(value).__name__
                 valid = f"; valid: {', '.join(fields)}" if fields else ""
                 raise BridgeError(
-                    f"Invalid field '{'.'.join(self._style.field)}': {owner} has no field '{name}'{valid}"
+                    f"Invalid field '{'.'.join(self._style.path)}': {owner} has no field '{name}'{valid}"
                 )
             field = fields[name]
             value = getattr(value, field.attribute)
@@ -222,7 +194,8 @@ class EchoPrinter:
         if not _is_message(value):
             head = f"---Got new message, message info:---\n{info}\n---Message data:---\n" if info else ""
             return f"{head}{value if field is None else value_text(value, field)}\n---\n"
-        cut: Any = {"truncate_length": style.truncate_length, "no_arr": style.no_arr, "no_str": style.no_str}
+        length = None if style.full_length else style.truncate_length
+        cut: Any = {"truncate_length": length, "no_arr": style.no_arr, "no_str": style.no_str}
         if style.csv:
             return ",".join([*map(str, info.values()), message_to_csv(value, **cut)]) + "\n"
         head = f"{to_yaml(dict(sorted(info.items())))}---\n" if info else ""

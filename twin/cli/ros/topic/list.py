@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping, Sequence
+from typing import Annotated
 
 import typer
 
 from twin.cli.ros.endpoint_text import endpoint_text
-from twin.cli.ros.graph_names import absolute, unknown
+from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.topic.options import TopicName
-
-if TYPE_CHECKING:
-    from twin.bridge.graph import Graph
 
 Hidden = Annotated[
     bool, typer.Option("--include-hidden-topics", help="Those with a part that begins with _ too.")
@@ -33,17 +30,15 @@ def list_topics(
     joining: Joining,
 ) -> None:
     """List the topics."""
-    graph, topics = _topics(joining, hidden)
-    if count:
-        typer.echo(len(topics))
-    elif verbose and topics:
+    graph = joining.graph()
+    topics = shown(graph.topics(), hidden)
+    if verbose and topics and not count:
         published = [(name, len(graph.publishers(name))) for name in topics]
         subscribed = [(name, len(graph.subscriptions(name))) for name in topics]
         typer.echo(_table("Published topics:", "publisher", published, topics))
         typer.echo(_table("Subscribed topics:", "subscriber", subscribed, topics))
     else:
-        for name, types in topics.items():
-            typer.echo(f"{name} [{', '.join(types)}]" if show_types else name)
+        print_names(topics, count=count, show_types=show_types)
 
 
 @joins
@@ -57,8 +52,8 @@ def info(
     joining: Joining,
 ) -> None:
     """Tell type and number of publishers and subscriptions."""
-    graph, topics = _topics(joining, True)
-    name, types = _known(topic, topics)
+    graph = joining.graph()
+    name, types = _known(topic, graph.topics())
     end = "\n\n" if verbose else "\n"
     for line, endpoints in (
         (f"Type: {types[0] if len(types) == 1 else list(types)}", ()),
@@ -73,8 +68,7 @@ def info(
 @joins
 def type_of(topic: TopicName, *, joining: Joining) -> None:
     """Print a topic's type."""
-    _, topics = _topics(joining, True)
-    for name in _known(topic, topics)[1]:
+    for name in _known(topic, joining.graph().topics())[1]:
         typer.echo(name)
 
 
@@ -92,24 +86,10 @@ def find(
     from twin.bridge import types
 
     wanted = "/".join(types.parts(topic_type))
-    _, topics = _topics(joining, hidden)
-    found = [name for name, known in topics.items() if wanted in known]
-    if count:
-        typer.echo(len(found))
-        return
-    for name in found:
-        typer.echo(name)
+    print_names(of_type(wanted, shown(joining.graph().topics(), hidden)), count=count)
 
 
-def _topics(joining: Joining, hidden: bool) -> tuple[Graph, dict[str, tuple[str, ...]]]:
-    from twin.bridge.graph import is_hidden
-
-    graph = joining.graph()
-    topics = graph.topics()
-    return graph, {name: types for name, types in topics.items() if hidden or not is_hidden(name)}
-
-
-def _known(topic: str, topics: dict[str, tuple[str, ...]]) -> tuple[str, tuple[str, ...]]:
+def _known(topic: str, topics: Mapping[str, Sequence[str]]) -> tuple[str, Sequence[str]]:
     name = absolute(topic)
     if name not in topics:
         raise unknown("topic", topic, topics)
@@ -117,7 +97,7 @@ def _known(topic: str, topics: dict[str, tuple[str, ...]]) -> tuple[str, tuple[s
 
 
 def _table(
-    title: str, word: str, counts: Sequence[tuple[str, int]], topics: dict[str, tuple[str, ...]]
+    title: str, word: str, counts: Sequence[tuple[str, int]], topics: Mapping[str, Sequence[str]]
 ) -> str:
     rows = [
         f" * {name} [{', '.join(topics[name])}] {count} {word}{'s' if count > 1 else ''}\n"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -46,9 +45,7 @@ def hz(
     from twin.cli.ros.topic.process import open_topics
 
     accepts = compile_filter(filter_expr) if filter_expr else None
-    if wall_time:
-        joining = replace(joining, use_sim_time=False)
-    with open_topics(joining) as process:
+    with open_topics(joining.by_wall_time if wall_time else joining) as process:
         rates: dict[str, RateStatistics] = {}
         for topic in topics:
             name = process.topic(topic)

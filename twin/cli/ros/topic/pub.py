@@ -12,7 +12,7 @@ import typer
 from twin.cli.option_groups import takes
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.topic.options import NodeName, QosChoice, TopicName, publisher_qos
+from twin.cli.ros.topic.options import NodeName, PublisherQos, TopicName
 from twin.cli.ros.yaml_values import text_of, values_of
 from twin.errors import BridgeError
 
@@ -28,29 +28,18 @@ _CONNECTED_S = 1.0
 class PublishPlan:
     """How often, and when to begin and end."""
 
-    rate_hz: float
-    times: int
-    """0: until Ctrl-C."""
-    print_every: int
-    """0: never."""
-    wait_for: int
-    """Subscriptions."""
-    max_wait_s: float | None
-    keep_alive_s: float
-
-
-def _plan(
     rate: Annotated[
         float, typer.Option("--rate", "-r", min=1e-6, metavar="HZ", help="Messages per second.")
-    ] = 1.0,
-    once: Annotated[bool, typer.Option("--once", "-1", help="One message, then end.")] = False,
+    ] = 1.0
+    once: Annotated[bool, typer.Option("--once", "-1", help="One message, then end.")] = False
     times: Annotated[
         int,
         typer.Option("--times", "-t", min=0, metavar="N", help="So many, then end.", show_default="no end"),
-    ] = 0,
+    ] = 0
     print_every: Annotated[
         int, typer.Option("--print", "-p", min=0, metavar="N", help="Print every N-th message.")
-    ] = 1,
+    ] = 1
+    """0: never."""
     wait: Annotated[
         int | None,
         typer.Option(
@@ -61,37 +50,38 @@ def _plan(
             help="Wait for so many subscriptions.",
             show_default="1 with --once or --times, else 0",
         ),
-    ] = None,
+    ] = None
     max_wait_time_secs: Annotated[
         float | None, typer.Option(min=0.001, metavar="S", help="Wait so many seconds for subscriptions.")
-    ] = None,
+    ] = None
     keep_alive: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="Stay so many seconds after the last message.")
-    ] = 0.1,
-) -> PublishPlan:
-    if once and times:
-        raise BridgeError("--once and --times exclude each other")
-    count = 1 if once else times
-    wait_for = (1 if count else 0) if wait is None else wait
-    if max_wait_time_secs is not None and not wait_for:
-        raise BridgeError(
-            "--max-wait-time-secs option is only effective with --wait-matching-subscriptions, --once or "
-            "--times"
-        )
-    return PublishPlan(
-        rate_hz=rate,
-        times=count,
-        print_every=print_every,
-        wait_for=wait_for,
-        max_wait_s=max_wait_time_secs,
-        keep_alive_s=keep_alive,
-    )
+    ] = 0.1
+
+    def __post_init__(self) -> None:
+        if self.once and self.times:
+            raise BridgeError("--once and --times exclude each other")
+        if self.max_wait_time_secs is not None and not self.wait_for:
+            raise BridgeError(
+                "--max-wait-time-secs option is only effective with --wait-matching-subscriptions, --once or "
+                "--times"
+            )
+
+    @property
+    def count(self) -> int:
+        """How many messages; 0: until Ctrl-C."""
+        return 1 if self.once else self.times
+
+    @property
+    def wait_for(self) -> int:
+        """How many subscriptions."""
+        return int(self.count > 0) if self.wait is None else self.wait
 
 
 @joins
-@takes("plan", _plan)
-@takes("choice", publisher_qos)
-@partial(endless, ends_by_itself=lambda given: given["plan"].times > 0)
+@takes("plan", PublishPlan)
+@takes("choice", PublisherQos)
+@partial(endless, ends_by_itself=lambda given: given["plan"].count > 0)
 def pub(
     topic: TopicName,
     message_type: Annotated[
@@ -104,7 +94,7 @@ def pub(
     stdin: Annotated[bool, typer.Option("--stdin", help="Read the values from standard input.")] = False,
     *,
     plan: PublishPlan,
-    choice: QosChoice,
+    choice: PublisherQos,
     node_name: NodeName = None,
     joining: Joining,
 ) -> None:
@@ -120,7 +110,7 @@ def pub(
         _wait_for_subscriptions(process, publisher, plan)
         typer.echo("publisher: beginning loop")
         _publish(process, publisher, make, plan)
-        process.live.spin(timeout_s=plan.keep_alive_s)
+        process.live.spin(timeout_s=plan.keep_alive)
 
 
 def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]:
@@ -162,13 +152,13 @@ def _wait_for_subscriptions(process: TopicProcess, publisher: Publisher[Any], pl
 
     waited_s = 0.0
     while count() < plan.wait_for:
-        if plan.max_wait_s is not None and waited_s >= plan.max_wait_s:
+        if plan.max_wait_time_secs is not None and waited_s >= plan.max_wait_time_secs:
             raise BridgeError(
                 f"Timed out waiting for subscribers: Expected {plan.wait_for} subcribers but only got "
                 f"{count()} subscribers"
             )
         typer.echo(f"Waiting for at least {plan.wait_for} matching subscription(s)...")
-        step_s = min(1.0, plan.max_wait_s or 1.0)
+        step_s = min(1.0, plan.max_wait_time_secs or 1.0)
         process.live.spin(lambda: count() >= plan.wait_for, timeout_s=step_s)
         waited_s += step_s
     # A publisher that nobody waits for may still be on its way to somebody.
@@ -191,7 +181,7 @@ def _publish(
         publisher.publish(message)
 
     publish()
-    if plan.times != 1:
-        timer = process.node.create_timer(round(1e9 / plan.rate_hz), publish)
-        process.live.spin(lambda: 0 < plan.times <= count)
+    if plan.count != 1:
+        timer = process.node.create_timer(round(1e9 / plan.rate), publish)
+        process.live.spin(lambda: 0 < plan.count <= count)
         timer.cancel()

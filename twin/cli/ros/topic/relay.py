@@ -46,7 +46,7 @@ def throttle_messages(
     from twin.bridge.tools.relay import MessageThrottle
 
     _run(
-        _clock(joining, wall_time),
+        joining.by_wall_time if wall_time else joining,
         "throttle",
         source,
         target or f"{source}_throttle",
@@ -75,7 +75,7 @@ def throttle_bytes(
     from twin.bridge.tools.relay import ByteThrottle
 
     _run(
-        _clock(joining, wall_time),
+        joining.by_wall_time if wall_time else joining,
         "throttle",
         source,
         target or f"{source}_throttle",
@@ -99,12 +99,6 @@ def drop(
     if x > y:
         raise BridgeError(f"X is {x} and Y {y}: of {y} messages at most {y} can be dropped")
     _run(joining, "drop", source, target or f"{source}_drop", lambda _: Drop(x, y))
-
-
-def _clock(joining: Joining, wall_time: bool) -> Joining:
-    from dataclasses import replace
-
-    return replace(joining, use_sim_time=False) if wall_time else joining
 
 
 def _run(
