@@ -19,17 +19,15 @@ from twin.bridge.conversions import (
 )
 from twin.bridge.msgs import Quaternion, TFMessage, Transform, TransformStamped, Vector3, header
 from twin.bridge.tf import (
-    StaticTransformBroadcaster,
-    TransformBroadcaster,
-    TransformListener,
-    transform_stamped,
-)
-from twin.bridge.tf.buffer import (
     DisconnectedFramesError,
     ExtrapolationError,
+    StaticTransformBroadcaster,
+    TransformBroadcaster,
     TransformBuffer,
     TransformError,
+    TransformListener,
     UnknownFrameError,
+    transform_stamped,
 )
 from twin.errors import TwinError
 from twin.geometry import Pose2, Pose3

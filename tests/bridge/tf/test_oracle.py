@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from twin.bridge.tf.buffer import (
+from twin.bridge.tf import (
     DisconnectedFramesError,
     ExtrapolationError,
     InvalidFrameError,

@@ -30,7 +30,7 @@ from twin.bridge.msgs import (
     header,
     new,
 )
-from twin.bridge.tf.buffer import ExtrapolationError, TransformBuffer
+from twin.bridge.tf import ExtrapolationError, TransformBuffer
 from twin.bridge.tf.clouds import points_of
 from twin.bridge.tf.laser import project_laser
 from twin.bridge.tf.transforms import QuaternionStamped, do_transform

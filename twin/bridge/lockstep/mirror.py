@@ -16,7 +16,7 @@ from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.graph import EndpointInfo, NodeInfo, alive, parse_token
-from twin.bridge.lockstep.protocol import Entry, entry
+from twin.bridge.lockstep.protocol import Entry, Questions, ask, carried, entry
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
 from twin.bridge.wire.external import Arrival
@@ -104,8 +104,7 @@ class Mirror:
         self._declared: dict[int, list[Any]] = {}
         self._publishers: dict[int, tuple[MirroredPublisher, Any]] = {}
         self._gids: set[bytes] = set()
-        self._queries: dict[int, zenoh.Query] = {}
-        self._requests = 0
+        self._questions = Questions()
         self._services: dict[str, str] = {}
         self.nodes: list[str] = []
         """Full names, in order of creation."""
@@ -130,12 +129,9 @@ class Mirror:
             if item.kind == Entry.SAMPLE:
                 self._publish(number, item.attachment.tobytes(), item.payload.tobytes())
             elif item.kind == Entry.REQUEST:
-                self._ask(item)
-            elif item.kind == Entry.REPLY and number in self._queries:
-                query = self._queries[number]
-                query.reply(query.key_expr, item.payload.tobytes(), attachment=item.attachment.tobytes())
-            elif item.kind == Entry.END and number in self._queries:
-                self._queries.pop(number).drop()  # type: ignore[no-untyped-call]
+                ask(self._bus.session, item, self._on_answer)
+            elif item.kind in (Entry.REPLY, Entry.END):
+                self._questions.answer(item)
             elif item.kind == Entry.DECLARE:
                 self._declare(number, item.key)
             elif item.kind == Entry.UNDECLARE:
@@ -143,17 +139,11 @@ class Mirror:
 
     def request(self, key: str, query: zenoh.Query) -> None:
         """Pass a request on to a service of the process with the next step."""
-        self._requests += 1
-        self._queries[self._requests] = query
-        attachment = query.attachment.to_bytes() if query.attachment else b""
-        payload = query.payload.to_bytes() if query.payload else b""
-        self._waiting.append(entry(Entry.REQUEST, self._requests, key, attachment, payload))
+        self._waiting.append(self._questions.pass_on(key, query))
 
     def close(self) -> None:
         """Take the nodes off the bus. Harmless when repeated."""
-        for query in self._queries.values():
-            query.drop()  # type: ignore[no-untyped-call]
-        self._queries.clear()
+        self._questions.close()
         for number in reversed(tuple(self._declared)):
             self._undeclare(number)
         if self._offers is not None:
@@ -170,27 +160,9 @@ class Mirror:
                 tap(sample)
         publisher.put(payload, attachment=attachment)
 
-    def _ask(self, item: Any) -> None:
-        number = item.number
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None and self._bus.in_own_thread():
-                attachment = reply.ok.attachment.to_bytes() if reply.ok.attachment else b""
-                payload = reply.ok.payload.to_bytes()
-                self._waiting.append(entry(Entry.REPLY, number, "", attachment, payload))
-
-        def on_end() -> None:
-            self._waiting.append(entry(Entry.END, number))
-
-        self._bus.session.get(
-            item.key,
-            direct(on_reply, on_end),
-            target=zenoh.QueryTarget.ALL_COMPLETE,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            payload=item.payload.tobytes(),
-            attachment=item.attachment.tobytes(),
-            timeout=1e8,
-        )
+    def _on_answer(self, answer: Any) -> None:
+        if answer.kind == Entry.END or self._bus.in_own_thread():
+            self._waiting.append(answer)
 
     def _declare(self, number: int, token: str) -> None:
         info = parse_token(token)
@@ -224,13 +196,12 @@ class Mirror:
         self._publishers.pop(number, None)
 
     def _on_sample(self, number: int, sample: zenoh.Sample) -> None:
-        attachment = sample.attachment.to_bytes() if sample.attachment else b""
+        attachment, payload = carried(sample)
         source = parse_attachment(attachment)
         if source is None or source.gid in self._gids:
             return  # nodes of one process reach each other without us
-        if not self._bus.in_own_thread():
-            return  # not from the run
-        self._waiting.append(entry(Entry.SAMPLE, number, "", attachment, sample.payload.to_bytes()))
+        if self._bus.in_own_thread():  # from the run
+            self._waiting.append(entry(Entry.SAMPLE, number, "", attachment, payload))
 
     def _on_query(self, query: zenoh.Query, service: _MirroredService) -> None:
         source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)

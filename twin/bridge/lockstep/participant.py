@@ -14,7 +14,7 @@ import zenoh
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
-from twin.bridge.lockstep.protocol import STEP, node_token, requests, responses, run_token, step_key
+from twin.bridge.lockstep.protocol import STEP, carried, node_token, requests, responses, run_token, step_key
 from twin.bridge.lockstep.recorder import Recorder
 from twin.bridge.msgs import ns
 from twin.bridge.node.services import StandardServices
@@ -64,8 +64,8 @@ class LockstepProcess:
         if query is None:
             return False
         with query:
-            payload = query.payload.to_bytes() if query.payload else b""
-            source = parse_attachment(query.attachment.to_bytes() if query.attachment else None)
+            attachment, payload = carried(query)
+            source = parse_attachment(attachment)
             if source is None:
                 return True  # not from a run
             request = requests.decode(payload)

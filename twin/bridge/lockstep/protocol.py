@@ -5,18 +5,26 @@ The service travels as any other of rmw_zenoh. The tokens tell who takes part; t
 
 from __future__ import annotations
 
+import logging
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import zenoh
 
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.keys import demangle, mangle, topic_key
+from twin.bridge.wire.session import direct
 
 STEP = ServiceType("twin_msgs/srv/Step")
 Entry: Any = types.get("twin_msgs/msg/LockstepEntry")
 _EMPTY = np.zeros(0, np.uint8)
+_PATIENCE_S = 1.0
+"""After so long, people are told what the run waits for."""
+_log = logging.getLogger("twin.run")
 requests, responses = codec(STEP.Request), codec(STEP.Response)
 
 
@@ -44,6 +52,69 @@ def parse_node_token(token: str) -> tuple[str, str]:
     """Return the session's id and the node of a `node_token`."""
     _, _, session_id, node = token.split("/")
     return session_id, demangle(node)
+
+
+def carried(carrier: zenoh.Sample | zenoh.Query) -> tuple[bytes, bytes]:
+    """Return attachment and payload, each empty if there is none."""
+    attachment, payload = carrier.attachment, carrier.payload
+    return attachment.to_bytes() if attachment else b"", payload.to_bytes() if payload else b""
+
+
+def ask(session: zenoh.Session, request: Any, on_entry: Callable[[Any], None]) -> None:
+    """Ask a session's services what an entry REQUEST says; hand on each reply, and the end, as entries."""
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            on_entry(entry(Entry.REPLY, request.number, "", *carried(reply.ok)))
+
+    session.get(
+        request.key,
+        direct(on_reply, lambda: on_entry(entry(Entry.END, request.number))),
+        target=zenoh.QueryTarget.ALL_COMPLETE,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        payload=request.payload.tobytes(),
+        attachment=request.attachment.tobytes(),
+        timeout=1e8,
+    )
+
+
+class Questions:
+    """Queries that the other side answers, by number."""
+
+    def __init__(self) -> None:
+        self._open: dict[int, zenoh.Query] = {}
+        self._count = 0
+
+    def pass_on(self, key: str, query: zenoh.Query) -> Any:
+        """Keep a query for services of a key; return the entry that asks it on the other side."""
+        self._count += 1
+        self._open[self._count] = query
+        return entry(Entry.REQUEST, self._count, key, *carried(query))
+
+    def answer(self, item: Any) -> None:
+        """Do what an entry says: REPLY, or END after the last one."""
+        query = self._open.get(item.number)
+        if query is not None and item.kind == Entry.REPLY:
+            query.reply(query.key_expr, item.payload.tobytes(), attachment=item.attachment.tobytes())
+        elif query is not None:
+            self._open.pop(item.number).drop()  # type: ignore[no-untyped-call]
+
+    def close(self) -> None:
+        """Let nobody wait any more."""
+        for query in self._open.values():
+            query.drop()  # type: ignore[no-untyped-call]
+        self._open.clear()
+
+
+def patience(timeout_s: float, what: str) -> Iterator[None]:
+    """Yield until so long [s] of wall time is over; after a moment people are told what is waited for."""
+    start, told = time.monotonic(), False
+    yield
+    while (waited := time.monotonic() - start) <= timeout_s:
+        if waited > _PATIENCE_S and not told:
+            told = True
+            _log.warning("waiting for %s, %g s at most", what, timeout_s)
+        yield
 
 
 def _octets(data: bytes) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 import zenoh
 
 from twin.bridge.bus import Bus
-from twin.bridge.lockstep.protocol import Entry, entry
+from twin.bridge.lockstep.protocol import Entry, Questions, ask, carried, entry
 from twin.bridge.wire.keys import gid, parse_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
@@ -27,8 +27,7 @@ class Recorder:
         self._numbers: dict[str, int] = {}
         self._gids: dict[bytes, int] = {}
         self._subscriptions: dict[int, Any] = {}
-        self._asked: dict[int, zenoh.Query] = {}
-        self._requests = 0
+        self._questions = Questions()
         self._asking = False
         self._offered: dict[str, Any] = {}
         session, everything = bus.session, f"{bus.domain_id}/**"
@@ -51,17 +50,15 @@ class Recorder:
             BridgeError: the run and this process do not agree on what there is.
         """
         for item in entries:
-            number = item.number
             if item.kind == Entry.SAMPLE:
                 source = parse_attachment(item.attachment.tobytes())
-                self._subscription(number).enqueue((item.payload.tobytes(), source), False)
+                self._subscription(item.number).enqueue((item.payload.tobytes(), source), False)
             elif item.kind == Entry.REQUEST:
-                self._ask(item)
-            elif item.kind == Entry.REPLY and number in self._asked:
-                query = self._asked[number]
-                query.reply(query.key_expr, item.payload.tobytes(), attachment=item.attachment.tobytes())
-            elif item.kind == Entry.END and number in self._asked:
-                self._asked.pop(number).drop()  # type: ignore[no-untyped-call]
+                self._asking = True
+                ask(self._bus.session, item, lambda answer: self._sent.append(answer))
+                self._asking = False
+            elif item.kind in (Entry.REPLY, Entry.END):
+                self._questions.answer(item)
             elif item.kind == Entry.DECLARE:
                 self._offered[item.key] = self._bus.session.declare_queryable(
                     item.key, direct(self._on_query), complete=True
@@ -74,27 +71,6 @@ class Recorder:
         if self._any_service is not None:
             self._any_service.undeclare()
             self._any_service = None
-
-    def _ask(self, item: Any) -> None:
-        number = item.number
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                attachment = reply.ok.attachment.to_bytes() if reply.ok.attachment else b""
-                payload = reply.ok.payload.to_bytes()
-                self._sent.append(entry(Entry.REPLY, number, "", attachment, payload))
-
-        self._asking = True
-        self._bus.session.get(
-            item.key,
-            direct(on_reply, lambda: self._sent.append(entry(Entry.END, number))),
-            target=zenoh.QueryTarget.ALL_COMPLETE,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            payload=item.payload.tobytes(),
-            attachment=item.attachment.tobytes(),
-            timeout=1e8,
-        )
-        self._asking = False
 
     def _subscription(self, number: int) -> Any:
         if number not in self._subscriptions:
@@ -120,18 +96,14 @@ class Recorder:
             self._subscriptions.pop(self._numbers[token], None)
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        attachment = sample.attachment.to_bytes() if sample.attachment else b""
+        attachment, payload = carried(sample)
         source = parse_attachment(attachment)
         number = self._gids.get(source.gid) if source else None
         if number is not None:
-            self._sent.append(entry(Entry.SAMPLE, number, "", attachment, sample.payload.to_bytes()))
+            self._sent.append(entry(Entry.SAMPLE, number, "", attachment, payload))
 
     def _on_query(self, query: zenoh.Query) -> None:
         if self._asking:  # the run asks one of our services; nobody else is meant
             query.drop()  # type: ignore[no-untyped-call]
-            return
-        self._requests += 1
-        self._asked[self._requests] = query
-        attachment = query.attachment.to_bytes() if query.attachment else b""
-        payload = query.payload.to_bytes() if query.payload else b""
-        self._sent.append(entry(Entry.REQUEST, self._requests, str(query.key_expr), attachment, payload))
+        else:
+            self._sent.append(self._questions.pass_on(str(query.key_expr), query))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import queue
 import threading
 import time
@@ -16,6 +15,7 @@ from twin.bridge.lockstep.protocol import (
     STEP,
     node_token,
     parse_node_token,
+    patience,
     requests,
     responses,
     run_token,
@@ -26,9 +26,6 @@ from twin.bridge.wire.keys import pack_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
-_log = logging.getLogger("twin.run")
-_PATIENCE_S = 1.0
-"""After so long, people are told what the run waits for."""
 _POLL_S = 0.2
 _MARGIN_S = 10.0
 """Zenoh gives up so much later than we do."""
@@ -173,23 +170,17 @@ def await_node(bus: Bus, attendance: Attendance, name: str, timeout_s: float) ->
     return stepper
 
 
-def _others(attendance: Attendance) -> str:
-    return f"; what has joined: {', '.join(attendance.nodes)}" if attendance.nodes else ""
-
-
 def _session_of(attendance: Attendance, name: str, timeout_s: float) -> str:
-    start, told = time.monotonic(), False
-    while not (sessions := attendance.sessions(name)):
-        waited = time.monotonic() - start
-        if waited > timeout_s:
-            raise BridgeError(
-                f"no node {name} has joined within {timeout_s:g} s; start its process, for example with "
-                f"twin exec FILE.py:FACTORY --lockstep{_others(attendance)}"
-            )
-        if waited > _PATIENCE_S and not told:
-            told = True
-            _log.warning("waiting for the node %s to join, %g s at most", name, timeout_s)
+    for _ in patience(timeout_s, f"the node {name} to join"):
+        if sessions := attendance.sessions(name):
+            break
         attendance.wait(_POLL_S)
+    else:
+        others = f"; what has joined: {', '.join(attendance.nodes)}" if attendance.nodes else ""
+        raise BridgeError(
+            f"no node {name} has joined within {timeout_s:g} s; start its process, for example with "
+            f"twin exec FILE.py:FACTORY --lockstep{others}"
+        )
     if len(sessions) > 1:
         raise BridgeError(f"{len(sessions)} processes have a node {name}; node names are unique")
     return sessions[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import queue
 import time
 from dataclasses import dataclass, replace
@@ -14,13 +13,12 @@ from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.graph import EndpointInfo, Graph, NodeInfo
 from twin.bridge.lockstep.mirror import MirroredSample, mirrored_publisher
+from twin.bridge.lockstep.protocol import carried, patience
 from twin.bridge.topics import Sample
 from twin.bridge.wire.keys import parse_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
-_log = logging.getLogger("twin.run")
-_PATIENCE_S = 1.0
 _POLL_S = 0.02
 _NAMELESS = NodeInfo("/", "", "", "")
 
@@ -55,16 +53,13 @@ class AnswerTopic:
         self._graph = Graph.watch(bus)
         listener = self._listener = self._own("MS", config.topic)
         talker = self._own("MP", config.stimulus)
-        base = f"{bus.domain_id}{config.topic}/{types.dds_name(listener.type)}/{listener.type_hash}"
-        self._publisher: Any = bus.session.declare_publisher(
-            base, congestion_control=zenoh.CongestionControl.DROP
-        )
-        self._subscriber: Any = bus.session.declare_subscriber(base, direct(self._on_sample))
+        drop = zenoh.CongestionControl.DROP
+        answer = f"{bus.domain_id}{config.topic}/{types.dds_name(listener.type)}/{listener.type_hash}"
+        self._publisher: Any = bus.session.declare_publisher(answer, congestion_control=drop)
+        self._subscriber: Any = bus.session.declare_subscriber(answer, direct(self._on_sample))
         stimulus = f"{bus.domain_id}{config.stimulus}/{types.dds_name(talker.type)}/{talker.type_hash}"
         self._probe: Any = bus.session.declare_publisher(
-            stimulus,
-            allowed_destination=zenoh.Locality.REMOTE,
-            congestion_control=zenoh.CongestionControl.DROP,
+            stimulus, allowed_destination=zenoh.Locality.REMOTE, congestion_control=drop
         )
         bus.tap(self._on_own_sample)
 
@@ -74,21 +69,15 @@ class AnswerTopic:
         Raises:
             BridgeError: none in time.
         """
-        start, told, config = time.monotonic(), False, self.config
-        while not self._is_present():
-            waited = time.monotonic() - start
-            if waited > config.timeout_s:
-                raise BridgeError(
-                    f"within {config.timeout_s:g} s nobody has joined who hears {config.stimulus} and "
-                    f"publishes {config.topic}; start it, or name another stimulus: --wait-for "
-                    f"{config.topic}@TOPIC"
-                )
-            if waited > _PATIENCE_S and not told:
-                told = True
-                _log.warning(
-                    "waiting for somebody who publishes %s, %g s at most", config.topic, config.timeout_s
-                )
+        config = self.config
+        for _ in patience(config.timeout_s, f"somebody who publishes {config.topic}"):
+            if self._is_present():
+                return
             time.sleep(_POLL_S)
+        raise BridgeError(
+            f"within {config.timeout_s:g} s nobody has joined who hears {config.stimulus} and publishes "
+            f"{config.topic}; start it, or name another stimulus: --wait-for {config.topic}@TOPIC"
+        )
 
     def step(self, tick: int) -> None:
         """Wait for as many samples as the stimulus had since the last call, and publish them.
@@ -139,10 +128,9 @@ class AnswerTopic:
     def _is_present(self) -> bool:
         if not self._probe.matching_status.matching:
             return False
-        hear = {
-            e.node.session_id for e in self._graph.subscriptions(self.config.stimulus) if not self._is_own(e)
-        }
-        speak = {e.node.session_id for e in self._graph.publishers(self.config.topic) if not self._is_own(e)}
+        own = {self._bus.session_id}
+        hear = {e.node.session_id for e in self._graph.subscriptions(self.config.stimulus)} - own
+        speak = {e.node.session_id for e in self._graph.publishers(self.config.topic)} - own
         # Who declares no tokens tells nobody what it publishes.
         return bool(hear & speak) or not hear
 
@@ -167,9 +155,8 @@ class AnswerTopic:
     def _on_sample(self, sample: zenoh.Sample) -> None:
         if self._bus.in_own_thread():
             return
-        attachment = sample.attachment.to_bytes() if sample.attachment else None
+        attachment, payload = carried(sample)
         if parse_attachment(attachment) is None:
             self._bus.external.refuse("attachment", self.config.topic, "no rmw_zenoh attachment of 33 bytes")
-            return
-        assert attachment is not None
-        self._arrived.put((sample.payload.to_bytes(), attachment))
+        else:
+            self._arrived.put((payload, attachment))

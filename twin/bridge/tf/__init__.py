@@ -8,11 +8,11 @@ from twin.bridge.tf.broadcasting import (
     TransformListener,
     transform_stamped,
 )
-from twin.bridge.tf.buffer import (
+from twin.bridge.tf.buffer import TransformBuffer
+from twin.bridge.tf.errors import (
     DisconnectedFramesError,
     ExtrapolationError,
     InvalidFrameError,
-    TransformBuffer,
     TransformError,
     TransformTimeoutError,
     UnknownFrameError,

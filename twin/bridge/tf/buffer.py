@@ -4,41 +4,14 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from twin.bridge.msgs import (
-    LaserScan,
-    Quaternion,
-    Time,
-    Transform,
-    TransformStamped,
-    Vector3,
-    header,
-    ns,
-)
+from twin.bridge.msgs import LaserScan, Quaternion, Time, Transform, TransformStamped, Vector3, header, ns
 from twin.bridge.tf.core import BufferCore
-from twin.bridge.tf.errors import (
-    DisconnectedFramesError,
-    ExtrapolationError,
-    InvalidFrameError,
-    TransformError,
-    TransformTimeoutError,
-    UnknownFrameError,
-)
 from twin.bridge.tf.laser import transform_laser_scan
 from twin.bridge.tf.report import frame_infos, frames_as_string, frames_as_yaml
 from twin.bridge.tf.rigid import Rigid
 from twin.bridge.tf.transforms import do_transform
 from twin.bridge.tf.wait import TransformFuture, Waiting
 from twin.errors import BridgeError
-
-__all__ = [
-    "DisconnectedFramesError",
-    "ExtrapolationError",
-    "InvalidFrameError",
-    "TransformBuffer",
-    "TransformError",
-    "TransformTimeoutError",
-    "UnknownFrameError",
-]
 
 M = TypeVar("M")
 AnyTime = int | Time | None

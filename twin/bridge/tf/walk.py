@@ -8,12 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from twin.bridge.tf.cache import FrameCache
-from twin.bridge.tf.errors import (
-    DisconnectedFramesError,
-    ExtrapolationError,
-    UnknownFrameError,
-    seconds,
-)
+from twin.bridge.tf.errors import DisconnectedFramesError, ExtrapolationError, UnknownFrameError, seconds
 from twin.bridge.tf.rigid import IDENTITY, Rigid, compose, inverse
 
 MAX_DEPTH = 1000
