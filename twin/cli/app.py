@@ -9,22 +9,22 @@ from typing import Annotated
 
 import typer
 
-from twin.cli import examples, exec, new, play, run, schema
+from twin.cli import examples, exec, listings, new, play, run, schema
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
-from twin.cli.map import arenas
-from twin.cli.model import check, convert, graph, robots, tree, view
+from twin.cli.model import check, convert, graph, tree, view
+from twin.cli.option_groups import example
 from twin.cli.other_commands import Commands
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
-from twin.cli.run import batch, scenarios
+from twin.cli.run import batch
 from twin.errors import TwinError
 
 app = typer.Typer(
     name="twin",
     cls=Commands,
     help="A digital twin for mobile robots: robot files, physics, autonomy, recordings, verdicts, ROS 2.",
-    epilog="Example: [bold]twin run warehouse[/bold]",
+    epilog=example("twin run warehouse"),
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -39,11 +39,11 @@ _COMMANDS = (
     ("test", batch.run_batch, _SCENARIOS, "twin test scenarios --junit results.xml"),
     ("play", play.play, _SCENARIOS, "twin play runs/warehouse/20261121-101500"),
     ("new", new.new, _SCENARIOS, "twin new my_robot"),
-    ("scenarios", scenarios.scenarios, _SCENARIOS, "twin scenarios"),
-    ("arenas", arenas.arenas, _SCENARIOS, "twin arenas"),
+    ("scenarios", listings.scenarios, _SCENARIOS, "twin scenarios"),
+    ("arenas", listings.arenas, _SCENARIOS, "twin arenas"),
     ("examples", examples.examples, _SCENARIOS, "twin examples talker"),
     ("schema", schema.schema, _SCENARIOS, "twin schema -o scenario.schema.json"),
-    ("robots", robots.robots, _ROBOTS, "twin robots"),
+    ("robots", listings.robots, _ROBOTS, "twin robots"),
     ("check", check.check, _ROBOTS, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
     ("tree", tree.tree, _ROBOTS, "twin tree my_robot.urdf"),
     ("graph", graph.graph, _ROBOTS, "twin graph my_robot.urdf -o my_robot.svg"),
@@ -69,7 +69,7 @@ _NEED_ARGUMENTS = ("run", "new", "exec", "play", "check", "tree", "graph", "conv
 for _name, _function, _panel, _example in _COMMANDS:
     app.command(
         _name,
-        epilog=f"Example: [bold]{_example}[/bold]",
+        epilog=example(_example),
         no_args_is_help=_name in _NEED_ARGUMENTS,
         rich_help_panel=_panel,
     )(_function)

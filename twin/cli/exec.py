@@ -6,19 +6,12 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Factory, Joining, joins
 
 
 @joins
 def execute(
-    place: Annotated[
-        str,
-        typer.Argument(
-            metavar="FILE.py:FACTORY",
-            help="A function that takes the bus and returns a node, or a list of them.",
-            show_default=False,
-        ),
-    ],
+    place: Factory,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="Be stepped by a run that waits for a node of this process.")
     ] = False,

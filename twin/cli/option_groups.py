@@ -1,4 +1,4 @@
-"""Groups of options that several commands share."""
+"""What commands share: groups of options, an example below the help, options that many have."""
 
 from __future__ import annotations
 
@@ -29,3 +29,8 @@ def takes(name: str, make: Callable[..., Any]) -> Callable[[Callable[..., None]]
         return wrapper
 
     return decorate
+
+
+def example(command: str) -> str:
+    """Return what stands below a command's help."""
+    return f"Example: [bold]{command.replace('[', chr(92) + '[')}[/bold]"

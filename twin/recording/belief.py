@@ -8,17 +8,19 @@ that odometry is drawn in the right place and its drift can be seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
 
-from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
+from twin.geometry import Pose2, yaw_from_quat_wxyz
 from twin.periods import Period, next_due
 from twin.recording.columns import Columns, TrailColumns, TransformColumns, scalars
-from twin.recording.frames import WORLD, Frames
+from twin.recording.frames import WORLD
 from twin.recording.placing import Placed
+
+if TYPE_CHECKING:
+    from twin.recording.channels.channel import Context
 
 TRUTH_COLOUR = (90, 200, 120, 255)
 ESTIMATE_COLOUR = (255, 150, 40, 255)
@@ -33,41 +35,27 @@ FLOOR_HEIGHT = 0.03
 """Above the floor, so that what is drawn there lies on the map [m]; each trail has its own level."""
 
 Numbers = tuple[float, ...]
-TruePose = Callable[[str], Pose3]
-"""Returns the pose of a body in `world`, now."""
 
 
 class Belief:
     """Estimated pose, trails and localisation error of one robot."""
 
     def __init__(
-        self,
-        recording: rr.RecordingStream,
-        frames: Frames,
-        namespace: str,
-        true_pose: TruePose,
-        *,
-        start_ns: int,
-        period: Period,
-        trail_step_m: float,
-        radius: float,
+        self, context: Context, namespace: str, *, period: Period, trail_step_m: float, radius: float
     ) -> None:
         """Start without knowing anything.
 
         Args:
-            recording: Gets the static parts: the ghost, colours.
-            frames: Names of the run's frames.
+            context: What channels need; its recording gets the static parts: the ghost, colours.
             namespace: Of the robot's topics.
-            true_pose: Reads the simulator.
-            start_ns: When the recording begins [ns].
             period: Trails and errors are sampled in the first transform at or after its multiples [ns].
             trail_step_m: Length of a segment of a trail [m].
             radius: Of the ring around the estimated pose [m].
         """
-        self._recording = recording
-        self._frames = frames
+        recording, frames = context.recording, context.frames
+        self._recording, self._frames = recording, frames
         self._namespace = namespace
-        self._true_pose = true_pose
+        self._true_pose = context.true_pose
         self._period = period
         self._next_ns = 0
         self._base: str | None = None
@@ -77,7 +65,7 @@ class Belief:
         self._radius = radius
         robot = frames.robot(namespace)
         self._ghost = f"/estimate/{robot}"
-        self._placed = Placed(recording, self._ghost, start_ns)
+        self._placed = Placed(recording, self._ghost, context.start_ns)
         self._transforms = TransformColumns(f"/tf_belief/{robot}")
         self._trails = {name: TrailColumns(f"/trails/{robot}/{name}", trail_step_m) for name in TRAILS}
         for name, (colour, width) in TRAILS.items():

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import struct
+from typing import TYPE_CHECKING, Any
 
-from twin.recording.sources import Sample
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
 
 _HEAD = struct.Struct("<qI")  # time [ns], payload length [bytes]
 
@@ -21,7 +23,7 @@ class RunDigest:
         self._hash = hashlib.sha256()
         self._names: dict[tuple[str, str], bytes] = {}
 
-    def on_sample(self, sample: Sample) -> None:
+    def on_sample(self, sample: Sample[Any]) -> None:
         """Add one sample (a callback for `Bus.tap`)."""
         key = (sample.topic, sample.msgtype)
         names = self._names.get(key)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from twin.recording.solids import Rgba8
+from twin.recording.shapes import Rgba8
 
 COLOURS: tuple[Rgba8, ...] = (
     (102, 133, 227, 255),

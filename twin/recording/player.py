@@ -44,7 +44,8 @@ def play(
     command = [viewer_binary(), "--bind", LOCALHOST]
     if web:
         data_port = free_port()
-        _check_port(port)
+        if listens(port):
+            raise RecordingError(f"port {port} is in use; choose another one with --port")
         command += ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(port)]
         on_ready(f"http://{LOCALHOST}:{port}/?url=rerun%2Bhttp://{LOCALHOST}:{data_port}/proxy")
     else:
@@ -169,11 +170,6 @@ def check_display() -> None:
     """Raise RecordingError if no window can be opened."""
     if not has_display():
         raise RecordingError("no display to open the viewer on; --web serves it to a browser")
-
-
-def _check_port(port: int) -> None:
-    if listens(port):
-        raise RecordingError(f"port {port} is in use; choose another one with --port")
 
 
 def listens(port: int) -> bool:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 import rerun as rr
 
-from twin.geometry import Array, Pose3, xyzw_from_wxyz
-from twin.models.shapes import Box, Capsule, Cylinder, Sphere
+from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, xyzw_from_wxyz
+from twin.models.mesh.meshes import read_mesh
+from twin.models.shapes import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
 from twin.recording.frames import WORLD
-from twin.recording.meshes import declare_mesh
-from twin.recording.solids import Rgba8, Solid
 
 if TYPE_CHECKING:
     from twin.sim.shapes import BodyShape
@@ -20,7 +21,17 @@ FLOOR_COLOUR = (96, 100, 106, 255)
 FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
+Rgba8 = tuple[int, int, int, int]
 FillMode = Literal["solid", "majorwireframe", "transparentfillmajorwireframe"]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A shape in the frame of the entity it is drawn in."""
+
+    geometry: Geometry
+    pose: Pose3
+    colour: Rgba8
 
 
 def body_entity(body: str, static: bool) -> str:
@@ -69,7 +80,7 @@ def draw_solids(
     fill_mode: FillMode = "transparentfillmajorwireframe" if see_through else "solid"
     recording.log(entity, at, *_primitives(solids, fill_mode), static=True)
     for i, solid in enumerate(solids):
-        declare_mesh(recording, f"{entity}/mesh_{i}", at, solid, own_colours=not see_through)
+        _declare_mesh(recording, f"{entity}/mesh_{i}", at, solid, own_colours=not see_through)
 
 
 def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
@@ -125,3 +136,48 @@ def _look(solids: Sequence[tuple[Solid, object]], fill_mode: FillMode) -> dict[s
         "colors": [solid.colour for solid, _ in solids],
         "fill_mode": fill_mode,
     }
+
+
+def _declare_mesh(
+    recording: rr.RecordingStream,
+    path: str,
+    frame: rr.CoordinateFrame,
+    solid: Solid,
+    *,
+    own_colours: bool,
+) -> None:
+    """Log the mesh of `solid`, if it is one: the triangles that physics has, whatever the format of its file.
+
+    With `own_colours`, triangles keep those of their file, whatever the robot file says, as RViz does.
+    """
+    mesh = solid.geometry
+    if not isinstance(mesh, Mesh):
+        return
+    triangles = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
+    R = matrix_from_quat_wxyz(solid.pose.quat_wxyz)
+    points = (triangles.points * mesh.scale) @ R.T + solid.pose.xyz
+    # A negative scale turns the surface inside out, unless it is put back.
+    faces = triangles.faces[:, :: -1 if np.prod(mesh.scale) < 0.0 else 1]
+    corners = points[faces]
+    given = np.array(solid.colour, dtype=np.uint8)
+    colours = np.tile(given, (len(faces), 1))
+    if own_colours and triangles.face_colours is not None:
+        known = np.isfinite(triangles.face_colours[:, 0])
+        colours[known, :3] = np.round(255.0 * np.clip(triangles.face_colours[known], 0.0, 1.0))
+    recording.log(
+        path,
+        frame,
+        rr.Mesh3D(
+            vertex_positions=corners.reshape(-1, 3).astype(np.float32),
+            vertex_normals=np.repeat(_normals(corners), 3, axis=0).astype(np.float32),
+            vertex_colors=np.repeat(colours, 3, axis=0),
+        ),
+        static=True,
+    )
+
+
+def _normals(corners: Array) -> Array:
+    """Return unit normals, shape (n, 3), of triangles of corners of shape (n, 3, 3)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(lengths > 0.0, lengths, 1.0)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +14,11 @@ import numpy as np
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
 from twin.recording.frames import WORLD, Frames
-from twin.recording.sources import Sample
 
 if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays for it
     import rerun as rr
 
+    from twin.bridge.topics import Sample
     from twin.recording.belief import Belief
     from twin.recording.channels.channel import Channel, Context
     from twin.recording.columns import TransformColumns
@@ -56,21 +56,6 @@ class RecordingConfig:
             raise RecordingError("; ".join(problems))
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """A copy of a sample; the bus lends a message only during the call."""
-
-    topic: str
-    msgtype: str
-    time_ns: int
-    payload: bytes
-    message: Any
-
-    @classmethod
-    def of(cls, sample: Sample) -> _Kept:
-        return cls(sample.topic, sample.msgtype, sample.time_ns, sample.payload, deepcopy(sample.message))
-
-
 class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
@@ -100,7 +85,7 @@ class RerunSink:
         self._config = config or RecordingConfig()
         self._ids = (application_id, recording_id)
         self._world: World | None = None
-        self._early: list[Sample] = []
+        self._early: list[Any] = []
         self._channels: dict[tuple[str, str], Channel | None] = {}
         self._beliefs: dict[str, Belief] = {}
         self._period = period_of(self._config.poses_hz)
@@ -158,10 +143,12 @@ class RerunSink:
         for sample in early:
             self.on_sample(sample)
 
-    def on_sample(self, sample: Sample) -> None:
+    def on_sample(self, sample: Sample[Any]) -> None:
         """Keep what is shown of a message (a callback for `Bus.tap`)."""
         if self._world is None:
-            self._early.append(_Kept.of(sample))
+            # The bus lends a message only during the call.
+            kept = {name: getattr(sample, name) for name in ("topic", "msgtype", "time_ns", "payload")}
+            self._early.append(SimpleNamespace(**kept, message=deepcopy(sample.message)))
             return
         key = (sample.topic, sample.msgtype)
         if key not in self._channels:
@@ -239,17 +226,13 @@ class RerunSink:
         declare_map_eye(self._recording, self._stage.low, self._stage.high)
 
     def _belief(self, namespace: str) -> Belief:
-        assert self._world is not None
         if namespace not in self._beliefs:
             from twin.recording.belief import Belief
 
             box = self._robots.get(self._frames.robot(namespace))
             self._beliefs[namespace] = Belief(
-                self._recording,
-                self._frames,
+                self._context,
                 namespace,
-                self._world.pose,
-                start_ns=self._context.start_ns,
                 period=self._period,
                 trail_step_m=self._config.trail_step_m,
                 radius=box.radius if box else _RING_RADIUS,

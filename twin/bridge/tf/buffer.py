@@ -68,8 +68,7 @@ class TransformBuffer(BufferCore):
         if isinstance(message, LaserScan):
             raise BridgeError("a LaserScan becomes a cloud in another frame: use transform_laser_scan")
         here = self.lookup_transform(target_frame, stamped.header.frame_id, stamped.header.stamp)
-        transformed: M = do_transform(message, here)
-        return transformed
+        return do_transform(message, here)
 
     def transform_full(self, message: M, target_frame: str, target_time: AnyTime, fixed_frame: str) -> M:
         """Return a stamped message as seen from a frame at another time, while `fixed_frame` did not move.
@@ -79,12 +78,9 @@ class TransformBuffer(BufferCore):
             BridgeError: messages of this type cannot be transformed.
         """
         stamped: Any = message
-        source = stamped.header
-        transformed: M = do_transform(
-            message,
-            self.lookup_transform_full(target_frame, target_time, source.frame_id, source.stamp, fixed_frame),
-        )
-        return transformed
+        frame, time = stamped.header.frame_id, stamped.header.stamp
+        there = self.lookup_transform_full(target_frame, target_time, frame, time, fixed_frame)
+        return do_transform(message, there)
 
     def transform_laser_scan(self, scan: LaserScan, target_frame: str, *, range_cutoff: float = -1.0) -> Any:
         """Return a scan as a PointCloud2 in another frame; see `tf_laser.transform_laser_scan`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -31,10 +31,11 @@ from twin.bridge.tf.clouds import moved
 from twin.errors import BridgeError, nearest
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, multiply_wxyz, rotate_wxyz
 
+M = TypeVar("M")
 QuaternionStamped: Any = types.get("geometry_msgs/msg/QuaternionStamped")
 
 
-def do_transform(message: Any, transform: TransformStamped) -> Any:
+def do_transform(message: M, transform: TransformStamped) -> M:
     """Return a message in the frame that a transform leads to; its header becomes the transform's.
 
     One without a header, such as a `Pose`, is taken to be in the transform's child frame.
@@ -47,7 +48,8 @@ def do_transform(message: Any, transform: TransformStamped) -> Any:
         name = getattr(type(message), "__msgtype__", type(message).__name__)
         known = [str(getattr(cls, "__msgtype__", cls)) for cls in _FUNCTIONS]
         raise BridgeError(f"a {name} cannot be transformed; {nearest(name, known)}")
-    return function(message, pose3_from_transform(transform.transform), transform.header)
+    transformed: M = function(message, pose3_from_transform(transform.transform), transform.header)
+    return transformed
 
 
 def rotated_covariance(covariance: Array, quat_wxyz: Array) -> Array:

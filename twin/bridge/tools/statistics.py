@@ -35,37 +35,52 @@ class Bandwidth(NamedTuple):
     maximum: int
 
 
-class RateStatistics:
-    """Gaps between messages."""
+class _Window:
+    """The latest numbers; they are forgotten when the clock is set back."""
 
     def __init__(self, window: int) -> None:
-        self._gaps_ns: deque[int] = deque(maxlen=window)
-        self._last_ns = -1
+        self._numbers: deque[int] = deque(maxlen=window)
         self._first_ns = -1
-        self._reported_ns = 0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no number is known yet."""
+        return not self._numbers
+
+    def _note(self, now_ns: int, number: int) -> bool:
+        """Keep a number, not of the first message; return whether the clock was set back to zero."""
+        if now_ns == 0:  # use_sim_time, and nobody publishes /clock
+            restarted = bool(self._numbers)
+            self._numbers.clear()
+            return restarted
+        if self._first_ns < 0 or now_ns < self._first_ns:
+            self._first_ns = now_ns
+            self._numbers.clear()
+        else:
+            self._numbers.append(number)
+        return False
+
+
+class RateStatistics(_Window):
+    """Gaps between messages."""
+
+    _last_ns = -1
+    _reported_ns = 0
 
     def add(self, now_ns: int) -> bool:
         """Note a message; return whether the clock was set back to zero, so that counting starts anew."""
-        if now_ns == 0:  # use_sim_time, and nobody publishes /clock
-            restarted = bool(self._gaps_ns)
-            self._gaps_ns.clear()
-            return restarted
-        if self._first_ns < 0 or now_ns < self._first_ns:
-            self._first_ns = self._reported_ns = now_ns
-            self._gaps_ns.clear()
-        else:
-            self._gaps_ns.append(now_ns - self._last_ns)
-        self._last_ns = now_ns
-        return False
+        restarted = self._note(now_ns, now_ns - self._last_ns)
+        if now_ns:
+            self._last_ns = now_ns
+            self._reported_ns = now_ns if self.is_empty else self._reported_ns
+        return restarted
 
     def report(self, at_least_ns: int = _SECOND_NS) -> Spread | None:
         """Return the gaps [ns]; None if nothing came so long [ns] after the last report or first message."""
-        if not self._gaps_ns:
-            return None
-        if self._last_ns < self._reported_ns + at_least_ns:
+        if self.is_empty or self._last_ns < self._reported_ns + at_least_ns:
             return None
         self._reported_ns = self._last_ns
-        return _spread(self._gaps_ns)
+        return _spread(self._numbers)
 
 
 class BandwidthStatistics:
@@ -94,39 +109,22 @@ class BandwidthStatistics:
         return Bandwidth(total / (span_ns * 1e-9), n, total / n, min(sizes), max(sizes))
 
 
-class DelayStatistics:
+class DelayStatistics(_Window):
     """How old the stamps of messages were when they came."""
 
-    def __init__(self, window: int) -> None:
-        self._delays_ns: deque[int] = deque(maxlen=window)
-        self._first_ns = -1
-        self._new = False
+    _new = False
 
     def add(self, now_ns: int, stamp_ns: int) -> bool:
         """Note a message; return whether the clock was set back to zero, so that counting starts anew."""
-        if now_ns == 0:
-            restarted = bool(self._delays_ns)
-            self._delays_ns.clear()
-            return restarted
-        if self._first_ns < 0 or now_ns < self._first_ns:
-            self._first_ns = now_ns
-            self._delays_ns.clear()
-        else:
-            self._delays_ns.append(now_ns - stamp_ns)
-        self._new = True
-        return False
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no delay is known yet."""
-        return not self._delays_ns
+        self._new = self._new or now_ns != 0
+        return self._note(now_ns, now_ns - stamp_ns)
 
     def report(self) -> Spread | None:
         """Return the delays [ns]; None if nothing came since the last report."""
-        if not self._new or not self._delays_ns:
+        if not self._new or self.is_empty:
             return None
         self._new = False
-        return _spread(self._delays_ns)
+        return _spread(self._numbers)
 
 
 def _spread(numbers: Sequence[int]) -> Spread:

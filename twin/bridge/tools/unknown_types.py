@@ -19,39 +19,31 @@ _UNTOLD = ("", HUMBLE_HASH)
 """What stands for a hash where a wire knows none."""
 
 
-def only_type(name: str, endpoints: Sequence[EndpointInfo]) -> str:
-    """Return the type of a topic's endpoints.
-
-    Raises:
-        BridgeError: they have several.
-    """
-    found = sorted({endpoint.type for endpoint in endpoints})
-    if len(found) > 1:
-        raise BridgeError(
-            f"Cannot echo topic '{name}', as it contains more than one type: [{', '.join(found)}]"
-        )
-    return found[0]
-
-
 def message_class(process: LiveBus, node: Node, endpoints: Sequence[EndpointInfo]) -> type[Any]:
     """Return the class of what endpoints of one topic exchange; an unknown type is learnt from their nodes.
 
     Args:
         process: what the node runs in; it spins while a node is asked.
         node: asks.
-        endpoints: of one topic and type, those whose definition matters first.
+        endpoints: of one topic, those whose definition matters first.
 
     Raises:
-        BridgeError: no node tells an unknown type, or it is known here with another definition.
+        BridgeError: several types, an unknown one that no node tells, or one that is known here with another
+            definition.
     """
-    typename = endpoints[0].type
+    name, typename = endpoints[0].name, endpoints[0].type
+    found = sorted({endpoint.type for endpoint in endpoints})
+    if len(found) > 1:
+        raise BridgeError(
+            f"Cannot echo topic '{name}', as it contains more than one type: [{', '.join(found)}]"
+        )
     if not is_known(typename):
         learn_type(process, node, endpoints)
     cls = types.get(typename)
     ours, theirs = types.rihs01(typename), endpoints[0].type_hash
     if not same_hash(ours, theirs):
         raise BridgeError(
-            f"{endpoints[0].name}: {endpoints[0].node.full_name} has another definition of {typename} "
+            f"{name}: {endpoints[0].node.full_name} has another definition of {typename} "
             f"({theirs}) than is known here ({ours}); give its files with --interfaces DIR"
         )
     return cls

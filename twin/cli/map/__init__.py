@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from twin.cli.map import convert, info, render, save, show, zone
+from twin.cli.option_groups import example
 
 app = typer.Typer(no_args_is_help=True, help="Maps: look at them, save, convert, render, draw zones.")
 
@@ -15,8 +16,6 @@ for _function, _example in (
     (convert.convert, "twin map convert warehouse -o warehouse_coarse --resolution 0.1"),
     (render.render, "twin map render warehouse -o exact --resolution 0.02"),
 ):
-    app.command(no_args_is_help=_function is not save.save, epilog=f"Example: [bold]{_example}[/bold]")(
-        _function
-    )
+    app.command(no_args_is_help=_function is not save.save, epilog=example(_example))(_function)
 
 app.add_typer(zone.app, name="zone")

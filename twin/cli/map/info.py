@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from twin.cli.map.map_files import Map, map_path
+from twin.cli.map.map_files import Map
 
 
 def info(
@@ -46,8 +46,9 @@ def info(
 def _facts(name: str) -> dict[str, Any]:
     from twin.navigation.maps.map_yaml import read_metadata
     from twin.navigation.maps.occupancy_map import OccupancyMap
+    from twin.warehouse.map_files import named_map
 
-    path = map_path(name)
+    path = named_map(name)
     metadata = read_metadata(path)
     occupancy = OccupancyMap.load(path)
     return {

@@ -18,17 +18,11 @@ Format = Annotated[str, typer.Option("--fmt", help="pgm, png or bmp.", show_defa
 
 
 def load(name_or_path: str) -> OccupancyMap:
-    """Return a map; raises MapError with every fault."""
+    """Return a map; raises MapError with every fault, or if there is none."""
     from twin.navigation.maps.occupancy_map import OccupancyMap
-
-    return OccupancyMap.load(map_path(name_or_path))
-
-
-def map_path(name_or_path: str) -> Path:
-    """Return the YAML file of a map; raises MapError if there is none."""
     from twin.warehouse.map_files import named_map
 
-    return named_map(name_or_path)
+    return OccupancyMap.load(named_map(name_or_path))
 
 
 def yaml_path(output: Path) -> Path:

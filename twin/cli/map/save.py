@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import time
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from twin.cli.map.map_files import Format, Mode, told, yaml_path
 from twin.cli.ros.graph_names import absolute
-from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.tool_node import tool_node
+from twin.cli.ros.joining import Joining, joins, tool_node
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -41,7 +41,6 @@ def save(
     joining: Joining,
 ) -> None:
     """Save the map of a live graph as YAML and image; as `ros2 run nav2_map_server map_saver_cli`."""
-    from twin.cli.run.folders import map_name
     from twin.navigation.maps.map_saver import SaveParameters, save_map
     from twin.nodes.navigation.mapping.map_server import occupancy_map
 
@@ -51,7 +50,7 @@ def save(
         occupied_thresh=occupied,
         free_thresh=free,
     )
-    path = yaml_path(name or map_name())
+    path = yaml_path(name or Path(f"map_{int(time())}"))
     with joining.open() as process:
         message = _first_map(process, absolute(topic), transient_local, timeout)
     occupancy = occupancy_map(message)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from twin.cli.drawing_file import check_ending
 from twin.cli.map.map_files import Map, load
 
 
@@ -26,13 +27,9 @@ def show(
     ] = 1000,
 ) -> None:
     """Draw a map: in the terminal, or as a picture with the map frame's axes and masks over it."""
-    from twin.errors import RecordingError
-    from twin.files.writing import check_file, write_whole
+    from twin.files.writing import write_whole
 
-    if output is not None and output.suffix not in (".png", ".svg"):
-        raise RecordingError(f"--output {output}: must end in .png or .svg")
-    if output is not None:
-        check_file(output)
+    check_ending(output, (".png", ".svg"))
     if mask and output is None:
         raise typer.BadParameter("--mask is drawn in a picture: give --output, too")
     occupancy = load(name)

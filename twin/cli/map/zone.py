@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.map.map_files import load, told, yaml_path
-from twin.cli.option_groups import takes
+from twin.cli.option_groups import example, takes
 
 if TYPE_CHECKING:
     from twin.navigation.maps.map_saver import SaveParameters
@@ -48,7 +48,7 @@ def _zones(
 
 @app.command(
     no_args_is_help=True,
-    epilog="Example: [bold]twin map zone keepout keepout.yaml --map warehouse --rectangle 1,1,2,3[/bold]",
+    epilog=example("twin map zone keepout keepout.yaml --map warehouse --rectangle 1,1,2,3"),
 )
 @takes("zones", _zones)
 def keepout(mask: Mask, of: Of = "", *, zones: list[Any], erase: Erase = False) -> None:
@@ -60,7 +60,7 @@ def keepout(mask: Mask, of: Of = "", *, zones: list[Any], erase: Erase = False) 
 
 @app.command(
     no_args_is_help=True,
-    epilog="Example: [bold]twin map zone speed slow.yaml --map warehouse --circle 2,3,1 --percent 40[/bold]",
+    epilog=example("twin map zone speed slow.yaml --map warehouse --circle 2,3,1 --percent 40"),
 )
 @takes("zones", _zones)
 def speed(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ def inspection_text(found: Inspection, *, every: bool = False) -> Text:
     from rich.text import Text
 
     text = Text()
-    sources = _Sources()
+    lines_of = cache(lambda file: read_text(file, errors="replace").splitlines())
     shown, others = (found.diagnostics, {}) if every else _abridged(found.diagnostics)
     for diagnostic in shown:
         where = str(diagnostic.file) + (f":{diagnostic.line}" if diagnostic.line else "")
@@ -43,7 +44,7 @@ def inspection_text(found: Inspection, *, every: bool = False) -> Text:
         text.append(f"{diagnostic.severity}[{diagnostic.code}]: ", STYLES[diagnostic.severity])
         subject = "" if diagnostic.element in diagnostic.message else f"{diagnostic.element}: "
         text.append(escaped(f"{subject}{diagnostic.message}\n"))
-        excerpt = sources.line(diagnostic)
+        excerpt = _excerpt(diagnostic, lines_of)
         if excerpt:
             text.append(escaped(f"    {excerpt}\n"), "dim")
         text.append("    fix: ", "green")
@@ -108,19 +109,9 @@ def _summary(found: Inspection) -> str:
     return f"{found.file}: {faults or 'no faults found'}{size}"
 
 
-class _Sources:
-    """The lines of the files that diagnostics name, each file read once."""
-
-    def __init__(self) -> None:
-        self._lines: dict[str, list[str]] = {}
-
-    def line(self, diagnostic: Diagnostic) -> str:
-        """Return the source line of a diagnostic; empty if it is unknown or long."""
-        if diagnostic.line is None:
-            return ""
-        key = str(diagnostic.file)
-        if key not in self._lines:
-            self._lines[key] = read_text(diagnostic.file, errors="replace").splitlines()
-        lines = self._lines[key]
-        text = lines[diagnostic.line - 1].strip() if diagnostic.line <= len(lines) else ""
-        return text if len(text) <= EXCERPT else ""
+def _excerpt(diagnostic: Diagnostic, lines_of: Callable[[Path], list[str]]) -> str:
+    """Return the source line of a diagnostic; empty if it is unknown or long."""
+    if diagnostic.line is None:
+        return ""
+    text = "".join(lines_of(diagnostic.file)[diagnostic.line - 1 : diagnostic.line]).strip()
+    return text if len(text) <= EXCERPT else ""

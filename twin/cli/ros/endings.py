@@ -10,12 +10,9 @@ from contextlib import contextmanager
 from typing import Any
 
 
-def _once(given: Mapping[str, Any]) -> bool:
-    return bool(given.get("once"))
-
-
 def endless(
-    command: Callable[..., None], ends_by_itself: Callable[[Mapping[str, Any]], bool] = _once
+    command: Callable[..., None],
+    ends_by_itself: Callable[[Mapping[str, Any]], bool] = lambda given: bool(given.get("once")),
 ) -> Callable[..., None]:
     """Let Ctrl-C be the ordinary end of a command, unless its options say that it ends by itself."""
 

@@ -14,6 +14,20 @@ def absolute(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
 
 
+def full_type(name: str, kind: str, word: str, example: str) -> str:
+    """Return a type's whole name, in which the kind (msg, srv, action) may be left out.
+
+    Raises:
+        BridgeError: it is of another kind.
+    """
+    from twin.bridge import types
+
+    parts = types.parts(name if name.count("/") != 1 else name.replace("/", f"/{kind}/"))
+    if parts.kind != kind:
+        raise BridgeError(f"{name} is no {word}; valid is for example {example}")
+    return "/".join(parts)
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> BridgeError:
     """Return the error that something is not in the graph, with the nearest name."""
     return BridgeError(f"Unknown {kind} '{name}'; {instead(kind, name, known)}")

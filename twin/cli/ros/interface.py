@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli.option_groups import takes
-from twin.cli.ros.own_types import Interfaces, add_interfaces
+from twin.cli.option_groups import example, takes
+from twin.cli.ros.joining import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
     from twin.bridge.types.show import Comments
@@ -34,7 +34,7 @@ def _kinds(
     return [kind for kind, wanted in chosen.items() if wanted or not any(chosen.values())]
 
 
-@app.command(epilog="Example: [bold]twin interface show geometry_msgs/msg/Twist[/bold]")
+@app.command(epilog=example("twin interface show geometry_msgs/msg/Twist"))
 def show(
     typename: TypeName,
     all_comments: Annotated[bool, typer.Option("--all-comments", help="Those of nested types too.")] = False,
@@ -51,7 +51,7 @@ def show(
     _print(show_lines(_given(typename), comments))
 
 
-@app.command("list", epilog="Example: [bold]twin interface list --only-actions[/bold]")
+@app.command("list", epilog=example("twin interface list --only-actions"))
 @takes("kinds", _kinds)
 def list_interfaces(*, kinds: list[str]) -> None:
     """List all types."""
@@ -62,7 +62,7 @@ def list_interfaces(*, kinds: list[str]) -> None:
         _print([_HEADINGS[kind], *(f"    {name}" for name in names if f"/{kind}/" in name)])
 
 
-@app.command(epilog="Example: [bold]twin interface package nav2_msgs[/bold]")
+@app.command(epilog=example("twin interface package nav2_msgs"))
 @takes("kinds", _kinds)
 def package(
     name: Annotated[str, typer.Argument(metavar="PACKAGE", help="Such as example_interfaces.")],
@@ -80,7 +80,7 @@ def package(
     _print(item for kind in kinds for item in names if f"/{kind}/" in item)
 
 
-@app.command(epilog="Example: [bold]twin interface packages[/bold]")
+@app.command(epilog=example("twin interface packages"))
 @takes("kinds", _kinds)
 def packages(
     *,
@@ -93,7 +93,7 @@ def packages(
     _print(sorted(found))
 
 
-@app.command(epilog="Example: [bold]twin interface proto geometry_msgs/msg/Twist[/bold]")
+@app.command(epilog=example("twin interface proto geometry_msgs/msg/Twist"))
 def proto(
     typename: TypeName,
     no_quotes: Annotated[bool, typer.Option("--no-quotes", help="Without quotes around it.")] = False,

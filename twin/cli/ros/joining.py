@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,16 +15,23 @@ import typer
 from twin.bridge.wire import Wire
 from twin.cli.option_groups import takes
 from twin.cli.ros.endings import quiet_pipe
-from twin.cli.ros.own_types import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
+    from twin.bridge.node import Node
 
 _AT_ONCE_S = 3.0
 PATIENCE_S = 60.0
 """How long a command that waits for a server waits for somebody to listen [s]: runs take a while to start."""
+
+
+def tool_node(bus: Bus, name: str, *, shown_as: str | None = None) -> Node:
+    """Return a node without parameters and log: `_ros2cli_<name>`, which lists leave out, or as asked for."""
+    from twin.bridge.node.options import BARE
+
+    return bus.create_node(shown_as or f"_ros2cli_{name}", options=BARE)
 
 
 def whole_graph(bus: Bus) -> Graph:
@@ -35,6 +42,38 @@ def whole_graph(bus: Bus) -> Graph:
     if graph.lacks:
         typer.echo(f"WARNING: what is shown may be incomplete: {graph.lacks}", err=True)
     return graph
+
+
+Factory = Annotated[
+    str,
+    typer.Argument(
+        metavar="FILE.py:FACTORY",
+        help="A function that takes the bus and returns a node, or a list of them.",
+        show_default=False,
+    ),
+]
+Interfaces = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--interfaces",
+        metavar="DIR",
+        envvar="TWIN_INTERFACES",
+        help="A package, workspace or share folder with .msg, .srv, .action files; repeatable.",
+        show_default=False,
+    ),
+]
+
+
+def add_interfaces(folders: Sequence[Path] | None) -> None:
+    """Make the interfaces of folders known.
+
+    Raises:
+        BridgeError: no such folder, or all faults in its files.
+    """
+    if folders:
+        from twin.bridge import types
+
+        types.add_folders(folders)
 
 
 _option = partial(typer.Option, rich_help_panel="Joining the graph")

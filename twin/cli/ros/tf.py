@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.drawing_file import Output, check_ending, write_drawing
+from twin.cli.option_groups import example
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
@@ -26,7 +27,7 @@ app = typer.Typer(
 WaitTime = Annotated[float, typer.Option("--wait-time", "-t", min=0.0, help="How many seconds to listen.")]
 
 
-@app.command("tree", epilog="Example: [bold]twin tf tree[/bold]")
+@app.command("tree", epilog=example("twin tf tree"))
 @joins
 def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
     """Show the frames as a tree, with broadcaster and rate."""
@@ -37,7 +38,7 @@ def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
     typer.echo(text_tree(infos), nl=False)
 
 
-@app.command("frames", epilog="Example: [bold]twin tf frames -o frames.svg[/bold]")
+@app.command("frames", epilog=example("twin tf frames -o frames.svg"))
 @joins
 def frames(
     output: Output = None,
@@ -54,7 +55,7 @@ def frames(
     write_drawing(output, {".gv": lambda: graphviz(infos, now_ns), ".svg": lambda: svg(infos, now_ns)})
 
 
-@app.command("echo", epilog="Example: [bold]twin tf echo map base_link --once[/bold]")
+@app.command("echo", epilog=example("twin tf echo map base_link --once"))
 @joins
 @endless
 def echo(
@@ -87,7 +88,7 @@ def echo(
             process.spin(timeout_s=1.0 / rate)
 
 
-@app.command("monitor", epilog="Example: [bold]twin tf monitor --once --duration 3[/bold]")
+@app.command("monitor", epilog=example("twin tf monitor --once --duration 3"))
 @joins
 @endless
 def monitor(
@@ -136,7 +137,7 @@ def monitor(
                 return
 
 
-@app.command("throttle", epilog="Example: [bold]twin tf throttle map base_link laser --rate 2[/bold]")
+@app.command("throttle", epilog=example("twin tf throttle map base_link laser --rate 2"))
 @joins
 @endless
 def throttle(

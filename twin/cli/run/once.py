@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
 from twin.cli.console import print_error, stderr, stdout
-from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
+from twin.cli.interrupted import sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import run_folder
 from twin.cli.run.options import RunOptions
 from twin.cli.run.progress import run_progress
 from twin.errors import TwinError
-
-if TYPE_CHECKING:
-    from twin.runtime import Progress
 
 
 def run_once(options: RunOptions) -> int:
@@ -44,8 +39,8 @@ def run_once(options: RunOptions) -> int:
     )
     fault = None
     try:
-        with run_progress(options.scenario.stem) as bar:
-            simulation.run(_progress(bar))
+        with run_progress(options.scenario.stem) as progress:
+            simulation.run(progress)
     except TwinError as error:
         fault = error
         print_error(error)
@@ -62,12 +57,3 @@ def run_once(options: RunOptions) -> int:
         assert simulation.folder is not None
         stdout().print(verdict_report(verdict.to_dict(), simulation.folder))
     return verdict.exit_code
-
-
-def _progress(bar: Callable[[Progress], None] | None) -> Callable[[Progress], None]:
-    def show(now: Progress) -> None:
-        raise_swallowed()
-        if bar is not None:
-            bar(now)
-
-    return show

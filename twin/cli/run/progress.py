@@ -7,17 +7,18 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from twin.cli.console import stderr
+from twin.cli.interrupted import raise_swallowed
 
 if TYPE_CHECKING:
     from twin.runtime import Progress
 
 
 @contextmanager
-def run_progress(title: str) -> Iterator[Callable[[Progress], None] | None]:
-    """Yield a callback that moves the bar, or None if stderr is no terminal."""
+def run_progress(title: str) -> Iterator[Callable[[Progress], None]]:
+    """Yield a callback that moves the bar, if stderr is a terminal, and does not miss a Ctrl-C."""
     console = stderr()
     if not console.is_terminal:
-        yield None
+        yield lambda progress: raise_swallowed()
         return
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
@@ -36,6 +37,7 @@ def run_progress(title: str) -> Iterator[Callable[[Progress], None] | None]:
         task = bar.add_task(title, total=1.0, factor=0.0, state="loading")
 
         def show(progress: Progress) -> None:
+            raise_swallowed()
             bar.update(
                 task,
                 completed=progress.time_s,

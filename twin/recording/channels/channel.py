@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rerun as rr
 
@@ -13,7 +13,9 @@ from twin.geometry import Pose3
 from twin.recording.belief import Belief
 from twin.recording.columns import Columns
 from twin.recording.frames import Frames
-from twin.recording.sources import Sample
+
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +49,7 @@ class Channel(ABC):
         """What is sent with a block."""
 
     @abstractmethod
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep what is shown of a message."""
 
     def send(self, recording: rr.RecordingStream) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import takewhile
+from typing import TYPE_CHECKING, Any
 
 import rerun as rr
 
@@ -10,8 +11,10 @@ from twin.recording.channels.channel import Channel, Context
 from twin.recording.columns import Columns, log_lines, scalars, states
 from twin.recording.frames import BELIEF_FRAMES
 from twin.recording.palette import Palette
-from twin.recording.solids import Rgba8
-from twin.recording.sources import Sample
+from twin.recording.shapes import Rgba8
+
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
 
 COMMANDED_COLOUR = (255, 150, 40, 255)
 MEASURED_COLOUR = (80, 160, 255, 255)
@@ -22,7 +25,7 @@ LOG_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "CRITICAL"}
 class VelocityChannel(Channel):
     """Forward and turning velocity, commanded (geometry_msgs/Twist) or measured (nav_msgs/Odometry)."""
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep linear.x [m/s] and angular.z [rad/s]."""
         measured = sample.msgtype == "nav_msgs/msg/Odometry"
         stamped = measured or sample.msgtype == "geometry_msgs/msg/TwistStamped"
@@ -48,7 +51,7 @@ class JointChannel(Channel):
         self._palette = Palette()
         self._plans: dict[tuple[str, ...], list[tuple[int, Columns[float]]]] = {}
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep positions [m] or [rad], not of wheels."""
         state = sample.message
         names = tuple(state.name)
@@ -77,7 +80,7 @@ class TransformChannel(Channel):
         super().__init__(context, namespace, topic)
         self._belief = context.belief(namespace)
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep transforms whose parent is `map` or `odom`."""
         for stamped in sample.message.transforms:
             parent = stamped.header.frame_id
@@ -108,7 +111,7 @@ class StateChannel(Channel):
         self._objects: dict[str, list[str]] = {}
         self._sent = 0
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep a change of state."""
         state = sample.message.data
         if state == self._last:
@@ -153,7 +156,7 @@ class LogChannel(Channel):
         self._lines = Columns("/log", log_lines)
         self.columns.append(self._lines)
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep a line as `[node] text`."""
         log = sample.message
         self._lines.append(sample.time_ns, f"[{log.name}] {log.msg}", LOG_LEVELS.get(log.level, "INFO"))

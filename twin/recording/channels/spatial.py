@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
@@ -14,7 +14,9 @@ from twin.recording.channels.channel import Channel, Context
 from twin.recording.columns import Columns, TransformColumns, arrows, points, strips
 from twin.recording.frames import WORLD
 from twin.recording.placing import Placed, set_time
-from twin.recording.sources import Sample
+
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
 
 SCAN_COLOUR = (255, 70, 70, 255)
 PLAN_COLOUR = (70, 140, 255, 255)
@@ -70,7 +72,7 @@ class ScanChannel(_SpatialChannel):
         self._directions: NDArray[np.float32] = np.zeros((0, 3), dtype=np.float32)
         self.declare(rr.Points3D.from_fields(colors=[SCAN_COLOUR], radii=rr.Radius.ui_points(1.5)))
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep the returns between range_min and range_max."""
         scan = sample.message
         self.place(scan.header.frame_id, sample.time_ns)
@@ -96,7 +98,7 @@ class GridChannel(_SpatialChannel):
         self._opacity = LAYER_OPACITIES.get(name, 1.0 if self._is_map else 0.6)
         self._last: tuple[Any, ...] | None = None
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Log the raster: row 0 of the message is at its origin, row 0 of Rerun's image at the far side."""
         grid = sample.message
         info = grid.info
@@ -136,7 +138,7 @@ class PathChannel(_SpatialChannel):
         self._last: NDArray[np.float32] | None = None
         self.declare(rr.LineStrips3D.from_fields(colors=[PLAN_COLOUR], radii=rr.Radius.ui_points(1.5)))
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep the positions."""
         path = sample.message
         positions = [pose.pose.position for pose in path.poses]
@@ -157,7 +159,7 @@ class PoseArrayChannel(_SpatialChannel):
         self.columns.append(self._arrows)
         self.declare(rr.Arrows3D.from_fields(colors=[PARTICLE_COLOUR], radii=[0.008]))
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Sample[Any]) -> None:
         """Keep at most `max_particles`, evenly spread over the array.
 
         The poses are read from the payload, 50 times faster than from the message: CDR ends with them, seven

@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.description import Inertial, RobotDescription
-from twin.recording.shapes import draw_solids, rgba8
-from twin.recording.solids import Rgba8, Solid
+from twin.recording.shapes import Rgba8, Solid, draw_solids, rgba8
 
 COLLISION_COLOUR: Rgba8 = (255, 140, 0, 110)
 """See-through, so that what is meant can be compared with what is touched."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,18 +13,11 @@ from twin.models.checks.diagnostic import Diagnostic
 from twin.models.description import RobotDescription
 from twin.recording.view.posture import Posture, Preset, coordinates
 
+if TYPE_CHECKING:
+    from twin.recording.view.robot_view import RobotView
+
 SEED = 0
 """Of the random postures: the same ones in the same order each time."""
-
-
-class Screen(Protocol):
-    """What shows postures; a `RobotView`."""
-
-    def move(self, posture: Posture) -> None:
-        """Show a posture."""
-
-    def close(self) -> None:
-        """Show nothing any more."""
 
 
 class RobotSession:
@@ -34,7 +27,7 @@ class RobotSession:
         self,
         description: RobotDescription,
         posture: Posture,
-        draw: Callable[[RobotDescription, Posture], Screen],
+        draw: Callable[[RobotDescription, Posture], RobotView],
     ) -> None:
         """Draw the robot and show its first posture.
 
@@ -116,11 +109,10 @@ class RobotSession:
         return self._values()
 
     def _values(self) -> dict[str, Any]:
-        values = self._posture.values
         return {
             "revision": self._revision,
             "robot_revision": self._robot_revision,
-            "values": values,
+            "values": self._posture.values,
             "followers": self._posture.followers,
         }
 

@@ -12,8 +12,17 @@ import pytest
 
 from twin.bridge.graph import Graph
 from twin.bridge.wire.keys import mangle
-from twin.cli.ros.node.graph import GraphChoice, NodeGraph, Topic, graphviz, mermaid, node_graph, text
-from twin.cli.ros.node.rendering import check_dot, svg
+from twin.cli.ros.node.graph import (
+    GraphChoice,
+    NodeGraph,
+    Topic,
+    check_dot,
+    graphviz,
+    mermaid,
+    node_graph,
+    svg,
+    text,
+)
 from twin.errors import RecordingError
 
 TOPICS = (Path(__file__).with_name("warehouse_topics.txt")).read_text("utf-8").split("\n")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.option_groups import example
 from twin.cli.ros.action.goal import send_goal
 from twin.cli.ros.graph_names import absolute, of_type, print_names, unknown
 from twin.cli.ros.joining import Joining, joins
@@ -22,18 +23,18 @@ _Count = Annotated[bool, typer.Option("--count-actions", "-c", help="Only show h
 app.command(
     "send_goal",
     no_args_is_help=True,
-    epilog='Example: [bold]twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"[/bold]',
+    epilog=example('twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"'),
 )(joins(send_goal))
 
 
-@app.command("list", epilog="Example: [bold]twin action list -t[/bold]")
+@app.command("list", epilog=example("twin action list -t"))
 @joins
 def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
     """List the actions that somebody offers or uses."""
     print_names(joining.graph().actions(), count=count, show_types=show_types)
 
 
-@app.command("type", no_args_is_help=True, epilog="Example: [bold]twin action type /fibonacci[/bold]")
+@app.command("type", no_args_is_help=True, epilog=example("twin action type /fibonacci"))
 @joins
 def show_type(action: _Name, *, joining: Joining) -> None:
     """Print the type of an action."""
@@ -45,9 +46,7 @@ def show_type(action: _Name, *, joining: Joining) -> None:
 
 
 @app.command(
-    "find",
-    no_args_is_help=True,
-    epilog="Example: [bold]twin action find example_interfaces/action/Fibonacci[/bold]",
+    "find", no_args_is_help=True, epilog=example("twin action find example_interfaces/action/Fibonacci")
 )
 @joins
 def find(
@@ -57,7 +56,7 @@ def find(
     print_names(of_type(action_type, joining.graph().actions()), count=count)
 
 
-@app.command("info", no_args_is_help=True, epilog="Example: [bold]twin action info -t /fibonacci[/bold]")
+@app.command("info", no_args_is_help=True, epilog=example("twin action info -t /fibonacci"))
 @joins
 def info(
     action: _Name,

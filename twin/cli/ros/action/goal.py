@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
-from twin.cli.ros.joining import PATIENCE_S, Joining
+from twin.cli.ros.graph_names import absolute, full_type, hint_at_nearest, unknown
+from twin.cli.ros.joining import PATIENCE_S, Joining, tool_node
 from twin.cli.ros.service.call import know
-from twin.cli.ros.tool_node import tool_node
 from twin.cli.ros.yaml_values import message_of, text_of
 from twin.errors import BridgeError
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from twin.bridge.actions.client import ActionClient, ClientGoal
     from twin.bridge.live import LiveBus
 
-_STATUS = {1: "ACCEPTED", 2: "EXECUTING", 3: "CANCELING", 4: "SUCCEEDED", 5: "CANCELED", 6: "ABORTED"}
 _CANCEL_S = 5.0
 _INTERRUPTED = 130
 
@@ -40,13 +38,15 @@ def send_goal(
     joining: Joining,
 ) -> None:
     """Send a goal and wait for its result; Ctrl-C cancels the goal."""
+    from twin.bridge import types
     from twin.bridge.actions.client import ActionClient
     from twin.bridge.messages.as_yaml import message_to_yaml
     from twin.bridge.wire.interrupts import noted_signals
 
     text = text_of(goal, stdin)
     with joining.open(PATIENCE_S if timeout is None else timeout) as process, noted_signals() as signals:
-        kind = _action_type(action_type)
+        example = "example_interfaces/action/Fibonacci"
+        kind = types.ActionType(full_type(action_type, "action", "action", example))
         node = tool_node(process.bus, f"send_goal_{kind.name.replace('/', '_')}")
         know(process, node, _used(kind.name, f"{absolute(action)}/_action"))
         message = message_of(kind.Goal, text)
@@ -87,6 +87,7 @@ def _follow(
     feedback: list[Any],
 ) -> None:
     """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
+    from twin.bridge.actions.states import NAMES
     from twin.bridge.messages.as_yaml import message_to_yaml
 
     def is_over() -> bool:
@@ -105,7 +106,7 @@ def _follow(
         if goal.error is not None:
             raise BridgeError(f"the goal has no result: {goal.error}")
         typer.echo(f"Result:\n    {message_to_yaml(goal.result)}")
-        typer.echo(f"Goal finished with status: {_STATUS.get(goal.status, 'UNKNOWN')}")
+        typer.echo(f"Goal finished with status: {NAMES.get(goal.status, 'UNKNOWN')}")
         return
     _cancel(process, goal)
     if not answered:
@@ -145,12 +146,3 @@ def _used(typename: str, base: str) -> dict[str, tuple[str, str]]:
         f"{typename}_Result": (f"{base}/get_result", f"{typename}_GetResult"),
         f"{typename}_Feedback": (f"{base}/feedback", f"{typename}_FeedbackMessage"),
     }
-
-
-def _action_type(name: str) -> Any:
-    from twin.bridge import types
-
-    package, kind, tail = types.parts(name if name.count("/") != 1 else name.replace("/", "/action/"))
-    if kind != "action":
-        raise BridgeError(f"{name} is no action; valid is for example example_interfaces/action/Fibonacci")
-    return types.ActionType(f"{package}/action/{tail}")

@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from twin.cli.ros.bag.rerun import rerun
+from twin.cli.option_groups import example
+from twin.cli.ros.bag.rerun import Bag, rerun
 from twin.cli.ros.joining import Joining, joins
 
 app = typer.Typer(no_args_is_help=True, help="Bags: record, play, look, convert; as `ros2 bag`.")
 
 _NS = 1e9
 
-Bag = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap, .db3 or .bag file.")]
 Topics = Annotated[list[str] | None, typer.Option("--topics", metavar="TOPIC", help="Only this; repeatable.")]
 Regex = Annotated[str, typer.Option("--regex", "-e", help="Topics whose whole name matches.")]
 Exclude = Annotated[str, typer.Option("--exclude-regex", "-x", help="Not topics whose whole name matches.")]
 Compression = Annotated[str, typer.Option(help="none, zstd, or with mcap lz4.")]
 
-app.command(no_args_is_help=True, epilog="Example: [bold]twin bag rerun drive/bag nodes.py:make[/bold]")(
-    rerun
-)
+app.command(no_args_is_help=True, epilog=example("twin bag rerun drive/bag nodes.py:make"))(rerun)
 
 
-@app.command(no_args_is_help=True, epilog="Example: [bold]twin bag record -a -o drive[/bold]")
+@app.command(no_args_is_help=True, epilog=example("twin bag record -a -o drive"))
 @joins
 def record(
     topics: Annotated[list[str] | None, typer.Argument(metavar="TOPIC", show_default=False)] = None,
@@ -51,7 +50,6 @@ def record(
     from twin.bridge.bags.topic_choice import TopicChoice
     from twin.bridge.bags.writer import BagConfig, as_storage
     from twin.bridge.wire.interrupts import noted_signals
-    from twin.cli.run.folders import bag_folder
 
     if not (topics or everything or regex):
         raise typer.BadParameter("name topics, or give --all or --regex")
@@ -62,7 +60,7 @@ def record(
         use_sim_time=joining.use_sim_time,
         bag=BagConfig(storage=as_storage(storage), compression=as_compression(compression)),
     )
-    folder = output or bag_folder()
+    folder = output or Path(datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S"))
     with joining.open() as process, noted_signals() as signals:
         recorder = Recorder(process.bus, folder, config)
         _tell([f"recording to {folder}; Ctrl-C ends it"])
@@ -76,7 +74,7 @@ def record(
     typer.echo(f"{recorder.count} messages on {len(recorder.topics)} topics in {folder}")
 
 
-@app.command(no_args_is_help=True, epilog="Example: [bold]twin bag play drive --clock[/bold]")
+@app.command(no_args_is_help=True, epilog=example("twin bag play drive --clock"))
 @joins
 def play(
     bag: Bag,
@@ -135,7 +133,7 @@ def play(
             player.play(lambda: bool(signals))
 
 
-@app.command(no_args_is_help=True, epilog="Example: [bold]twin bag info drive[/bold]")
+@app.command(no_args_is_help=True, epilog=example("twin bag info drive"))
 def info(bag: Bag) -> None:
     """Say what is in a bag, of ROS 2 or ROS 1."""
     from twin.bridge.bags.reader import BagReader
@@ -146,7 +144,7 @@ def info(bag: Bag) -> None:
         typer.echo(report(reader), nl=False)
 
 
-@app.command(no_args_is_help=True, epilog="Example: [bold]twin bag convert drive -o drive.bag[/bold]")
+@app.command(no_args_is_help=True, epilog=example("twin bag convert drive -o drive.bag"))
 def convert(
     bag: Bag,
     output: Annotated[

@@ -7,26 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli.ros.own_types import Interfaces, add_interfaces
+from twin.cli.ros.joining import Factory, Interfaces, add_interfaces
 from twin.errors import RecordingError
 
 if TYPE_CHECKING:
     from twin.bridge.bags.replay import Replayed
     from twin.bridge.bus import Bus
 
+Bag = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap, .db3 or .bag file.")]
+
 
 def rerun(
-    bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap, .db3 or .bag file.")
-    ],
-    place: Annotated[
-        str,
-        typer.Argument(
-            metavar="FILE.py:FACTORY",
-            help="A function that takes the bus and returns a node, or a list of them.",
-            show_default=False,
-        ),
-    ],
+    bag: Bag,
+    place: Factory,
     topics: Annotated[
         list[str] | None,
         typer.Option("--topics", metavar="TOPIC", help="Only this as input; repeatable.", show_default="all"),

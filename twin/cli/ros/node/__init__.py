@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.drawing_file import check_ending, write_drawing
+from twin.cli.option_groups import example
 from twin.cli.ros.graph_names import absolute, instead
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
@@ -21,13 +22,13 @@ if TYPE_CHECKING:
 app = typer.Typer(
     no_args_is_help=True,
     help="Nodes: list, look, draw; as `ros2 node` and rqt_graph.",
-    epilog="Example: [bold]twin node info /amcl[/bold]",
+    epilog=example("twin node info /amcl"),
 )
 
 _SEND_GOAL = "/_action/send_goal"
 
 
-@app.command("list", epilog="Example: [bold]twin node list[/bold]")
+@app.command("list", epilog=example("twin node list"))
 @joins
 def list_nodes(
     every: Annotated[bool, typer.Option("--all", "-a", help="Hidden nodes too.")] = False,
@@ -50,7 +51,7 @@ def list_nodes(
         typer.echo(name)
 
 
-@app.command("info", epilog="Example: [bold]twin node info /amcl[/bold]")
+@app.command("info", epilog=example("twin node info /amcl"))
 @joins
 def info(
     node: Annotated[str, typer.Argument(metavar="NODE", help="Such as /amcl.", show_default=False)],
@@ -78,13 +79,14 @@ def info(
     first = next(each for each in graph.nodes if each.full_name == name)
     own = [endpoint for endpoint in graph.endpoints if endpoint.node == first]
     typer.echo(name)
-    for title, chosen in _SECTIONS:
+    for title, kind, actions in _SECTIONS:
         typer.echo(f"  {title}:")
-        shown = [line for line in chosen(own) if hidden or not is_hidden(line.partition(":")[0])]
+        lines = _lines(own, kind, actions=actions)
+        shown = [line for line in lines if hidden or not is_hidden(line.partition(":")[0])]
         typer.echo("\n".join(f"    {line}" for line in shown))
 
 
-@app.command("graph", epilog="Example: [bold]twin node graph -o graph.mmd[/bold]")
+@app.command("graph", epilog=example("twin node graph -o graph.mmd"))
 @joins
 def graph_(
     output: Annotated[
@@ -113,8 +115,7 @@ def graph_(
     joining: Joining,
 ) -> None:
     """Draw nodes and topics, as rqt_graph: text, Graphviz text, Mermaid text, or SVG by Graphviz."""
-    from twin.cli.ros.node.graph import GraphChoice, graphviz, mermaid, node_graph, text
-    from twin.cli.ros.node.rendering import check_dot, svg
+    from twin.cli.ros.node.graph import GraphChoice, check_dot, graphviz, mermaid, node_graph, svg, text
 
     file = None if output is None or str(output) == "-" else output
     check_ending(file, (".gv", ".mmd", ".svg"))
@@ -133,37 +134,23 @@ def _names(graph: Graph, *, hidden: bool) -> list[str]:
     return sorted(node.full_name for node in graph.nodes if hidden or not node.name.startswith("_"))
 
 
-def _of_kind(kind: str) -> Callable[[Iterable[EndpointInfo]], list[str]]:
-    """Return what lists the endpoints of a kind as 'name: types'."""
-
-    def lines(endpoints: Iterable[EndpointInfo]) -> list[str]:
-        found: dict[str, set[str]] = {}
-        for endpoint in endpoints:
-            if endpoint.kind == kind:
-                found.setdefault(endpoint.name, set()).add(endpoint.type)
-        return [f"{name}: {', '.join(sorted(types))}" for name, types in sorted(found.items())]
-
-    return lines
-
-
-def _actions(kind: str) -> Callable[[Iterable[EndpointInfo]], list[str]]:
-    """Return what lists the actions whose goals are taken (SS) or sent (SC)."""
-
-    def lines(endpoints: Iterable[EndpointInfo]) -> list[str]:
-        return sorted(
-            f"{endpoint.name.removesuffix(_SEND_GOAL)}: {endpoint.type.removesuffix('_SendGoal')}"
-            for endpoint in endpoints
-            if endpoint.kind == kind and endpoint.name.endswith(_SEND_GOAL)
-        )
-
-    return lines
+def _lines(endpoints: Iterable[EndpointInfo], kind: str, *, actions: bool) -> list[str]:
+    """Return 'name: types' of the endpoints of a kind, or of the actions whose goals they take or send."""
+    found: dict[str, set[str]] = {}
+    for endpoint in endpoints:
+        if endpoint.kind == kind and (not actions or endpoint.name.endswith(_SEND_GOAL)):
+            name, typename = endpoint.name, endpoint.type
+            if actions:
+                name, typename = name.removesuffix(_SEND_GOAL), typename.removesuffix("_SendGoal")
+            found.setdefault(name, set()).add(typename)
+    return [f"{name}: {', '.join(sorted(types))}" for name, types in sorted(found.items())]
 
 
 _SECTIONS = (
-    ("Subscribers", _of_kind("MS")),
-    ("Publishers", _of_kind("MP")),
-    ("Service Servers", _of_kind("SS")),
-    ("Service Clients", _of_kind("SC")),
-    ("Action Servers", _actions("SS")),
-    ("Action Clients", _actions("SC")),
+    ("Subscribers", "MS", False),
+    ("Publishers", "MP", False),
+    ("Service Servers", "SS", False),
+    ("Service Clients", "SC", False),
+    ("Action Servers", "SS", True),
+    ("Action Clients", "SC", True),
 )

@@ -1,4 +1,4 @@
-"""What rqt_graph shows: nodes, and the topics by which they are connected; as text, DOT or Mermaid.
+"""What rqt_graph shows: nodes, and the topics by which they are connected; as text, DOT, Mermaid or SVG.
 
 Source of what is shown: rqt_graph, dotcode.py (active topics; dead sinks and debug topics hidden, the
 topics of an action as one).
@@ -6,8 +6,13 @@ topics of an action as one).
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+from twin.errors import RecordingError
 
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo, Graph
@@ -124,6 +129,31 @@ def graphviz(graph: NodeGraph) -> str:
             lines += [f"{_id('n', node)} -> {_id('t', topic.name)};" for node in topic.publishers]
             lines += [f"{_id('t', topic.name)} -> {_id('n', node)};" for node in topic.subscribers]
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def check_dot(output: Path) -> None:
+    """Refuse to draw where Graphviz is missing.
+
+    Raises:
+        RecordingError: there is no `dot`.
+    """
+    if shutil.which("dot") is None:
+        raise RecordingError(
+            f"--output {output}: an .svg is drawn by dot, of the package graphviz, which is not installed; "
+            "valid without it: .gv, .mmd"
+        )
+
+
+def svg(graphviz: str) -> str:
+    """Return the drawing.
+
+    Raises:
+        RecordingError: `dot` cannot draw it.
+    """
+    done = subprocess.run(["dot", "-Tsvg"], input=graphviz, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RecordingError(f"dot cannot draw the graph: {' '.join(done.stderr.split())}")
+    return done.stdout
 
 
 def mermaid(graph: NodeGraph) -> str:

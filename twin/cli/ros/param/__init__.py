@@ -7,10 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.cli.option_groups import example
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.param.client import TYPES, ParameterClient, find_node, node_names
+from twin.cli.ros.param.client import (
+    TYPES,
+    Hidden,
+    Name,
+    NodeName,
+    ParameterClient,
+    Timeout,
+    find_node,
+    node_names,
+)
 from twin.cli.ros.param.files import dump, load
-from twin.cli.ros.param.options import Hidden, Name, Node, Timeout
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -18,28 +27,13 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Parameters: list, get, set, keep in files; as `ros2 param`.")
 
-app.command(
-    "dump", no_args_is_help=True, epilog="Example: [bold]twin param dump /talker > talker.yaml[/bold]"
-)(joins(dump))
-app.command("load", no_args_is_help=True, epilog="Example: [bold]twin param load /talker talker.yaml[/bold]")(
-    joins(load)
+app.command("dump", no_args_is_help=True, epilog=example("twin param dump /talker > talker.yaml"))(
+    joins(dump)
 )
-
-_LABELS = (
-    "Parameter not set.",
-    "Boolean value is:",
-    "Integer value is:",
-    "Double value is:",
-    "String value is:",
-    "Byte values are:",
-    "Boolean values are:",
-    "Integer values are:",
-    "Double values are:",
-    "String values are:",
-)
+app.command("load", no_args_is_help=True, epilog=example("twin param load /talker talker.yaml"))(joins(load))
 
 
-@app.command("list", epilog="Example: [bold]twin param list /talker --param-type[/bold]")
+@app.command("list", epilog=example("twin param list /talker --param-type"))
 @joins
 def list_parameters(
     node: Annotated[str | None, typer.Argument(metavar="NODE", help="Default: all nodes.")] = None,
@@ -88,10 +82,10 @@ def _print_names(
         typer.echo(f"  {name} (type: {types[name]})" if show_types else f"  {name}")
 
 
-@app.command("get", no_args_is_help=True, epilog="Example: [bold]twin param get /talker use_sim_time[/bold]")
+@app.command("get", no_args_is_help=True, epilog=example("twin param get /talker use_sim_time"))
 @joins
 def get(
-    node: Node,
+    node: NodeName,
     name: Name,
     hide_type: Annotated[bool, typer.Option("--hide-type", help="Only the value.")] = False,
     hidden: Hidden = False,
@@ -107,22 +101,24 @@ def get(
         found = client.get([name])
         if not found:
             raise client.undeclared([name])
-    label, value = _LABELS[found[0].type], value_to_python(found[0])
-    if hide_type:
-        typer.echo(str(value))
-    else:
-        typer.echo(label if value is None else f"{label} {value}")
+    value = value_to_python(found[0])
+    if not hide_type and value is None:
+        typer.echo("Parameter not set.")
+        return
+    kind, is_array, _ = TYPES[found[0].type].partition(" array")
+    label = f"{kind.capitalize()} {'values are' if is_array else 'value is'}: "
+    typer.echo(f"{'' if hide_type else label}{value}")
 
 
 @app.command(
     "set",
     no_args_is_help=True,
     context_settings={"ignore_unknown_options": True},  # -1.0 is a value
-    epilog="Example: [bold]twin param set /talker max_speed 0.5[/bold]",
+    epilog=example("twin param set /talker max_speed 0.5"),
 )
 @joins
 def set_parameter(
-    node: Node,
+    node: NodeName,
     name: Name,
     value: Annotated[
         str, typer.Argument(metavar="VALUE", help="As in YAML: 1, 1.0, true, text, '[1, 2]', \"'1'\".")
@@ -142,12 +138,10 @@ def set_parameter(
     _say(result, "Set parameter successful", "Setting parameter failed")
 
 
-@app.command(
-    "delete", no_args_is_help=True, epilog="Example: [bold]twin param delete /talker max_speed[/bold]"
-)
+@app.command("delete", no_args_is_help=True, epilog=example("twin param delete /talker max_speed"))
 @joins
 def delete(
-    node: Node, name: Name, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining
+    node: NodeName, name: Name, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining
 ) -> None:
     """Delete a parameter, if the node allows it."""
     from twin.bridge.parameters.values import Parameter
@@ -158,12 +152,10 @@ def delete(
     _say(result, "Deleted parameter successfully", "Deleting parameter failed")
 
 
-@app.command(
-    "describe", no_args_is_help=True, epilog="Example: [bold]twin param describe /talker max_speed[/bold]"
-)
+@app.command("describe", no_args_is_help=True, epilog=example("twin param describe /talker max_speed"))
 @joins
 def describe(
-    node: Node,
+    node: NodeName,
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="Of parameters.")],
     hidden: Hidden = False,
     timeout: Timeout = 1.0,

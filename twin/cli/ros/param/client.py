@@ -1,19 +1,27 @@
-"""Asks nodes for their parameters: a client of the six services of rcl_interfaces."""
+"""Asks nodes for their parameters: a client of the six services of rcl_interfaces, and options in common."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from twin.cli.ros.graph_names import absolute
-from twin.cli.ros.joining import whole_graph
+from twin.cli.ros.joining import tool_node, whole_graph
 from twin.cli.ros.service.call import answer
-from twin.cli.ros.tool_node import tool_node
 from twin.errors import BridgeError, nearest
 
 if TYPE_CHECKING:
     from twin.bridge.graph import Graph
     from twin.bridge.live import LiveBus
+
+NodeName = Annotated[str, typer.Argument(metavar="NODE", help="Such as /talker.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the parameter.")]
+Hidden = Annotated[bool, typer.Option("--include-hidden-nodes", help="Nodes of tools too.")]
+Timeout = Annotated[
+    float, typer.Option("--timeout", metavar="S", min=0.0, help="How long to wait for the node.")
+]
 
 _WAIT_S = 5.0
 """How long `ros2 param` waits for the services of a node and their answers."""

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.cli.ros.joining import Joining
-from twin.cli.ros.param.client import ParameterClient, find_node
-from twin.cli.ros.param.options import Hidden, Node, Timeout
+from twin.cli.ros.param.client import Hidden, NodeName, ParameterClient, Timeout, find_node
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     import yaml
 
 
-def dump(node: Node, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining) -> None:
+def dump(node: NodeName, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining) -> None:
     """Print the parameters of a node as a parameter file."""
     from twin.bridge.parameters.files import KEY
     from twin.bridge.parameters.values import value_to_python
@@ -33,7 +32,7 @@ def dump(node: Node, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining:
 
 
 def load(
-    node: Node,
+    node: NodeName,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="Such as one of `dump`.")
     ],

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from twin.cli.option_groups import example
 from twin.cli.ros.endpoint_text import endpoint_text
 from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
 from twin.cli.ros.joining import Joining, joins
@@ -22,11 +23,11 @@ _Name = Annotated[str, typer.Argument(metavar="SERVICE", help="Such as /add_two_
 app.command(
     "call",
     no_args_is_help=True,
-    epilog='Example: [bold]twin service call /pause std_srvs/srv/SetBool "{data: true}"[/bold]',
+    epilog=example('twin service call /pause std_srvs/srv/SetBool "{data: true}"'),
 )(joins(call))
 
 
-@app.command("list", epilog="Example: [bold]twin service list -t[/bold]")
+@app.command("list", epilog=example("twin service list -t"))
 @joins
 def list_services(
     show_types: Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")] = False,
@@ -39,7 +40,7 @@ def list_services(
     print_names(shown(joining.graph().services(), hidden), count=count, show_types=show_types)
 
 
-@app.command("type", no_args_is_help=True, epilog="Example: [bold]twin service type /add_two_ints[/bold]")
+@app.command("type", no_args_is_help=True, epilog=example("twin service type /add_two_ints"))
 @joins
 def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> None:
     """Print the type of a service."""
@@ -50,9 +51,7 @@ def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> N
         typer.echo(typename)
 
 
-@app.command(
-    "find", no_args_is_help=True, epilog="Example: [bold]twin service find std_srvs/srv/Empty[/bold]"
-)
+@app.command("find", no_args_is_help=True, epilog=example("twin service find std_srvs/srv/Empty"))
 @joins
 def find(
     service_type: Annotated[str, typer.Argument(metavar="TYPE", help="Such as std_srvs/srv/Empty.")],
@@ -65,7 +64,7 @@ def find(
     print_names(of_type(service_type, shown(joining.graph().services(), hidden)), count=count)
 
 
-@app.command("info", no_args_is_help=True, epilog="Example: [bold]twin service info -v /add_two_ints[/bold]")
+@app.command("info", no_args_is_help=True, epilog=example("twin service info -v /add_two_ints"))
 @joins
 def info(
     service: _Name,

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from twin.cli.ros.graph_names import absolute, hint_at_nearest, unknown
-from twin.cli.ros.joining import PATIENCE_S, Joining
-from twin.cli.ros.tool_node import tool_node
+from twin.cli.ros.graph_names import absolute, full_type, hint_at_nearest, unknown
+from twin.cli.ros.joining import PATIENCE_S, Joining, tool_node
 from twin.cli.ros.yaml_values import message_of, text_of
 from twin.errors import BridgeError
 
@@ -42,10 +41,11 @@ def call(
     if rate is not None and not rate > 0.0:
         raise BridgeError(f"a rate of {rate} Hz; valid: rate must be greater than zero")
     text = text_of(values, stdin)
+    from twin.bridge import types
     from twin.bridge.messages.as_repr import message_repr
 
     with joining.open(PATIENCE_S if timeout is None else timeout) as process:
-        srv_type = _service_type(service_type)
+        srv_type = types.ServiceType(full_type(service_type, "srv", "service", "std_srvs/srv/Empty"))
         package, _, name = srv_type.name.split("/")
         node = tool_node(process.bus, f"requester_{package}_{name}")
         know(process, node, {f"{srv_type.name}_Request": (absolute(service), srv_type.name)})
@@ -114,15 +114,6 @@ def _is_offered(bus: Bus, name: str, typename: str) -> bool:
                 f"{server.type_hash} there, {here} here"
             )
     return bool(servers)
-
-
-def _service_type(name: str) -> Any:
-    from twin.bridge import types
-
-    package, kind, tail = types.parts(name if name.count("/") != 1 else name.replace("/", "/srv/"))
-    if kind != "srv":
-        raise BridgeError(f"{name} is no service; valid is for example std_srvs/srv/Empty")
-    return types.ServiceType(f"{package}/srv/{tail}")
 
 
 def know(process: LiveBus, node: Node, used: dict[str, tuple[str, str]]) -> None:

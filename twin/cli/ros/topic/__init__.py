@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from twin.cli.option_groups import example
 from twin.cli.ros.topic import echo as topic_echo
 from twin.cli.ros.topic import list as topic_list
 from twin.cli.ros.topic import measure as topic_measure
@@ -13,7 +14,7 @@ from twin.cli.ros.topic import relay as topic_relay
 app = typer.Typer(
     no_args_is_help=True,
     help="Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.",
-    epilog="Example: [bold]twin topic echo /odom --field pose.pose.position[/bold]",
+    epilog=example("twin topic echo /odom --field pose.pose.position"),
 )
 
 _COMMANDS = (
@@ -31,6 +32,6 @@ _COMMANDS = (
 )
 
 for _name, _function, _example in _COMMANDS:
-    app.command(_name, epilog=f"Example: [bold]{_example.replace('[', chr(92) + '[')}[/bold]")(_function)
+    app.command(_name, epilog=example(_example))(_function)
 
 app.add_typer(topic_relay.throttle, name="throttle")

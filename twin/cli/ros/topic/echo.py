@@ -96,7 +96,7 @@ def echo(
         name = process.topic(topic)
         if message_type is None:
             endpoints = process.wait_for_topic(name, timeout)
-            cls = None if style.raw and accepts is None else process.message_class(name, endpoints)
+            cls = None if style.raw and accepts is None else process.message_class(endpoints)
             listener = Listener.of_topic(process, name, endpoints, cls)
         else:
             listener = Listener.of_type(process, name, message_type)

@@ -53,19 +53,10 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (abs, all, any, bool, float, int, len, max, min, round, sorted, str, sum)
 } | {
-    name: getattr(math, name)
-    for name in (
-        "sqrt",
-        "hypot",
-        "sin",
-        "cos",
-        "atan2",
-        "fabs",
-        "floor",
-        "ceil",
-        "isnan",
-        "isinf",
-        "isfinite",
+    function.__name__: function
+    for function in (
+        *(math.sqrt, math.hypot, math.sin, math.cos, math.atan2, math.fabs, math.floor, math.ceil),
+        *(math.isnan, math.isinf, math.isfinite),
     )
 }
 _MATH = {"pi": math.pi, "inf": math.inf, "nan": math.nan, "tau": math.tau, "e": math.e}

@@ -60,7 +60,7 @@ class Listener:
         others = [e for e in matching if e.type != full]
         if others:
             raise BridgeError(f"{name} carries {others[0].type}, not {full}")
-        message = process.message_class(name, matching) if matching else types.get(full)
+        message = process.message_class(matching) if matching else types.get(full)
         return cls(process, name, full, types.rihs01(full), message)
 
     def listen(self, qos: QoS, callback: Callable[[RawSample], Any]) -> None:

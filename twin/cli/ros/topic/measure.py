@@ -127,7 +127,7 @@ def _listen(
     from twin.cli.ros.topic.listen import Listener
 
     endpoints = process.wait_for_topic(name)
-    cls = process.message_class(name, endpoints) if decode else None
+    cls = process.message_class(endpoints) if decode else None
     listener = Listener.of_topic(process, name, endpoints, cls)
 
     def on_sample(sample: RawSample) -> None:

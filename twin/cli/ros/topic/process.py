@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from twin.cli.ros.graph_names import instead
-from twin.cli.ros.joining import Joining, whole_graph
-from twin.cli.ros.tool_node import tool_node
+from twin.cli.ros.joining import Joining, tool_node, whole_graph
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -63,16 +62,15 @@ class TopicProcess:
             raise BridgeError(f"Could not determine the type for the passed topic {name}")
         return found
 
-    def message_class(self, name: str, endpoints: Sequence[EndpointInfo]) -> type[Any]:
+    def message_class(self, endpoints: Sequence[EndpointInfo]) -> type[Any]:
         """Return the class of a topic's messages.
 
         Raises:
             BridgeError: several types, an unknown one, or one with another definition than is known here.
         """
-        from twin.bridge.tools import unknown_types as topic_types
+        from twin.bridge.tools.unknown_types import message_class
 
-        topic_types.only_type(name, endpoints)
-        return topic_types.message_class(self.live, self.node, endpoints)
+        return message_class(self.live, self.node, endpoints)
 
 
 @contextmanager

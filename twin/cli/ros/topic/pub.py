@@ -126,7 +126,7 @@ def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]
         typer.echo(
             f"WARNING: {name} carries {endpoints[0].type}, not {full}: nobody there will hear it", err=True
         )
-    return process.message_class(name, same) if same else types.get(full)
+    return process.message_class(same) if same else types.get(full)
 
 
 def _maker(process: TopicProcess, cls: type[Any], values: dict[str, Any]) -> Callable[[], Any]:

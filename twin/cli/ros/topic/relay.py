@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twin.cli.option_groups import example
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError
@@ -29,7 +30,7 @@ def relay(source: Input, target: Output = None, *, joining: Joining) -> None:
     _run(joining, "relay", source, target or f"{source}_relay", None)
 
 
-@throttle.command("messages", epilog="Example: [bold]twin topic throttle messages /scan 5[/bold]")
+@throttle.command("messages", epilog=example("twin topic throttle messages /scan 5"))
 @joins
 @endless
 def throttle_messages(
@@ -54,7 +55,7 @@ def throttle_messages(
     )
 
 
-@throttle.command("bytes", epilog="Example: [bold]twin topic throttle bytes /scan 10000 1.0[/bold]")
+@throttle.command("bytes", epilog=example("twin topic throttle bytes /scan 10000 1.0"))
 @joins
 @endless
 def throttle_bytes(
