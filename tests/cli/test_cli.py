@@ -443,7 +443,7 @@ def test_wrong_options_say_what_is_valid() -> None:
         RunOptions(scenario=Path("a.yaml")),
         RunOptions(
             scenario=Path("a.yaml"),
-            sets=["x=1", "y=a=b"],
+            set=["x=1", "y=a=b"],
             seed=3,
             params_file=Path(__file__),
             pace="0.5",
@@ -458,7 +458,7 @@ def test_wrong_options_say_what_is_valid() -> None:
             domain=7,
             no_record=True,
             bag=True,
-            hidden=True,
+            include_hidden_topics=True,
             save_model=Path("model"),
         ),
     ],

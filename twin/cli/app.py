@@ -13,7 +13,7 @@ from twin.cli import examples, exec, listings, new, play, run, schema
 from twin.cli.console import guard_terminal, print_error
 from twin.cli.interrupted import raise_swallowed
 from twin.cli.map import app as map_app
-from twin.cli.model import check, convert, graph, tree, view
+from twin.cli.model import check, convert, tree, view
 from twin.cli.option_groups import example
 from twin.cli.other_commands import Commands
 from twin.cli.ros import action, bag, interface, node, param, router, service, tf, topic
@@ -46,7 +46,7 @@ _COMMANDS = (
     ("robots", listings.robots, _ROBOTS, "twin robots"),
     ("check", check.check, _ROBOTS, "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06"),
     ("tree", tree.tree, _ROBOTS, "twin tree my_robot.urdf"),
-    ("graph", graph.graph, _ROBOTS, "twin graph my_robot.urdf -o my_robot.svg"),
+    ("graph", tree.graph, _ROBOTS, "twin graph my_robot.urdf -o my_robot.svg"),
     ("convert", convert.convert, _ROBOTS, "twin convert my_robot.urdf -o my_robot"),
     ("view", view.view, _ROBOTS, "twin view my_robot.urdf --joint lift_joint=0.5"),
     ("router", router.router, _GRAPH, "twin router --listen tcp/127.0.0.1:7447"),

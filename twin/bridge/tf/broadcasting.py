@@ -59,7 +59,7 @@ class TransformListener:
     """Fills a buffer from /tf and /tf_static, in the node's spin."""
 
     def __init__(self, buffer: TransformBuffer, node: Node) -> None:
-        self._buffer = buffer
+        self.buffer = buffer
         self._node = node
         self._refused: set[str] = set()
         self._broadcasters: dict[bytes, Broadcaster] = {}
@@ -86,7 +86,7 @@ class TransformListener:
                 with the reason. None: for ever.
         """
         deadline_ns = None if timeout_ns is None else self._node.now_ns + timeout_ns
-        future = self._buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
+        future = self.buffer.waiting.add(target_frame, source_frame, time_ns, deadline_ns)
         if deadline_ns is not None and not self._expires:
             self._expires = True
             self._node.create_timer(_EXPIRY_NS, self._expire)
@@ -100,7 +100,7 @@ class TransformListener:
         subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
 
     def _expire(self) -> None:
-        self._buffer.waiting.expire(self._node.now_ns)
+        self.buffer.waiting.expire(self._node.now_ns)
 
     def _on_message(self, message: TFMessage, static: bool, gid: bytes | None) -> None:
         authority = self._broadcaster(gid)
@@ -109,7 +109,7 @@ class TransformListener:
         for item in message.transforms:
             try:
                 t, q = item.transform.translation, item.transform.rotation
-                self._buffer.set_rigid(
+                self.buffer.set_rigid(
                     item.header.frame_id,
                     item.child_frame_id,
                     ns(item.header.stamp),

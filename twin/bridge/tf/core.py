@@ -120,7 +120,7 @@ class BufferCore:
     def can_transform(self, target: str, source: str, time_ns: int | None = None) -> bool:
         """Return whether `lookup` would succeed."""
         try:
-            self._lookup(target, source, time_ns)
+            self.lookup_stamped(target, source, time_ns)
         except TransformError:
             return False
         return True
@@ -170,21 +170,13 @@ class BufferCore:
             ExtrapolationError: the time is before the first or after the last stamp of a transform between.
             InvalidFrameError: a name that is empty or starts with '/'.
         """
-        value, _ = self._lookup(target, source, time_ns)
+        value, _ = self.lookup_stamped(target, source, time_ns)
         return Pose3(np.array(value[:3]), np.array(value[3:]))
 
     def lookup_planar(self, target: str, source: str, time_ns: int | None = None) -> Pose2:
         """Return `lookup` projected to the ground plane; cheaper than to project the result."""
-        (x, y, _, w, i, j, k), _ = self._lookup(target, source, time_ns)
+        (x, y, _, w, i, j, k), _ = self.lookup_stamped(target, source, time_ns)
         return Pose2(x, y, math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)))
-
-    def lookup_stamped(self, target: str, source: str, time_ns: int | None = None) -> tuple[Rigid, int]:
-        """Return `lookup` as numbers, and the time [ns] that it is of: 0 if all between are static.
-
-        Raises:
-            TransformError: as `lookup`.
-        """
-        return self._lookup(target, source, time_ns)
 
     def lookup_full(
         self, target: str, target_time_ns: int | None, source: str, source_time_ns: int | None, fixed: str
@@ -205,13 +197,18 @@ class BufferCore:
             TransformError: as `lookup`.
         """
         self._check(target, source, fixed)
-        T_fixed_source, _ = self._lookup(fixed, source, source_time_ns)
-        T_target_fixed, time_ns = self._lookup(target, fixed, target_time_ns)
+        T_fixed_source, _ = self.lookup_stamped(fixed, source, source_time_ns)
+        T_target_fixed, time_ns = self.lookup_stamped(target, fixed, target_time_ns)
         return as_from_matrix(compose(normalized(T_target_fixed), T_fixed_source)), time_ns
 
-    def _lookup(self, target: str, source: str, time_ns: int | None) -> tuple[Rigid, int]:
-        """Take the remembered path if parents do not depend on the time, else walk as tf2 does."""
+    def lookup_stamped(self, target: str, source: str, time_ns: int | None = None) -> tuple[Rigid, int]:
+        """Return `lookup` as numbers, and the time [ns] that it is of: 0 if all between are static.
+
+        Raises:
+            TransformError: as `lookup`.
+        """
         time_ns = time_ns or 0
+        # The remembered path if parents do not depend on the time, else tf2's walk.
         if not self._irregular:
             path = self._paths.get((target, source))
             if path is None:

@@ -31,8 +31,7 @@ def graphviz(infos: Sequence[FrameInfo], now_ns: int) -> str:
 def svg(infos: Sequence[FrameInfo], now_ns: int) -> str:
     """Return the tree as SVG: roots at the left, a column for each generation."""
     if not infos:
-        infos_text = ["No tf data received"]
-        return _document([_text(_MARGIN, _MARGIN, infos_text)], 240.0, 60.0)
+        return _document([_text(_MARGIN, _MARGIN, ["No tf data received"])], 240.0, 60.0)
     places, texts = _layout(infos)
     depth = max(column for column, _ in places.values()) + 1
     widths = [0.0] * depth
@@ -73,9 +72,7 @@ def _label(info: FrameInfo) -> list[str]:
     ]
 
 
-def _layout(
-    infos: Sequence[FrameInfo],
-) -> tuple[dict[str, tuple[int, float]], dict[str, list[str]]]:
+def _layout(infos: Sequence[FrameInfo]) -> tuple[dict[str, tuple[int, float]], dict[str, list[str]]]:
     """Return column and row of every frame, and what is written in its box.
 
     Leaves have a row each; a parent is in the middle of its first and last child.

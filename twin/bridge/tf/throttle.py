@@ -72,8 +72,6 @@ class TransformThrottle:
 def rotation_angle(a: Rigid, b: Rigid) -> float:
     """Return the angle between two rotations [rad], in [0, pi]."""
     # Of the difference and the sum of the quaternions: exact for small angles, where acos is not.
-    difference, total = (
-        math.dist(a[3:], b[3:]),
-        math.hypot(*(p + q for p, q in zip(a[3:], b[3:], strict=True))),
-    )
+    difference = math.dist(a[3:], b[3:])
+    total = math.hypot(*(p + q for p, q in zip(a[3:], b[3:], strict=True)))
     return 4.0 * math.atan2(min(difference, total), max(difference, total))

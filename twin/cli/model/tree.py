@@ -1,4 +1,4 @@
-"""`twin tree`: the links of a robot file, as check_urdf prints them."""
+"""`twin tree` and `twin graph`: links and joints, as check_urdf prints them, and as a drawing."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 
 import typer
 
+from twin.cli.drawing_file import Output, check_ending, write_drawing
 from twin.cli.model.options import RobotFile, reads_robot
 from twin.models.options import ReadOptions
 
@@ -30,3 +31,14 @@ def tree(file: RobotFile, *, read: ReadOptions) -> None:
         print_error(fault)
         raise typer.Exit(REFUSED) from None
     sys.stdout.write(tree_text(description))
+
+
+@reads_robot
+def graph(file: RobotFile, output: Output = None, *, read: ReadOptions) -> None:
+    """Draw links and joints: Graphviz text as urdf_to_graphviz writes it, or SVG, which needs no Graphviz."""
+    check_ending(output)
+    from twin.models import load
+    from twin.models.graph import graphviz, svg
+
+    description = load(file, read)
+    write_drawing(output, {".gv": lambda: graphviz(description), ".svg": lambda: svg(description)})

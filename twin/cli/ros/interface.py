@@ -82,10 +82,7 @@ def package(
 
 @app.command(epilog=example("twin interface packages"))
 @takes("kinds", _kinds)
-def packages(
-    *,
-    kinds: list[str],
-) -> None:
+def packages(*, kinds: list[str]) -> None:
     """List the packages that have types."""
     from twin.bridge import types
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from twin.bridge.wire import Wire
-from twin.cli.option_groups import takes
+from twin.cli.option_groups import example, takes
 from twin.cli.ros.endings import quiet_pipe
 
 if TYPE_CHECKING:
@@ -148,11 +147,12 @@ class Joining:
 
 def joins(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command whose last parameter is `joining: Joining` the options of which that is made."""
-    joined = takes("joining", Joining)(command)
+    return quiet_pipe()(takes("joining", Joining)(command))
 
-    @functools.wraps(joined)
-    def wrapper(**given: Any) -> None:
-        with quiet_pipe():
-            joined(**given)
 
-    return wrapper
+def on_graph(
+    app: typer.Typer, name: str, command_line: str, **settings: Any
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add a command that joins, with an example below its help; `settings` are those of `app.command`."""
+    add = app.command(name, epilog=example(command_line), **settings)
+    return lambda command: add(joins(command))

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.drawing_file import Output, check_ending, write_drawing
-from twin.cli.option_groups import example
 from twin.cli.ros.endings import endless
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, on_graph
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
     from twin.bridge.msgs import TransformStamped
-    from twin.bridge.tf import TransformBuffer
+    from twin.bridge.tf import TransformBuffer, TransformListener
     from twin.bridge.tf.report import FrameInfo
 
 app = typer.Typer(
@@ -27,8 +26,7 @@ app = typer.Typer(
 WaitTime = Annotated[float, typer.Option("--wait-time", "-t", min=0.0, help="How many seconds to listen.")]
 
 
-@app.command("tree", epilog=example("twin tf tree"))
-@joins
+@on_graph(app, "tree", "twin tf tree")
 def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
     """Show the frames as a tree, with broadcaster and rate."""
     from twin.bridge.tf.report import text_tree
@@ -38,14 +36,8 @@ def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
     typer.echo(text_tree(infos), nl=False)
 
 
-@app.command("frames", epilog=example("twin tf frames -o frames.svg"))
-@joins
-def frames(
-    output: Output = None,
-    wait_time: WaitTime = 5.0,
-    *,
-    joining: Joining,
-) -> None:
+@on_graph(app, "frames", "twin tf frames -o frames.svg")
+def frames(output: Output = None, wait_time: WaitTime = 5.0, *, joining: Joining) -> None:
     """Draw the tree: Graphviz text as view_frames writes it, or SVG, which needs no Graphviz."""
     check_ending(output)
     from twin.bridge.tf.drawing import graphviz, svg
@@ -55,8 +47,7 @@ def frames(
     write_drawing(output, {".gv": lambda: graphviz(infos, now_ns), ".svg": lambda: svg(infos, now_ns)})
 
 
-@app.command("echo", epilog=example("twin tf echo map base_link --once"))
-@joins
+@on_graph(app, "echo", "twin tf echo map base_link --once")
 @endless
 def echo(
     source_frame: Annotated[
@@ -75,11 +66,8 @@ def echo(
     joining: Joining,
 ) -> None:
     """Show a frame in another one again and again; the words and the order of frames are tf2_echo's."""
-    from twin.bridge.tf import TransformBuffer, TransformListener
-
     with joining.open() as process:
-        buffer = TransformBuffer()
-        TransformListener(buffer, process.bus.create_node("tf2_echo"))
+        buffer = _listener(process, "tf2_echo").buffer
         _await(process, buffer, source_frame, target_frame, timeout)
         while True:
             _show(process, buffer, source_frame, target_frame)
@@ -88,8 +76,7 @@ def echo(
             process.spin(timeout_s=1.0 / rate)
 
 
-@app.command("monitor", epilog=example("twin tf monitor --once --duration 3"))
-@joins
+@on_graph(app, "monitor", "twin tf monitor --once --duration 3")
 @endless
 def monitor(
     source_frame: Annotated[
@@ -106,13 +93,12 @@ def monitor(
     """Report delay and rate of every frame and broadcaster, or of a chain; the words are tf2_monitor's."""
     if (source_frame is None) != (target_frame is None):
         raise BridgeError("tf monitor takes two frames, or none for all")
-    from twin.bridge.tf import TransformBuffer, TransformListener
     from twin.bridge.tf.monitor import TransformStatistics, net_delay
 
     with joining.open() as process:
-        buffer, statistics = TransformBuffer(), TransformStatistics()
-        clock = process.bus.clock
-        listener = TransformListener(buffer, process.bus.create_node("tf2_monitor"))
+        clock, statistics = process.bus.clock, TransformStatistics()
+        listener = _listener(process, "tf2_monitor")
+        buffer = listener.buffer
         listener.on_message.append(lambda message, who: statistics.add(message, str(who), clock.now_ns))
         chain: list[str] | None = None
         name = "all frames"
@@ -137,8 +123,7 @@ def monitor(
                 return
 
 
-@app.command("throttle", epilog=example("twin tf throttle map base_link laser --rate 2"))
-@joins
+@on_graph(app, "throttle", "twin tf throttle map base_link laser --rate 2")
 @endless
 def throttle(
     target_frame: Annotated[
@@ -169,13 +154,17 @@ def throttle(
         process.spin()
 
 
+def _listener(process: LiveBus, name: str) -> TransformListener:
+    from twin.bridge.tf import TransformBuffer, TransformListener
+
+    return TransformListener(TransformBuffer(), process.bus.create_node(name))
+
+
 def _listen(process: LiveBus, wait_time_s: float) -> tuple[tuple[FrameInfo, ...], int]:
     """Return what is known of the frames after a while, and the time then [ns]."""
-    from twin.bridge.tf import TransformBuffer, TransformListener
     from twin.bridge.tf.report import frame_infos
 
-    buffer = TransformBuffer()
-    TransformListener(buffer, process.bus.create_node("view_frames"))
+    buffer = _listener(process, "view_frames").buffer
     process.spin(timeout_s=wait_time_s)
     infos = frame_infos(buffer)
     if not infos:

@@ -27,7 +27,7 @@ def run_once(options: RunOptions) -> int:
         out=options.out or run_folder,
         record=not options.no_record,
         bag=options.bag,
-        bag_hidden_topics=options.hidden,
+        bag_hidden_topics=options.include_hidden_topics,
         save_model=options.save_model,
         pace=options.speed,
         network=options.network,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -35,9 +34,9 @@ class RunOptions:
             autocompletion=completion.scenarios,
         ),
     ]
-    sets: Annotated[
+    set: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
+        typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
     ] = None
     seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None
     params_file: Annotated[
@@ -91,7 +90,7 @@ class RunOptions:
     bag: Annotated[
         bool, typer.Option("--bag", help="Also write a ROS 2 bag of every message: <out>/bag.")
     ] = False
-    hidden: Annotated[
+    include_hidden_topics: Annotated[
         bool, typer.Option("--include-hidden-topics", help="With --bag: topics of actions too.")
     ] = False
     save_model: Annotated[
@@ -100,14 +99,14 @@ class RunOptions:
     json: Annotated[bool, typer.Option("--json", help="Print verdict.json instead of the table.")] = False
 
     def __post_init__(self) -> None:
-        if self.hidden and not self.bag:
+        if self.include_hidden_topics and not self.bag:
             raise typer.BadParameter("--include-hidden-topics says what is in the bag; it needs --bag")
         _ = self.overrides, self.speed  # raise ScenarioError
 
     @property
     def overrides(self) -> dict[str, str]:
         """Dotted keys of the scenario -> values that go before its own."""
-        return parse_overrides(self.sets or (), self.seed)
+        return parse_overrides(self.set or (), self.seed)
 
     @property
     def speed(self) -> float | None:
@@ -147,13 +146,11 @@ class RunOptions:
         """Return the arguments of a `twin` that does the same once, in a folder, and prints JSON."""
         child = replace(self, out=out, json=True, repeat=1, expect_one_hash=False)
         words = ["run", str(self.scenario)]
-        for name, parameter in inspect.signature(RunOptions, eval_str=True).parameters.items():
-            value: Any = getattr(child, name)
-            option = parameter.annotation.__metadata__[0]
+        for name, value in vars(child).items():
             if name != "scenario" and value is not None and value is not False:
-                (word,) = option.param_decls or (f"--{name.replace('_', '-')}",)
+                option = f"--{name.replace('_', '-')}"
                 values = value if isinstance(value, list) else [value]
-                words += [word] if value is True else [text for each in values for text in (word, str(each))]
+                words += [option] if value is True else [w for each in values for w in (option, str(each))]
         return words
 
 

@@ -23,9 +23,8 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
     table.add_column("check", no_wrap=True)
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("limit", justify="right", no_wrap=True)
-    table.add_column("at", justify="right", no_wrap=True)
+    for name in ("value", "limit", "at"):
+        table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
         value, limit = (_quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))

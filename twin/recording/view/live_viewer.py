@@ -11,14 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from twin.errors import RecordingError
-from twin.recording.player import (
-    LOCALHOST,
-    free_port,
-    listens,
-    viewer_binary,
-    viewer_environment,
-    wait_for,
-)
+from twin.recording.player import LOCALHOST, free_port, listens, viewer_binary, viewer_environment, wait_for
 
 STOP_TIMEOUT_S = 5.0
 """A viewer that does not end when asked to is killed."""

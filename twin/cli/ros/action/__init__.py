@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli.option_groups import example
 from twin.cli.ros.action.goal import send_goal
 from twin.cli.ros.graph_names import absolute, of_type, print_names, unknown
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, on_graph
 
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo
@@ -20,22 +19,21 @@ _Name = Annotated[str, typer.Argument(metavar="ACTION", help="Such as /fibonacci
 _Types = Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")]
 _Count = Annotated[bool, typer.Option("--count-actions", "-c", help="Only show how many.")]
 
-app.command(
+on_graph(
+    app,
     "send_goal",
+    'twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"',
     no_args_is_help=True,
-    epilog=example('twin action send_goal -f /spin nav2_msgs/action/Spin "{target_yaw: 1.57}"'),
-)(joins(send_goal))
+)(send_goal)
 
 
-@app.command("list", epilog=example("twin action list -t"))
-@joins
+@on_graph(app, "list", "twin action list -t")
 def list_actions(show_types: _Types = False, count: _Count = False, *, joining: Joining) -> None:
     """List the actions that somebody offers or uses."""
     print_names(joining.graph().actions(), count=count, show_types=show_types)
 
 
-@app.command("type", no_args_is_help=True, epilog=example("twin action type /fibonacci"))
-@joins
+@on_graph(app, "type", "twin action type /fibonacci", no_args_is_help=True)
 def show_type(action: _Name, *, joining: Joining) -> None:
     """Print the type of an action."""
     actions, name = joining.graph().actions(), absolute(action)
@@ -45,10 +43,7 @@ def show_type(action: _Name, *, joining: Joining) -> None:
         typer.echo(typename)
 
 
-@app.command(
-    "find", no_args_is_help=True, epilog=example("twin action find example_interfaces/action/Fibonacci")
-)
-@joins
+@on_graph(app, "find", "twin action find example_interfaces/action/Fibonacci", no_args_is_help=True)
 def find(
     action_type: Annotated[str, typer.Argument(metavar="TYPE")], count: _Count = False, *, joining: Joining
 ) -> None:
@@ -56,8 +51,7 @@ def find(
     print_names(of_type(action_type, joining.graph().actions()), count=count)
 
 
-@app.command("info", no_args_is_help=True, epilog=example("twin action info -t /fibonacci"))
-@joins
+@on_graph(app, "info", "twin action info -t /fibonacci", no_args_is_help=True)
 def info(
     action: _Name,
     show_types: _Types = False,

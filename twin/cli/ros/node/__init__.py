@@ -13,7 +13,7 @@ import typer
 from twin.cli.drawing_file import check_ending, write_drawing
 from twin.cli.option_groups import example
 from twin.cli.ros.graph_names import absolute, instead
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, on_graph
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -28,8 +28,7 @@ app = typer.Typer(
 _SEND_GOAL = "/_action/send_goal"
 
 
-@app.command("list", epilog=example("twin node list"))
-@joins
+@on_graph(app, "list", "twin node list")
 def list_nodes(
     every: Annotated[bool, typer.Option("--all", "-a", help="Hidden nodes too.")] = False,
     count: Annotated[bool, typer.Option("--count-nodes", "-c", help="Only say how many.")] = False,
@@ -51,8 +50,7 @@ def list_nodes(
         typer.echo(name)
 
 
-@app.command("info", epilog=example("twin node info /amcl"))
-@joins
+@on_graph(app, "info", "twin node info /amcl")
 def info(
     node: Annotated[str, typer.Argument(metavar="NODE", help="Such as /amcl.", show_default=False)],
     hidden: Annotated[
@@ -86,8 +84,7 @@ def info(
         typer.echo("\n".join(f"    {line}" for line in shown))
 
 
-@app.command("graph", epilog=example("twin node graph -o graph.mmd"))
-@joins
+@on_graph(app, "graph", "twin node graph -o graph.mmd")
 def graph_(
     output: Annotated[
         Path | None,

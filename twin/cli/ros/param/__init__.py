@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from twin.cli.option_groups import example
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, on_graph
 from twin.cli.ros.param.client import (
     TYPES,
     Hidden,
@@ -27,14 +26,11 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Parameters: list, get, set, keep in files; as `ros2 param`.")
 
-app.command("dump", no_args_is_help=True, epilog=example("twin param dump /talker > talker.yaml"))(
-    joins(dump)
-)
-app.command("load", no_args_is_help=True, epilog=example("twin param load /talker talker.yaml"))(joins(load))
+on_graph(app, "dump", "twin param dump /talker > talker.yaml", no_args_is_help=True)(dump)
+on_graph(app, "load", "twin param load /talker talker.yaml", no_args_is_help=True)(load)
 
 
-@app.command("list", epilog=example("twin param list /talker --param-type"))
-@joins
+@on_graph(app, "list", "twin param list /talker --param-type")
 def list_parameters(
     node: Annotated[str | None, typer.Argument(metavar="NODE", help="Default: all nodes.")] = None,
     name_filter: Annotated[
@@ -82,8 +78,7 @@ def _print_names(
         typer.echo(f"  {name} (type: {types[name]})" if show_types else f"  {name}")
 
 
-@app.command("get", no_args_is_help=True, epilog=example("twin param get /talker use_sim_time"))
-@joins
+@on_graph(app, "get", "twin param get /talker use_sim_time", no_args_is_help=True)
 def get(
     node: NodeName,
     name: Name,
@@ -110,13 +105,13 @@ def get(
     typer.echo(f"{'' if hide_type else label}{value}")
 
 
-@app.command(
+@on_graph(
+    app,
     "set",
+    "twin param set /talker max_speed 0.5",
     no_args_is_help=True,
     context_settings={"ignore_unknown_options": True},  # -1.0 is a value
-    epilog=example("twin param set /talker max_speed 0.5"),
 )
-@joins
 def set_parameter(
     node: NodeName,
     name: Name,
@@ -138,8 +133,7 @@ def set_parameter(
     _say(result, "Set parameter successful", "Setting parameter failed")
 
 
-@app.command("delete", no_args_is_help=True, epilog=example("twin param delete /talker max_speed"))
-@joins
+@on_graph(app, "delete", "twin param delete /talker max_speed", no_args_is_help=True)
 def delete(
     node: NodeName, name: Name, hidden: Hidden = False, timeout: Timeout = 1.0, *, joining: Joining
 ) -> None:
@@ -152,8 +146,7 @@ def delete(
     _say(result, "Deleted parameter successfully", "Deleting parameter failed")
 
 
-@app.command("describe", no_args_is_help=True, epilog=example("twin param describe /talker max_speed"))
-@joins
+@on_graph(app, "describe", "twin param describe /talker max_speed", no_args_is_help=True)
 def describe(
     node: NodeName,
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="Of parameters.")],

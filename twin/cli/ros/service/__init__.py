@@ -6,10 +6,9 @@ from typing import Annotated
 
 import typer
 
-from twin.cli.option_groups import example
 from twin.cli.ros.endpoint_text import endpoint_text
 from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, on_graph
 from twin.cli.ros.service.call import call
 
 app = typer.Typer(no_args_is_help=True, help="Services: list, look, call; as `ros2 service`.")
@@ -20,15 +19,12 @@ _Hidden = Annotated[
 _Count = Annotated[bool, typer.Option("--count-services", "-c", help="Only show how many.")]
 _Name = Annotated[str, typer.Argument(metavar="SERVICE", help="Such as /add_two_ints.")]
 
-app.command(
-    "call",
-    no_args_is_help=True,
-    epilog=example('twin service call /pause std_srvs/srv/SetBool "{data: true}"'),
-)(joins(call))
+on_graph(app, "call", 'twin service call /pause std_srvs/srv/SetBool "{data: true}"', no_args_is_help=True)(
+    call
+)
 
 
-@app.command("list", epilog=example("twin service list -t"))
-@joins
+@on_graph(app, "list", "twin service list -t")
 def list_services(
     show_types: Annotated[bool, typer.Option("--show-types", "-t", help="Also show the types.")] = False,
     count: _Count = False,
@@ -40,8 +36,7 @@ def list_services(
     print_names(shown(joining.graph().services(), hidden), count=count, show_types=show_types)
 
 
-@app.command("type", no_args_is_help=True, epilog=example("twin service type /add_two_ints"))
-@joins
+@on_graph(app, "type", "twin service type /add_two_ints", no_args_is_help=True)
 def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> None:
     """Print the type of a service."""
     services, name = joining.graph().services(), absolute(service)
@@ -51,8 +46,7 @@ def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> N
         typer.echo(typename)
 
 
-@app.command("find", no_args_is_help=True, epilog=example("twin service find std_srvs/srv/Empty"))
-@joins
+@on_graph(app, "find", "twin service find std_srvs/srv/Empty", no_args_is_help=True)
 def find(
     service_type: Annotated[str, typer.Argument(metavar="TYPE", help="Such as std_srvs/srv/Empty.")],
     count: _Count = False,
@@ -64,8 +58,7 @@ def find(
     print_names(of_type(service_type, shown(joining.graph().services(), hidden)), count=count)
 
 
-@app.command("info", no_args_is_help=True, epilog=example("twin service info -v /add_two_ints"))
-@joins
+@on_graph(app, "info", "twin service info -v /add_two_ints", no_args_is_help=True)
 def info(
     service: _Name,
     verbose: Annotated[

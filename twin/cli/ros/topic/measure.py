@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -54,8 +54,7 @@ def hz(
             if len(topics) > 1:
                 typer.echo(f"Subscribed to [{name}]")
         if len(rates) > 1:
-            process.node.create_timer(_SECOND_NS, lambda: _print_table(rates))
-            process.live.spin()
+            _every_second(process, lambda: _table(rates))
         while True:
             process.live.spin_once()
             for rate in rates.values():
@@ -77,14 +76,7 @@ def bw(topic: TopicName, window: Window = 100, *, joining: Joining) -> None:
             process, name, lambda sample, _: statistics.add(process.now_ns, len(sample.payload)), decode=False
         )
         typer.echo(f"Subscribed to [{name}]")
-
-        def report() -> None:
-            bandwidth = statistics.report(process.now_ns)
-            if bandwidth is not None:
-                typer.echo(_bandwidth_text(bandwidth))
-
-        process.node.create_timer(_SECOND_NS, report)
-        process.live.spin()
+        _every_second(process, lambda: _bandwidth_text(statistics.report(process.now_ns)))
 
 
 @joins
@@ -108,15 +100,13 @@ def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> Non
         if "header" not in {field.name for field in fields_of(cls.__msgtype__)}:
             raise BridgeError(f"msg does not have header: {name} carries {cls.__msgtype__}")
 
-        def report() -> None:
+        def report() -> str:
             spread = statistics.report()
-            if spread is not None:
-                typer.echo(_spread_text("average delay", spread.mean * 1e-9, spread))
-            elif not statistics.is_empty:
-                typer.echo("no new messages")
+            if spread is None:
+                return "" if statistics.is_empty else "no new messages"
+            return _spread_text("average delay", spread.mean * 1e-9, spread)
 
-        process.node.create_timer(_SECOND_NS, report)
-        process.live.spin()
+        _every_second(process, report)
 
 
 def _listen(
@@ -149,14 +139,15 @@ def _count(
     _listen(process, name, on_message, decode=accepts is not None)
 
 
-def _print_table(rates: dict[str, RateStatistics]) -> None:
-    rows = [
-        _row(name, report)
-        for name, rate in rates.items()
-        if (report := rate.report(at_least_ns=1)) is not None
-    ]
-    if rows:
-        typer.echo(_table(rows))
+def _every_second(process: TopicProcess, report: Callable[[], str]) -> None:
+    """Print a report, if there is one, again and again."""
+
+    def tell() -> None:
+        if text := report():
+            typer.echo(text)
+
+    process.node.create_timer(_SECOND_NS, tell)
+    process.live.spin()
 
 
 def _rate(spread: Spread) -> float:
@@ -184,14 +175,20 @@ def _row(name: str, spread: Spread) -> tuple[str, ...]:
     )
 
 
-def _table(rows: Sequence[tuple[str, ...]]) -> str:
+def _table(rates: dict[str, RateStatistics]) -> str:
+    reports = {name: rate.report(at_least_ns=1) for name, rate in rates.items()}
+    rows = [_row(name, report) for name, report in reports.items() if report is not None]
+    if not rows:
+        return ""
     widths = [max(map(len, column)) for column in zip(_HEADER, *rows, strict=True)]
     head = "   ".join(word.center(width) for word, width in zip(_HEADER, widths, strict=True))
     lines = ["   ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
     return "\n".join([head, "=" * (sum(widths) + 3 * (len(widths) - 1)), *lines, ""])
 
 
-def _bandwidth_text(bandwidth: Bandwidth) -> str:
+def _bandwidth_text(bandwidth: Bandwidth | None) -> str:
+    if bandwidth is None:
+        return ""
     rate = bandwidth.bytes_per_s
     divisor, unit, digits = (1, "B", 0) if rate < 1e3 else (1e3, "KB", 2) if rate < 1e6 else (1e6, "MB", 2)
     speed, mean, low, high = (

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli.option_groups import example
 from twin.cli.ros.endings import endless
-from twin.cli.ros.joining import Joining, joins
+from twin.cli.ros.joining import Joining, joins, on_graph
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -27,11 +26,10 @@ throttle = typer.Typer(no_args_is_help=True, help="Pass fewer messages on: by nu
 @endless
 def relay(source: Input, target: Output = None, *, joining: Joining) -> None:
     """Pass every message on, undecoded; OUT is IN_relay unless named."""
-    _run(joining, "relay", source, target or f"{source}_relay", None)
+    _run(joining, "relay", source, target, None)
 
 
-@throttle.command("messages", epilog=example("twin topic throttle messages /scan 5"))
-@joins
+@on_graph(throttle, "messages", "twin topic throttle messages /scan 5")
 @endless
 def throttle_messages(
     source: Input,
@@ -46,17 +44,11 @@ def throttle_messages(
     """Pass at most so many messages on in a second; OUT is IN_throttle unless named."""
     from twin.bridge.tools.relay import MessageThrottle
 
-    _run(
-        joining.by_wall_time if wall_time else joining,
-        "throttle",
-        source,
-        target or f"{source}_throttle",
-        lambda process: MessageThrottle(rate, process.now_ns),
-    )
+    joined = joining.by_wall_time if wall_time else joining
+    _run(joined, "throttle", source, target, lambda process: MessageThrottle(rate, process.now_ns))
 
 
-@throttle.command("bytes", epilog=example("twin topic throttle bytes /scan 10000 1.0"))
-@joins
+@on_graph(throttle, "bytes", "twin topic throttle bytes /scan 10000 1.0")
 @endless
 def throttle_bytes(
     source: Input,
@@ -75,13 +67,8 @@ def throttle_bytes(
     """Pass messages on until so many bytes went by in the window; OUT is IN_throttle unless named."""
     from twin.bridge.tools.relay import ByteThrottle
 
-    _run(
-        joining.by_wall_time if wall_time else joining,
-        "throttle",
-        source,
-        target or f"{source}_throttle",
-        lambda _: ByteThrottle(bytes_per_s, window),
-    )
+    joined = joining.by_wall_time if wall_time else joining
+    _run(joined, "throttle", source, target, lambda _: ByteThrottle(bytes_per_s, window))
 
 
 @joins
@@ -99,17 +86,18 @@ def drop(
 
     if x > y:
         raise BridgeError(f"X is {x} and Y {y}: of {y} messages at most {y} can be dropped")
-    _run(joining, "drop", source, target or f"{source}_drop", lambda _: Drop(x, y))
+    _run(joining, "drop", source, target, lambda _: Drop(x, y))
 
 
 def _run(
-    joining: Joining, node: str, source: str, target: str, gate: Callable[[TopicProcess], Gate] | None
+    joining: Joining, node: str, source: str, target: str | None, gate: Callable[[TopicProcess], Gate] | None
 ) -> None:
     from twin.bridge.tools.relay import Relay
     from twin.cli.ros.topic.process import open_topics
 
     with open_topics(joining, node_name=node) as process:
-        relay_ = Relay(process.node, process.graph, source, target, gate(process) if gate else None)
+        passes = gate(process) if gate else None
+        relay_ = Relay(process.node, process.graph, source, target or f"{source}_{node}", passes)
         process.wait_for_topic(relay_.source)
         typer.echo(f"{relay_.source} -> {relay_.target}")
         while True:
