@@ -31,7 +31,7 @@ from twin.bridge.msgs import (
     new,
 )
 from twin.bridge.tf import ExtrapolationError, TransformBuffer
-from twin.bridge.tf.clouds import points_of
+from twin.bridge.tf.clouds import _coordinates
 from twin.bridge.tf.laser import project_laser
 from twin.bridge.tf.transforms import QuaternionStamped, do_transform
 from twin.errors import BridgeError
@@ -51,6 +51,12 @@ def buffer() -> TransformBuffer:
     buffer = TransformBuffer()
     buffer.set_transform("map", "base", 5 * S, quarter_turn)
     return buffer
+
+
+def points_of(cloud: PointCloud2) -> np.ndarray:
+    """Shape (height * width, 3)."""
+    fields = _coordinates(cloud, np.array(cloud.data, dtype=np.uint8))
+    return np.stack([np.asarray(field, dtype=np.float64).ravel() for field in fields], axis=-1)
 
 
 def cloud(

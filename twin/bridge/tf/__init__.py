@@ -2,44 +2,18 @@
 
 from __future__ import annotations
 
-from twin.bridge.tf.broadcasting import (
-    StaticTransformBroadcaster,
-    TransformBroadcaster,
-    TransformListener,
-    transform_stamped,
-)
-from twin.bridge.tf.buffer import TransformBuffer
-from twin.bridge.tf.errors import (
-    DisconnectedFramesError,
-    ExtrapolationError,
-    InvalidFrameError,
-    TransformError,
-    TransformTimeoutError,
-    UnknownFrameError,
-)
-from twin.bridge.tf.wait import TransformFuture
-
-__all__ = [
-    "Buffer",
-    "ConnectivityException",
-    "DisconnectedFramesError",
-    "ExtrapolationError",
-    "ExtrapolationException",
-    "InvalidArgumentException",
-    "InvalidFrameError",
-    "LookupException",
-    "StaticTransformBroadcaster",
-    "TimeoutException",
-    "TransformBroadcaster",
-    "TransformBuffer",
-    "TransformError",
-    "TransformException",
-    "TransformFuture",
-    "TransformListener",
-    "TransformTimeoutError",
-    "UnknownFrameError",
-    "transform_stamped",
-]
+from twin.bridge.tf.broadcasting import StaticTransformBroadcaster as StaticTransformBroadcaster
+from twin.bridge.tf.broadcasting import TransformBroadcaster as TransformBroadcaster
+from twin.bridge.tf.broadcasting import TransformListener as TransformListener
+from twin.bridge.tf.broadcasting import transform_stamped as transform_stamped
+from twin.bridge.tf.buffer import TransformBuffer as TransformBuffer
+from twin.bridge.tf.errors import DisconnectedFramesError as DisconnectedFramesError
+from twin.bridge.tf.errors import ExtrapolationError as ExtrapolationError
+from twin.bridge.tf.errors import InvalidFrameError as InvalidFrameError
+from twin.bridge.tf.errors import TransformError as TransformError
+from twin.bridge.tf.errors import TransformTimeoutError as TransformTimeoutError
+from twin.bridge.tf.errors import UnknownFrameError as UnknownFrameError
+from twin.bridge.tf.wait import TransformFuture as TransformFuture
 
 # The names that programs for tf2_ros use.
 Buffer = TransformBuffer

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.bridge.msgs import PointCloud2
 from twin.errors import BridgeError, shortened
-from twin.geometry import Array, Pose3
+from twin.geometry import Pose3
 
 _FLOATS = {7: "f4", 8: "f8"}
 """PointField.FLOAT32 and FLOAT64."""
@@ -28,16 +28,6 @@ def moved(cloud: PointCloud2, T_target_source: Pose3) -> PointCloud2:
     for axis, field in enumerate(fields):
         field[...] = out[..., axis]
     return replace(cloud, data=data)
-
-
-def points_of(cloud: PointCloud2) -> Array:
-    """Return the points of a cloud, shape (height * width, 3) [m].
-
-    Raises:
-        BridgeError: as `moved`.
-    """
-    fields = _coordinates(cloud, np.array(cloud.data, dtype=np.uint8))
-    return np.stack([np.asarray(field, dtype=np.float64).ravel() for field in fields], axis=-1)
 
 
 def _coordinates(cloud: PointCloud2, data: np.ndarray) -> list[np.ndarray]:
