@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import zenoh
@@ -15,7 +17,6 @@ from twin.bridge.lockstep.protocol import (
     STEP,
     node_token,
     parse_node_token,
-    patience,
     requests,
     responses,
     run_token,
@@ -26,6 +27,9 @@ from twin.bridge.wire.keys import pack_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
+_log = logging.getLogger("twin.run")
+_PATIENCE_S = 1.0
+"""After so long, people are told what the run waits for."""
 _POLL_S = 0.2
 _MARGIN_S = 10.0
 """Zenoh gives up so much later than we do."""
@@ -157,6 +161,17 @@ class Stepper:
                 )
             if answer[0] == sequence:
                 return answer[1]
+
+
+def patience(timeout_s: float, what: str) -> Iterator[None]:
+    """Yield until so long [s] of wall time is over; after a moment people are told what is waited for."""
+    start, told = time.monotonic(), False
+    yield
+    while (waited := time.monotonic() - start) <= timeout_s:
+        if waited > _PATIENCE_S and not told:
+            told = True
+            _log.warning("waiting for %s, %g s at most", what, timeout_s)
+        yield
 
 
 def await_node(bus: Bus, attendance: Attendance, name: str, timeout_s: float) -> Stepper:
