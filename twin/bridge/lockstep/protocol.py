@@ -5,9 +5,7 @@ The service travels as any other of rmw_zenoh. The tokens tell who takes part; t
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -104,17 +102,6 @@ class Questions:
         for query in self._open.values():
             query.drop()  # type: ignore[no-untyped-call]
         self._open.clear()
-
-
-def patience(timeout_s: float, what: str) -> Iterator[None]:
-    """Yield until so long [s] of wall time is over; after a moment people are told what is waited for."""
-    start, told = time.monotonic(), False
-    yield
-    while (waited := time.monotonic() - start) <= timeout_s:
-        if waited > _PATIENCE_S and not told:
-            told = True
-            _log.warning("waiting for %s, %g s at most", what, timeout_s)
-        yield
 
 
 def _octets(data: bytes) -> Any:

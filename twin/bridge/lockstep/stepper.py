@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import zenoh
@@ -157,6 +158,17 @@ class Stepper:
                 )
             if answer[0] == sequence:
                 return answer[1]
+
+
+def patience(timeout_s: float, what: str) -> Iterator[None]:
+    """Yield until so long [s] of wall time is over; after a moment people are told what is waited for."""
+    start, told = time.monotonic(), False
+    yield
+    while (waited := time.monotonic() - start) <= timeout_s:
+        if waited > _PATIENCE_S and not told:
+            told = True
+            _log.warning("waiting for %s, %g s at most", what, timeout_s)
+        yield
 
 
 def await_node(bus: Bus, attendance: Attendance, name: str, timeout_s: float) -> Stepper:

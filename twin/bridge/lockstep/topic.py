@@ -13,7 +13,8 @@ from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.graph import EndpointInfo, Graph, NodeInfo
 from twin.bridge.lockstep.mirror import MirroredSample, mirrored_publisher
-from twin.bridge.lockstep.protocol import carried, patience
+from twin.bridge.lockstep.protocol import carried
+from twin.bridge.lockstep.stepper import patience
 from twin.bridge.topics import Sample
 from twin.bridge.wire.keys import parse_attachment
 from twin.bridge.wire.session import direct
