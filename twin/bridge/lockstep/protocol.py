@@ -20,9 +20,6 @@ from twin.bridge.wire.session import direct
 STEP = ServiceType("twin_msgs/srv/Step")
 Entry: Any = types.get("twin_msgs/msg/LockstepEntry")
 _EMPTY = np.zeros(0, np.uint8)
-_PATIENCE_S = 1.0
-"""After so long, people are told what the run waits for."""
-_log = logging.getLogger("twin.run")
 requests, responses = codec(STEP.Request), codec(STEP.Response)
 
 

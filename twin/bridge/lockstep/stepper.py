@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
@@ -16,7 +17,6 @@ from twin.bridge.lockstep.protocol import (
     STEP,
     node_token,
     parse_node_token,
-    patience,
     requests,
     responses,
     run_token,
@@ -27,6 +27,9 @@ from twin.bridge.wire.keys import pack_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
+_log = logging.getLogger("twin.run")
+_PATIENCE_S = 1.0
+"""After so long, people are told what the run waits for."""
 _POLL_S = 0.2
 _MARGIN_S = 10.0
 """Zenoh gives up so much later than we do."""
