@@ -1,0 +1,29 @@
+"""Costmaps are by default what they are in Nav2, but for a few."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.oracles.nav2_defaults import compared
+from twin.navigation.costmaps.costmap_config import CostmapConfig
+
+CONFIG = CostmapConfig()
+
+
+@pytest.mark.parametrize(
+    ("component", "config", "shared", "ours"),
+    [
+        ("costmap", CONFIG, 19, {"inf_is_valid": True, "resolution": 0.05, "track_unknown_space": True}),
+        ("range sensor layer", CONFIG.range_sensor_layer, 5, {}),
+        ("keepout filter", CONFIG.keepout_filter, 1, {}),
+    ],
+)
+def test_defaults_are_nav2s(component: str, config: Any, shared: int, ours: dict[str, Any]) -> None:
+    assert compared(component, config) == (shared, ours)
+
+
+def test_who_may_drive_out_of_a_keepout_zone_pays_the_dearest_cost_that_is_free() -> None:
+    """Nav2's MAX_NON_OBSTACLE."""
+    assert CONFIG.keepout_filter.lethal_override_cost == 252
