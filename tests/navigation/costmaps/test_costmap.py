@@ -212,3 +212,11 @@ def test_radii_of_footprints() -> None:
 def test_the_inscribed_radius_of_any_outline(corners: list[list[float]], inscribed: float) -> None:
     for outline in (corners, corners[::-1]):
         assert radii(outline)[0] == pytest.approx(inscribed)
+
+
+def test_a_circle_has_as_many_corners_as_nav2s() -> None:
+    """nav2_costmap_2d, makeFootprintFromRadius: 16; here its sides touch the circle, not its corners."""
+    corners = circle(0.5)
+    assert len(corners) == 16
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    assert np.hypot(*middles.T) == pytest.approx(np.full(16, 0.5))

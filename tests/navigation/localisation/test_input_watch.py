@@ -45,6 +45,7 @@ def test_a_lidar_of_which_a_twentieth_hits_something_is_not_blind(hits: int, bli
 @pytest.mark.parametrize(
     ("step", "frozen"),
     [
+        (Pose2(0.05, 0.0, 0.0), True),
         (Pose2(0.021, 0.0, 0.0), True),
         (Pose2(0.019, 0.0, 0.0), False),
         (Pose2(0.0, 0.0, -0.021), True),

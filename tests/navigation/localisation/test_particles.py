@@ -110,6 +110,8 @@ def test_bins_are_those_of_amcls_tree() -> None:
     moved[:, 0] = np.arange(-2.0, 2.0, 0.05) + 0.025
     assert np.flatnonzero(np.diff(bin_keys(moved))).tolist() == list(range(9, 79, 10))
     assert len(np.unique(bin_keys(moved[:, [1, 0, 2]]))) == 8
+    border = bin_keys(np.array([[0.4, 0.1, 0.1], [0.5, 0.1, 0.1], [0.6, 0.1, 0.1]]))
+    assert border[0] != border[1] == border[2]
     everywhere = np.random.default_rng(0).uniform((-20, -20, -3.2), (20, 20, 3.2), (500, 3))
     at = [
         (math.floor(x * 2), math.floor(y * 2), math.floor(math.degrees(t) / 10) % 36)
