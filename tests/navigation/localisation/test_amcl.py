@@ -205,7 +205,7 @@ def test_a_scan_that_sees_nothing_leaves_dead_reckoning(hall_map: OccupancyMap) 
     assert np.isfinite(new.covariance).all()
 
 
-@pytest.mark.parametrize(("spread", "least", "most"), [(0.01, 500, 500), (0.7, 900, 1999), (4.0, 2000, 2000)])
+@pytest.mark.parametrize(("spread", "least", "most"), [(0.01, 500, 500), (0.4, 600, 1999), (4.0, 2000, 2000)])
 def test_as_many_particles_as_the_spread_of_the_belief_asks_for(
     hall_map: OccupancyMap, spread: float, least: int, most: int
 ) -> None:
