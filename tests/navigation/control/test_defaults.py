@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
+from tests.documented import other_ranges
 from tests.oracles.nav2_defaults import compared
 from twin.navigation.control.collision_monitor_config import FOOTPRINT_APPROACH, CollisionMonitorConfig
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
-from twin.navigation.control.mppi.config import MPPIConfig
+from twin.navigation.control.mppi.config import CRITICS, MPPIConfig
 from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
@@ -89,3 +90,25 @@ def test_a_collision_monitor_looks_and_waits_for_sensors_a_second() -> None:
 def test_critics_that_score_by_default() -> None:
     assert {name for name in MPPI.critics if MPPI.scores(name)} == {*MPPI.critics}
     assert not MPPI.scores("ObstaclesCritic")
+
+
+@pytest.mark.parametrize(
+    ("section", "config", "shared"),
+    [
+        ("controller", MPPI, 33),
+        ("controller", DWB, 17),
+        ("controller", RegulatedPurePursuitConfig(), 35),
+        ("controller", RotationShimConfig(), 11),
+        *((f"controller.{name}", getattr(MPPI, name), 3) for name in CRITICS),
+        ("controller.CostCritic", MPPI.CostCritic, 10),
+        ("controller.TrajectoryVisualizer", MPPI.TrajectoryVisualizer, 2),
+        ("controller.RotateToGoal", DWB.RotateToGoal, 4),
+        ("controller.Oscillation", DWB.Oscillation, 5),
+        ("controller.GoalAlign", DWB.GoalAlign, 2),
+        ("collision_monitor.polygons[]", FOOTPRINT_APPROACH, 10),
+    ],
+)
+def test_ranges_are_those_that_the_docs_tell(section: str, config: Any, shared: int) -> None:
+    found, others = other_ranges(f"robots[].navigation.{section}", config)
+    assert found >= shared
+    assert others == {}

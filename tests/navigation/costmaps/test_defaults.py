@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from tests.documented import other_ranges
 from tests.oracles.nav2_defaults import compared
 from twin.navigation.costmaps.costmap_config import CostmapConfig
 
@@ -27,3 +28,15 @@ def test_defaults_are_nav2s(component: str, config: Any, shared: int, ours: dict
 def test_who_may_drive_out_of_a_keepout_zone_pays_the_dearest_cost_that_is_free() -> None:
     """Nav2's MAX_NON_OBSTACLE."""
     assert CONFIG.keepout_filter.lethal_override_cost == 252
+
+
+@pytest.mark.parametrize(
+    ("section", "config", "shared"),
+    [
+        ("global_costmap", CONFIG, 21),
+        ("global_costmap.range_sensor_layer", CONFIG.range_sensor_layer, 5),
+        ("global_costmap.keepout_filter", CONFIG.keepout_filter, 2),
+    ],
+)
+def test_ranges_are_those_that_the_docs_tell(section: str, config: Any, shared: int) -> None:
+    assert other_ranges(f"robots[].navigation.{section}", config) == (shared, {})

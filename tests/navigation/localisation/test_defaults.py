@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.documented import other_ranges
 from tests.oracles.nav2_defaults import compared
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.ekf import EkfConfig
@@ -29,3 +30,7 @@ def test_the_filters_defaults_are_robot_localizations() -> None:
     assert EkfConfig().process_noise_covariance == noise
     assert EkfConfig().initial_estimate_covariance == (1e-9,) * 15
     assert not EkfConfig().two_d_mode
+
+
+def test_ranges_are_those_that_the_docs_tell() -> None:
+    assert other_ranges("robots[].localisation (type: amcl).parameters", AmclConfig()) == (34, {})

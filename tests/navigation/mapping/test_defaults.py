@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.documented import other_ranges
 from twin.navigation.mapping.config import SlamConfig
 
 THEIRS = {
@@ -51,3 +52,7 @@ def test_defaults_are_slam_toolboxs() -> None:
         "loop_match_minimum_response_coarse": 0.4,
         "loop_match_minimum_response_fine": 0.55,
     }
+
+
+def test_ranges_are_those_that_the_docs_tell() -> None:
+    assert other_ranges("robots[].localisation (type: slam).parameters", SlamConfig()) == (24, {})

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from tests.documented import other_ranges
 from tests.oracles.nav2_defaults import compared
 from twin.navigation.planning import config as ours_of
 
@@ -22,3 +23,19 @@ from twin.navigation.planning import config as ours_of
 )
 def test_defaults_are_nav2s(component: str, config: Any, shared: int, ours: dict[str, Any]) -> None:
     assert compared(component, config) == (shared, ours)
+
+
+@pytest.mark.parametrize(
+    ("section", "config", "shared"),
+    [
+        ("planner", ours_of.PlannerConfig(), 4),
+        ("planner", ours_of.ThetaStarConfig(), 5),
+        ("planner", ours_of.HybridConfig(), 13),
+        ("planner", ours_of.CommitmentConfig(), 2),
+        ("planner", ours_of.GoalAccessConfig(), 3),
+        ("smoother", ours_of.SmootherConfig(), 5),
+        ("smoother", ours_of.SavitzkyGolayConfig(), 2),
+    ],
+)
+def test_ranges_are_those_that_the_docs_tell(section: str, config: Any, shared: int) -> None:
+    assert other_ranges(f"robots[].navigation.{section}", config) == (shared, {})
