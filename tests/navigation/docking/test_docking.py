@@ -114,6 +114,16 @@ def test_what_has_another_width_is_no_tote() -> None:
     assert find_box_faces(np.full((9, 2), np.nan), 0.24) == []
 
 
+def test_the_two_sides_of_a_nose_are_no_faces() -> None:
+    """Five points each, of which one is 2.7 cm before the others: too few lie on a line."""
+    points = np.column_stack([np.full(9, 1.0), np.linspace(-0.08, 0.08, 9)])
+    assert len(find_box_faces(points, 0.18)) == 1
+    points[4, 0] -= 0.027
+    assert find_box_faces(points, 0.1) == []
+    assert len(find_box_faces(points[4:] + (0.027, 0.0), 0.1)) == 0
+    assert len(find_box_faces(np.delete(points, 4, axis=0)[:4], 0.08)) == 0, "four points are none"
+
+
 # DockEstimate: the plan expects the face at x = 2; the robot stands at the origin
 
 
