@@ -12,7 +12,6 @@ from twin.navigation.control.collision_monitor_config import FOOTPRINT_APPROACH,
 from twin.navigation.control.dwb.config import DWBConfig
 from twin.navigation.control.goal_checker import StoppedGoalCheckerConfig
 from twin.navigation.control.mppi.config import CRITICS, MPPIConfig
-from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.control.progress_checker import PoseProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.rotation_shim_config import RotationShimConfig
@@ -64,7 +63,6 @@ MPPI, DWB = MPPIConfig(), DWBConfig()
         ("goal checker", StoppedGoalCheckerConfig(), 8, {}),
         ("progress checker", PoseProgressCheckerConfig(), 3, {}),
         ("collision monitor", FOOTPRINT_APPROACH, 7, {"min_points": 3}),
-        ("path handler", PathHandlerConfig(), 4, {"enforce_path_inversion": True}),
         ("path handler", MPPI, 4, {"prune_distance": 1.5, "enforce_path_inversion": True}),
         ("regulated pure pursuit", RegulatedPurePursuitConfig(), 27, {"max_linear_decel": 0.0}),
         ("rotation shim", RotationShimConfig(), 9, {}),
@@ -74,9 +72,8 @@ def test_defaults_are_nav2s(component: str, config: Any, shared: int, ours: dict
     assert compared(component, config) == (shared, ours)
 
 
-def test_the_nearest_pose_of_a_path_is_searched_along_as_much_as_a_local_costmap_shows() -> None:
-    """Nav2's `max_robot_pose_search_dist` is the local costmap's extent, 3 m in its example."""
-    assert PathHandlerConfig().max_robot_pose_search_dist == 3.0
+def test_mppi_searches_the_nearest_pose_as_far_as_a_local_costmap_shows() -> None:
+    """Nav2's is the local costmap's extent, 3 m in its example."""
     assert MPPI.max_robot_pose_search_dist == 3.0
 
 
