@@ -423,3 +423,15 @@ def test_the_shim_turns_to_a_path_aside_and_drives_along_one_ahead() -> None:
         assert (controller.trajectory is None) is turns
         assert (v == 0.0 and abs(w) == pytest.approx(3.2 * DT)) is turns
         assert not turns or w * yaw < 0.0
+
+
+def test_what_the_primary_controller_had_in_mind_is_not_shown_while_the_shim_turns() -> None:
+    controller = create(CONTROLLERS, RotationShimConfig(primary_controller=DWB_CONFIG), footprint=FOOTPRINT)
+    here = Pose2(3.0, 2.0, 0.0), (0.0, 0.0)
+    for path, drives in (
+        (line(2.0, 4.0, 2.0), True),
+        (line(4.0, 2.0, 2.0), False),
+        (line(2.0, 4.0, 2.0), True),
+    ):
+        controller.compute_velocity(*here, path, hall(), DT)
+        assert (controller.trajectory is not None) is drives
