@@ -81,3 +81,11 @@ def test_rpy_round_trip(roll: float, pitch: float, yaw: float) -> None:
 
 def test_quaternion_orders_are_inverse_of_each_other() -> None:
     np.testing.assert_array_equal(wxyz_from_xyzw(xyzw_from_wxyz([1, 2, 3, 4])), [1, 2, 3, 4])
+
+
+def test_an_origin_that_is_not_written_is_that_of_its_parent() -> None:
+    """URDF: xyz and rpy default to zeros."""
+    for pose in (Pose3.from_xyz_rpy(), Pose3.from_pose2(Pose2(0.0, 0.0, 0.0))):
+        assert [*pose.xyz, *pose.quat_wxyz] == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert Pose3.from_xyz_rpy(rpy=(0.0, 0.0, math.pi)).xyz.tolist() == [0.0, 0.0, 0.0]
+    assert Pose3.from_xyz_rpy((1.0, 2.0, 3.0)).quat_wxyz.tolist() == [1.0, 0.0, 0.0, 0.0]

@@ -1,3 +1,5 @@
+import pytest
+
 from twin.controllers.twist_mux import MuxInput, TwistMux
 
 
@@ -20,3 +22,12 @@ def test_the_higher_priority_wins_while_it_is_live() -> None:
 
 def test_nobody_is_in_charge_before_the_first_command() -> None:
     assert mux().active(0.0) is None
+
+
+@pytest.mark.parametrize(("silent", "live"), [(0.5, True), (0.51, False)])
+def test_a_source_that_says_nothing_is_live_for_half_a_second(silent: float, live: bool) -> None:
+    one = MuxInput(name="teleop", topic="a", priority=100)
+    mux = TwistMux([one, MuxInput(name="joystick", topic="b", priority=200)])
+    assert one.guarded
+    assert mux.accept("teleop", 1.0)
+    assert mux.active(1.0 + silent) == ("teleop" if live else None)

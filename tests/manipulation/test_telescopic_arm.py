@@ -1,3 +1,5 @@
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,3 +34,19 @@ def test_forward_undoes_inverse(x: float, z: float, yaw: float) -> None:
 def test_out_of_reach_names_the_joint() -> None:
     with pytest.raises(ValueError, match=r"out of reach: 'stage' would be at 0\.900"):
         ARM.inverse(GraspPose(x=2.0, z=0.5))
+
+
+def test_where_the_joints_put_the_grasp_frame() -> None:
+    pose, y = ARM.forward({"lift": 0.3, "stage": 0.1, "wrist": 0.5})
+    assert (pose.x, pose.z, pose.yaw) == pytest.approx((2.0 * 0.1 + 0.2 * math.cos(0.5), 0.72, 0.5))
+    assert y == pytest.approx(0.2 * math.sin(0.5))
+
+
+@pytest.mark.parametrize(
+    ("x", "z", "joint"),
+    [(0.8, 1.4205, "lift"), (0.8, 0.4195, "lift"), (0.8405, 0.5, "stage"), (0.1995, 0.5, "stage")],
+)
+def test_the_edges_of_its_reach(x: float, z: float, joint: str) -> None:
+    with pytest.raises(ValueError, match=f"'{joint}' would be at"):
+        ARM.inverse(GraspPose(x=x, z=z))
+    assert ARM.inverse(GraspPose(x=min(max(x, 0.2), 0.84), z=min(max(z, 0.42), 1.42)))

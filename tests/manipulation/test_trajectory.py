@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
 
 from twin.manipulation.trajectory import JointLimits, concatenate, plan_joint_move
 
@@ -53,3 +54,28 @@ def test_a_move_takes_no_longer_and_no_shorter_than_its_limits_allow() -> None:
         assert max(peaks.values()) < 1.002
     slow = plan_joint_move({"lift": 0.0}, {"lift": 1.0}, LIMITS, speed=0.5)
     assert slow.velocities.max() == pytest.approx(0.2, rel=0.01)
+
+
+def test_between_way_points_a_trajectory_is_the_cubic_through_both_places_and_speeds() -> None:
+    times, places = [0.0, 1.0, 3.0, 3.5], [[0.0, 1.0], [2.0, 0.0], [1.0, -1.0], [1.5, 4.0]]
+    trajectory = concatenate(["a", "b"], times, places)
+    p, t = np.array(places), np.array(times)
+    inside = [(p[i + 1] - p[i - 1]) / (t[i + 1] - t[i - 1]) for i in (1, 2)]
+    oracle = CubicHermiteSpline(times, places, [[0.0, 0.0], *inside, [0.0, 0.0]])
+    for time in np.linspace(0.0, 3.5, 50):
+        assert trajectory.sample(time) == pytest.approx(oracle(time), abs=1e-12)
+    assert trajectory.duration == 3.5
+
+
+def test_way_points_lie_a_step_apart_and_follow_a_quintic() -> None:
+    """Source: the blend 10 s^3 - 15 s^4 + 6 s^5, whose speed and acceleration are 0 at both ends."""
+    trajectory = plan_joint_move({"lift": 0.2}, {"lift": 0.7}, LIMITS)
+    steps = np.diff(trajectory.times)
+    assert steps == pytest.approx(np.full(len(steps), steps[0]))
+    assert 0.045 < steps[0] <= 0.05
+    s = trajectory.times / trajectory.duration
+    assert trajectory.positions[:, 0] == pytest.approx(0.2 + 0.5 * (10 * s**3 - 15 * s**4 + 6 * s**5))
+    slope = np.gradient(trajectory.positions[:, 0], trajectory.times, edge_order=2)
+    assert trajectory.velocities[:, 0] == pytest.approx(slope, abs=5e-3)
+    nowhere = plan_joint_move({"lift": 0.2}, {"lift": 0.2}, LIMITS)
+    assert (nowhere.duration, nowhere.sample(1.0).tolist()) == (0.0, [0.2])

@@ -20,7 +20,10 @@ from tests.mutation.mutants import Mutant, Site
 _PARTS = ("twin", "tests", "scenarios", "examples", "docs")
 _SUITES = (
     ("tests/navigation", "tests/sim", "tests/warehouse", "tests/manipulation", "tests/test_geometry.py"),
-    ("tests/models", "tests/convert", "tests/controllers", "tests/scenario", "tests/test_periods.py"),
+    (
+        *("tests/models", "tests/convert", "tests/controllers", "tests/parameters", "tests/scenario"),
+        "tests/test_periods.py",
+    ),
 )
 """The tests of the packages themselves, in two parts that take about as long."""
 _FAST = ("-m", "not slow and not bench and not long", "-p", "no:cacheprovider", "-q", "--timeout=0")

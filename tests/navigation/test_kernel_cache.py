@@ -20,7 +20,7 @@ from . import limits
 
 @jit
 def cost(x):
-    return x + limits.LOW
+    return [x + limits.LOW for _ in range(1)][0]
 """,
     "middle.py": """
 from twin.navigation._jit import jit

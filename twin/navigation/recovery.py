@@ -81,7 +81,6 @@ class _Behavior:
         self._footprint: Array = np.array(self.config.footprint, dtype=np.float64)
         self._elapsed = 0.0
         self._turned = 0.0
-        self._last_yaw = 0.0
         self._start: Pose2 | None = None
         self._speed = 0.0
         self.progress = 0.0

@@ -177,3 +177,20 @@ def test_includes_are_relative_to_their_file(tmp_path: Path, load: Load) -> None
     )
     assert bed.tick(1) == "S"
     assert bed.leaves["b"].ticks == 1
+
+
+def nested(levels: int) -> str:
+    inside = "<Inverter>" * (levels - 1) + "<Leaf/>" + "</Inverter>" * (levels - 1)
+    return f'<root BTCPP_format="4"><BehaviorTree ID="Main">{inside}</BehaviorTree></root>'
+
+
+def test_how_deep_trees_may_be_nested(load: Load, tmp_path: Path) -> None:
+    assert load(nested(64)).tick(1) == "F", "63 times the contrary of success"
+    assert faults(tmp_path, nested(65)) == ["tree.xml:1: nested deeper than 64 levels"]
+
+
+def test_a_port_that_a_node_needs(tmp_path: Path) -> None:
+    tree = (
+        '<root><BehaviorTree ID="Main"><PersistentSequence><Leaf/></PersistentSequence></BehaviorTree></root>'
+    )
+    assert "<PersistentSequence> needs current_child_idx" in "\n".join(faults(tmp_path, tree))

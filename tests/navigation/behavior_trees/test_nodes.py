@@ -126,6 +126,25 @@ def test_the_next_recovery_after_each_failure(load: Load) -> None:
     assert bed.ticks == (2, 2, 1)
 
 
+def test_a_recovery_node_begins_with_its_first_child_and_all_retries_after_a_halt(load: Load) -> None:
+    bed = load(node("RecoveryNode", "FS", "R"))
+    assert bed.tick(1) == "R"
+    bed.tree.halt()
+    assert bed.tick(1) == "S"
+    assert bed.ticks == (2, 1)
+    bed = load(node("RecoveryNode", "FRF", "S", number_of_retries=2))
+    assert bed.tick(1) == "R"
+    bed.tree.halt()
+    assert bed.tick(1) == "F"
+    assert bed.ticks == (5, 3), "twice more after the halt"
+
+
+def test_a_recovery_node_whose_recovery_is_skipped_fails_and_tries_again(load: Load) -> None:
+    bed = load(node("RecoveryNode", "FFS", "-S", number_of_retries=1))
+    assert bed.tick(2) == "FS"
+    assert bed.ticks == (3, 2)
+
+
 def test_round_robin_begins_with_the_first_child_after_a_halt(load: Load) -> None:
     bed = load(node("RoundRobin", "S", "R", "S"))
     assert bed.tick(2) == "SR"

@@ -287,3 +287,15 @@ def test_the_last_metre_is_not_slower_than_the_least_approach_speed() -> None:
         pose = Pose2(5.0 - left, 0.0, 0.0)
         v, _ = controller.compute_velocity(pose, (0.5, 0.0), line(5.0), None, DT)
         assert v == pytest.approx(want), left
+
+
+def test_a_cancelled_robot_brakes_along_the_path_and_may_be_stopped_when_it_stands() -> None:
+    controller, path, v = rpp(use_cancel_deceleration=True, cancel_deceleration=3.2), line(3.0), 0.5
+    controller.compute_velocity(Pose2(0.0, 0.0, 0.0), (v, 0.0), path, None, DT)
+    assert not controller.cancel()
+    for want in (0.34, 0.18, 0.02, 0.0):
+        assert not controller.cancel()
+        v, _ = controller.compute_velocity(Pose2(0.0, 0.0, 0.0), (v, 0.0), path, None, DT)
+        assert v == pytest.approx(want)
+    assert controller.cancel()
+    assert rpp().cancel(), "at once, if it is not to brake by itself"

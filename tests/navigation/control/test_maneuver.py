@@ -129,3 +129,31 @@ def test_a_maneuver_ends_when_somebody_steps_into_it() -> None:
     blocked = hall((0.46, 0.8, -0.3, 0.3))
     assert maneuver.command(Pose2(0.0, 0.0, 0.0), (0.1, 0.0), blocked, DT) is None
     assert not maneuver.active
+
+
+def test_poses_of_a_move_lie_a_cell_and_a_half_apart_also_on_a_finer_costmap() -> None:
+    """Or every move would be half as long, and the way as dear to find as by four times as many."""
+    for resolution in (0.05, 0.025):
+        n = round(4.0 / resolution)
+        costmap = Costmap(costs=np.zeros((n, n), dtype=np.uint8), resolution=resolution, origin=(-2.0, -2.0))
+        moves = find_maneuver(costmap, LONG, Pose2(0.0, 0.0, 0.0), line((0.5, 0.0), (1.5, 0.0)))
+        assert [move.gear for move in moves] == [1]
+        between = np.hypot(*np.diff(moves[0].poses[:, :2], axis=0).T)
+        assert between == pytest.approx(np.full(len(between), 0.075))
+
+
+@pytest.mark.parametrize(("limit", "most"), [(None, 0.2), (0.1, 0.1), (0.5, 0.2)])
+def test_a_maneuver_is_driven_no_faster_than_its_speed_and_the_limit(
+    limit: float | None, most: float
+) -> None:
+    maneuver, at, velocity, speeds = Maneuver(footprint=LONG), Pose2(0.0, 0.0, 0.0), (0.0, 0.0), []
+    maneuver.speed_limit = limit
+    assert maneuver.begin(hall(), at, line((0.0, 0.0), (0.5, 0.0)))
+    while (command := maneuver.command(at, velocity, hall(), DT)) is not None:
+        velocity = command
+        at = at @ Pose2(command[0] * DT, 0.0, command[1] * DT)
+        speeds.append(command[0])
+    assert max(speeds) == pytest.approx(most)
+    assert np.diff(speeds, prepend=0.0).max() <= 0.5 * DT + 1e-9, "speeding up as it may"
+    assert speeds[-1] < 0.19, "slower at the end"
+    assert at.x == pytest.approx(0.5, abs=0.1)

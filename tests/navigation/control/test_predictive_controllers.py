@@ -377,3 +377,61 @@ def test_an_obstacles_critic_keeps_off_as_the_cost_critic_does() -> None:
     ]
     beside = [log[(log[:, 0] > 3.0) & (log[:, 0] < 4.0), 1].mean() for log in middle]
     assert beside[1] > beside[0] + 0.01
+
+
+def test_dwb_stops_at_the_goal_before_it_turns() -> None:
+    """What turns there without driving stands: it is rotating already."""
+    path = line(2.0, 4.0, 2.0)
+    path[-1, 2] = 1.2
+
+    def commanded(velocity: tuple[float, float]) -> tuple[float, float]:
+        controller = create(CONTROLLERS, DWB_CONFIG, footprint=FOOTPRINT)
+        controller.set_goal_tolerance(0.05)
+        return controller.compute_velocity(Pose2(3.98, 2.0, 0.0), velocity, path, hall(), DT)
+
+    v, w = commanded((0.0, 0.9))
+    assert v == 0.0
+    assert w > 0.3
+    assert abs(commanded((0.6, 0.0))[0]) < 0.6, "it brakes first"
+
+
+def at_the_goal(*, to_its_heading: bool) -> tuple[Controller, tuple[float, float]]:
+    shim = RotationShimConfig(primary_controller=DWB_CONFIG, rotate_to_goal_heading=to_its_heading)
+    controller = create(CONTROLLERS, shim, footprint=FOOTPRINT)
+    controller.set_goal_tolerance(0.1)
+    path = line(2.0, 4.0, 2.0)
+    path[-1, 2] = -2.0
+    return controller, controller.compute_velocity(Pose2(3.95, 2.0, 0.0), (0.0, 0.0), path, hall(), DT)
+
+
+def test_the_shim_turns_to_the_goals_heading_if_it_is_to() -> None:
+    controller, command = at_the_goal(to_its_heading=True)
+    assert command == pytest.approx((0.0, -3.2 * DT)), "by its own acceleration, the short way round"
+    assert controller.carrot == pytest.approx((4.0, 2.0))
+    assert controller.trajectory is None, "the primary controller does not drive"
+    controller, _ = at_the_goal(to_its_heading=False)
+    assert controller.trajectory is not None
+
+
+def test_the_shim_turns_to_a_path_aside_and_drives_along_one_ahead() -> None:
+    path = line(2.0, 4.0, 2.0)
+    for yaw, turns in ((-0.6, False), (-0.79, True), (0.79, True), (0.6, False)):
+        controller = create(
+            CONTROLLERS, RotationShimConfig(primary_controller=DWB_CONFIG), footprint=FOOTPRINT
+        )
+        v, w = controller.compute_velocity(Pose2(2.0, 2.0, yaw), (0.0, 0.0), path, hall(), DT)
+        assert (controller.trajectory is None) is turns
+        assert (v == 0.0 and abs(w) == pytest.approx(3.2 * DT)) is turns
+        assert not turns or w * yaw < 0.0
+
+
+def test_what_the_primary_controller_had_in_mind_is_not_shown_while_the_shim_turns() -> None:
+    controller = create(CONTROLLERS, RotationShimConfig(primary_controller=DWB_CONFIG), footprint=FOOTPRINT)
+    here = Pose2(3.0, 2.0, 0.0), (0.0, 0.0)
+    for path, drives in (
+        (line(2.0, 4.0, 2.0), True),
+        (line(4.0, 2.0, 2.0), False),
+        (line(2.0, 4.0, 2.0), True),
+    ):
+        controller.compute_velocity(*here, path, hall(), DT)
+        assert (controller.trajectory is not None) is drives

@@ -171,8 +171,10 @@ def test_what_a_layered_costmap_refuses() -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_footprint_cost_is_the_worst_cell_under_the_outline(seed: int) -> None:
     costmap = LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=room()).costmap
-    footprint = rectangle(0.5, 0.3)
-    pose = Pose2(*np.random.default_rng(seed).uniform((-0.6, -0.1, -4.0), (1.6, 1.6, 4.0)))
+    random, footprint = np.random.default_rng(seed), rectangle(0.5, 0.3)
+    pose = Pose2(*random.uniform((-0.6, -0.1, -4.0), (1.6, 1.6, 4.0)))
+    if seed % 2:  # every cell another: which ones are looked at matters
+        costmap.costs[:] = random.integers(0, 254 if seed % 4 == 1 else 256, costmap.costs.shape)
     corners = pose.apply(footprint)
     under = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -194,3 +196,27 @@ def test_radii_of_footprints() -> None:
     assert radii(rectangle(0.6, 0.4, x_offset=0.1, padding=0.01))[0] == pytest.approx(0.21)
     assert radii(rectangle(0.6, 0.4, x_offset=1.0))[0] == 0.0
     assert radii(circle(0.3))[0] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("corners", "inscribed"),
+    [
+        ([[0.3, 0.0], [0.0, 0.3], [-0.3, 0.0], [0.0, -0.3]], 0.3 / math.sqrt(2.0)),  # corners on the axes
+        ([[0.4, 0.0], [-0.2, 0.2], [-0.2, -0.2]], 0.4 * math.sin(math.atan2(0.2, 0.6))),
+        ([[0.0, 0.2], [-0.5, 0.2], [-0.5, -0.2], [0.0, -0.2]], 0.0),  # the base on the front edge
+        ([[0.5, 0.2], [0.0, 0.2], [0.0, -0.2], [0.5, -0.2]], 0.0),  # and on the back one
+        ([[0.5, 0.3], [0.1, 0.3], [0.1, -0.3], [0.5, -0.3]], 0.0),  # behind it
+        ([[-0.1, 0.3], [-0.5, 0.3], [-0.5, -0.3], [-0.1, -0.3]], 0.0),  # before it
+    ],
+)
+def test_the_inscribed_radius_of_any_outline(corners: list[list[float]], inscribed: float) -> None:
+    for outline in (corners, corners[::-1]):
+        assert radii(outline)[0] == pytest.approx(inscribed)
+
+
+def test_a_circle_has_as_many_corners_as_nav2s() -> None:
+    """nav2_costmap_2d, makeFootprintFromRadius: 16; here its sides touch the circle, not its corners."""
+    corners = circle(0.5)
+    assert len(corners) == 16
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    assert np.hypot(*middles.T) == pytest.approx(np.full(16, 0.5))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from twin.geometry import Pose2
 from twin.navigation.docking.config import DockEstimateConfig, LineApproachConfig
+from twin.navigation.docking.detectors import BoxFaces, BoxFacesConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.faces import BoxFace, find_box_faces, fit_wall
 from twin.navigation.docking.line_approach import MISSED, LineApproach
@@ -110,6 +111,40 @@ def test_what_has_another_width_is_no_tote() -> None:
     assert len(find_box_faces(points, 0.4)) == 1
     assert find_box_faces(np.zeros((0, 2)), 0.24) == []
     assert find_box_faces(np.full((9, 2), np.nan), 0.24) == []
+
+
+def test_the_two_sides_of_a_nose_are_no_faces() -> None:
+    """Five points each, of which one is 2.7 cm before the others: too few lie on a line."""
+    points = np.column_stack([np.full(9, 1.0), np.linspace(-0.08, 0.08, 9)])
+    assert len(find_box_faces(points, 0.18)) == 1
+    points[4, 0] -= 0.027
+    assert find_box_faces(points, 0.1) == []
+    assert find_box_faces(points[:4], 0.08) == [], "four points are none"
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "width", "found"),
+    [
+        (0.8, 0.0, 0.24, True),
+        (0.8, 0.0, 0.27, True),
+        (0.8, 0.0, 0.285, False),  # off by more than 3.5 cm
+        (0.8, 0.0, 0.215, True),
+        (0.8, 0.0, 0.195, False),
+        (1.78, 0.0, 0.24, True),
+        (1.82, 0.0, 0.24, False),
+        (1.4, 0.66, 0.24, True),
+        (1.4, -0.66, 0.24, True),
+        (1.4, 0.9, 0.24, False),
+    ],
+)
+def test_what_the_detector_of_boxes_looks_for_by_default(
+    x: float, y: float, width: float, found: bool
+) -> None:
+    far = 3.0, -6.0, 3.0, 6.0
+    faces = BoxFaces(config=BoxFacesConfig()).detect(cast([*box(Pose2(x, y, 0.0), width, 0.3), far]))
+    assert len(faces) == found
+    if found:
+        assert faces[0] == pytest.approx((x, y, 0.0), abs=0.02)
 
 
 # DockEstimate: the plan expects the face at x = 2; the robot stands at the origin

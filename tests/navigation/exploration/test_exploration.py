@@ -228,3 +228,10 @@ def test_rooms_behind_rooms_become_known_altogether() -> None:
     assert explorer.explored
     assert (known[truth == 0] == 0).mean() > 0.99
     assert driven < 60.0
+
+
+def test_a_frontier_that_the_robot_can_drive_up_to_needs_no_view_from_afar() -> None:
+    near = FrontierConfig(
+        min_frontier_size=0.5, robot_radius=0.25, inscribed_radius=0.25, view_distance=0.0, goal_clearance=0.0
+    )
+    assert len(FrontierMap(grid(corridor()), at(10, 20), near).frontiers) == 2

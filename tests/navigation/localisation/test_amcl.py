@@ -13,6 +13,7 @@ from twin.navigation.localisation.amcl import Amcl
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.laser_scan import chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
+from twin.navigation.localisation.particles import bin_keys, kld_sample_size
 from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
@@ -202,6 +203,20 @@ def test_a_scan_that_sees_nothing_leaves_dead_reckoning(hall_map: OccupancyMap) 
     assert new is not None
     assert new.pose.x == pytest.approx(WAYPOINTS[0][0] + 0.5, abs=0.05)
     assert np.isfinite(new.covariance).all()
+
+
+@pytest.mark.parametrize(("spread", "least", "most"), [(0.01, 500, 500), (0.4, 600, 1999), (4.0, 2000, 2000)])
+def test_as_many_particles_as_the_spread_of_the_belief_asks_for(
+    hall_map: OccupancyMap, spread: float, least: int, most: int
+) -> None:
+    """KLD sampling: Fox 2003, over the bins that particles are in."""
+    amcl = Amcl(AmclConfig(), hall_map, 0)
+    amcl.initialise(Pose2(10.0, 5.2, 0.0), np.diag([spread, spread, 0.5 * spread]) ** 2)
+    bins = len(np.unique(bin_keys(amcl.particles)))
+    amcl.update(NOWHERE, [math.inf], [0.0], T_BASE_LIDAR)
+    assert least <= len(amcl.particles) <= most
+    assert len(amcl.particles) == min(max(kld_sample_size(bins, 0.05, 0.99), 500), 2000)
+    assert amcl.weights == pytest.approx(np.full(len(amcl.particles), 1.0 / len(amcl.particles)))
 
 
 def test_a_map_without_room() -> None:

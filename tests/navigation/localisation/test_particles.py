@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from twin.geometry import Pose2
 from twin.navigation.localisation.motion_models import sample_motion
 from twin.navigation.localisation.particles import (
+    bin_keys,
     clusters,
     heaviest,
     kld_sample_size,
@@ -97,3 +98,23 @@ def test_the_heaviest_cluster_wins_and_wraps_at_pi() -> None:
     assert mean[:2] == pytest.approx((1.0, 1.0), abs=0.06)
     assert abs(mean.yaw) == pytest.approx(math.pi, abs=0.03)
     assert np.sqrt(np.diag(covariance)) == pytest.approx((0.3, 0.3, 0.1), rel=0.15)
+
+
+def test_bins_are_those_of_amcls_tree() -> None:
+    """Half a metre and ten degrees (pf_kdtree.c)."""
+    degrees = np.arange(-180.0, 180.0, 0.5) + 0.25
+    turned = np.column_stack([np.full((720, 2), 0.1), np.radians(degrees)])
+    assert len(np.unique(bin_keys(turned))) == 36
+    assert np.flatnonzero(np.diff(bin_keys(turned))).tolist() == list(range(19, 719, 20))
+    moved = np.zeros((80, 3))
+    moved[:, 0] = np.arange(-2.0, 2.0, 0.05) + 0.025
+    assert np.flatnonzero(np.diff(bin_keys(moved))).tolist() == list(range(9, 79, 10))
+    assert len(np.unique(bin_keys(moved[:, [1, 0, 2]]))) == 8
+    border = bin_keys(np.array([[0.4, 0.1, 0.1], [0.5, 0.1, 0.1], [0.6, 0.1, 0.1]]))
+    assert border[0] != border[1] == border[2]
+    everywhere = np.random.default_rng(0).uniform((-20, -20, -3.2), (20, 20, 3.2), (500, 3))
+    at = [
+        (math.floor(x * 2), math.floor(y * 2), math.floor(math.degrees(t) / 10) % 36)
+        for x, y, t in everywhere
+    ]
+    assert len(np.unique(bin_keys(everywhere))) == len({*at})

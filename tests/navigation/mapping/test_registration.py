@@ -9,7 +9,8 @@ import pytest
 from tests.navigation.mapping.worlds import ANGLES, LIDAR, WALLS, scan
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
-from twin.navigation.mapping.registration import Registration, doubted
+from twin.navigation.mapping.matcher import Match, Reference
+from twin.navigation.mapping.registration import Registration, contradiction, doubted
 from twin.navigation.mapping.scan import Scan
 from twin_benchmarks.slam.log import load_log
 from twin_benchmarks.slam.relations import relations_of
@@ -49,6 +50,60 @@ def test_a_corridor_leaves_the_robot_where_odometry_has_led_it():
     assert pose.x == pytest.approx(guess.x, abs=0.1)
     assert (pose.y, pose.yaw) == pytest.approx((where.y, where.yaw), abs=0.02)
     assert edge[0, 0] > 25.0 * edge[1, 1]
+
+
+GUESS = Pose2(1.0, 2.0, 0.5)
+
+
+def matched(x: float, score: float, *, loose: float = 1e-4) -> Match:
+    """Return a match so far along x from the guess."""
+    covariance = np.diag([loose, 1e-4, 1e-5])
+    pose = Pose2(GUESS.x + x, GUESS.y, GUESS.yaw)
+    return Match(pose=pose, covariance=covariance, response=0.7, inliers=score + 0.05, contradicted=0.05)
+
+
+@pytest.mark.parametrize(
+    ("away", "home", "believed"),
+    [
+        (matched(0.5, 0.85), matched(0.02, 0.76), 0.02),
+        (matched(0.5, 0.85), matched(0.02, 0.74), 0.5),  # better by more than a tenth
+        (matched(0.5, 0.85), None, 0.5),
+        (matched(0.5, 0.85), matched(0.4, 0.84), 0.5),  # that is no home
+        (matched(0.29, 0.85), matched(0.02, 0.84), 0.29),  # it agrees with odometry: less than 3 sigma
+        (matched(0.32, 0.85), matched(0.02, 0.84), 0.02),
+    ],
+)
+def test_who_contradicts_odometry_must_fit_better_than_who_does_not(
+    monkeypatch: pytest.MonkeyPatch, away: Match, home: Match | None, believed: float
+) -> None:
+    class Found:
+        def match(self, *_: object) -> Match:
+            return away
+
+        def refined(self, *_: object) -> Match | None:
+            return home
+
+    monkeypatch.setattr(Reference, "of", lambda *_, **__: Found())
+    taken = Scan.from_ranges([1.0], [0.0], LIDAR, min_range=0.05, max_range=8.0)
+    match = Registration(SlamConfig(), [taken], np.zeros((1, 3))).match(taken, GUESS, PRIOR)
+    assert match is not None
+    assert match.pose.x - GUESS.x == pytest.approx(believed)
+
+
+def test_how_much_a_match_contradicts_odometry_is_a_chi_square() -> None:
+    match = matched(0.3, 0.8, loose=0.0125)
+    assert contradiction(match, GUESS, PRIOR) == pytest.approx(0.3**2 / (0.01 + 0.0125))
+
+
+@pytest.mark.parametrize(("away", "wider"), [(0.29, False), (0.5, True)])
+def test_the_covariance_of_a_match_that_contradicts_odometry_reaches_towards_it(
+    away: float, wider: bool
+) -> None:
+    match = matched(away, 0.8)
+    spread = doubted(match, GUESS, PRIOR)
+    square = contradiction(match, GUESS, PRIOR)
+    doubt = max(0.2, 1.0 - 1e-4 / 1e-4 / 0.2) * (1.0 - 9.0 / square) if wider else 0.0
+    assert spread == pytest.approx(match.covariance + doubt * np.diag([away**2, 0.0, 0.0]), abs=1e-9)
 
 
 @pytest.mark.slow

@@ -36,3 +36,17 @@ def test_each_try_takes_another_gap_the_short_ways_first() -> None:
 
 def test_the_only_way_is_tried_again() -> None:
     assert all(2.3 < y < 2.7 for y in crossings(walls(2.3), 2))
+
+
+def test_a_strip_along_a_tried_path_becomes_dear_but_not_where_every_way_must_pass() -> None:
+    """By default half a metre to each side, from a metre off both ends on; what was closed stays so."""
+    costmap = walls(2.3)
+    costmap.costs[20:30, 30] = 100
+    costmap.costs[24, 70] = 255
+    path = np.column_stack([np.arange(0.55, 9.5, 0.1), np.full(90, 2.45)])
+    dear = avoiding(costmap, [path]).costs
+    want = costmap.costs.copy()
+    strip = want[19:30, 11:89]  # the first cell that counts is 1.1 m from the start
+    strip[strip < 253] = np.minimum(strip[strip < 253].astype(int) + 200, 252)
+    assert dear.tolist() == want.tolist()
+    assert avoiding(costmap, [path, path]).costs[24, 60] == 252

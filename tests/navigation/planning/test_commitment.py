@@ -41,3 +41,15 @@ def test_only_free_cells_become_dearer() -> None:
     config = CommitmentConfig(commitment_cost=20, commitment_width=0.1)
     found = committed(costmap, np.array([[-9.0, -9.0]]), config)
     assert found.costs.tolist() == [[20, 120, 252, 253, 254, 255]]
+
+
+def test_a_path_is_free_to_move_aside_by_the_width_and_no_farther() -> None:
+    costmap = Costmap(costs=np.full((12, 15), 7, dtype=np.uint8), resolution=0.1, origin=(-1.0, 2.0))
+    config = CommitmentConfig(commitment_cost=20, commitment_width=0.25)  # in three cells
+    path = np.array([[-0.45, 2.45, 0.0], [-0.35, 2.45, 0.0]])  # in columns 5 and 6 of row 4
+    found = committed(costmap, path, config).costs
+    want = np.full((12, 15), 27)
+    want[1:8, 2:10] = 7
+    assert found.tolist() == want.tolist()
+    corner = committed(costmap, np.array([[-0.95, 2.05]]), config).costs
+    assert np.argwhere(corner == 7).tolist() == [[row, column] for row in range(4) for column in range(4)]

@@ -99,3 +99,16 @@ def test_a_path_is_lost_when_its_end_is_taken_before_the_robots_eyes() -> None:
     assert not access.is_lost(GOAL, NEAR, hall().costmap, taken.known)
     tight = Pose2(7.0, 0.38, 1.57)  # across before the wall: the map's own doing
     assert not access.is_lost(tight, NEAR, taken.costmap, taken.known)
+
+
+@pytest.mark.parametrize(
+    ("goal", "person"),
+    [(Pose2(0.5, 2.0, 1.57), (0.02, 2.0)), (Pose2(7.5, 2.0, 1.57), (7.98, 2.0)), (GOAL, (7.0, 3.0))],
+    ids=["in the first column of the map", "in the last one", "within 1.2 m"],
+)
+def test_who_stands_around_an_occupied_goal_is_left_out(goal: Pose2, person: tuple[float, float]) -> None:
+    layers = hall((goal.x, goal.y), person, (4.0, 2.0))
+    costmap = opened(GoalAccess(footprint=LONG), layers, FAR, 0.0, goal)
+    assert layers.costmap.cost_at(*person) == 254
+    assert costmap.cost_at(*person) == costmap.cost_at(goal.x, goal.y) == 0
+    assert costmap.cost_at(4.0, 2.0) == 254

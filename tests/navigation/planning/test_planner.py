@@ -12,6 +12,7 @@ import pytest
 import scipy.sparse.csgraph
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import savgol_filter
 
 from twin.geometry import Pose2, wrap_angles
 from twin.navigation.costmaps.costmap import Costmap
@@ -23,7 +24,12 @@ from twin.navigation.failures import (
     StartOccupied,
     StartOutsideMap,
 )
-from twin.navigation.planning.config import PlannerConfig, SmootherConfig, ThetaStarConfig
+from twin.navigation.planning.config import (
+    PlannerConfig,
+    SavitzkyGolayConfig,
+    SmootherConfig,
+    ThetaStarConfig,
+)
 from twin.navigation.planning.direction import cusps, one_way_pieces
 from twin.navigation.planning.grid_search import GridSearch
 from twin.navigation.planning.planner import Planner, filled, path_length, with_headings
@@ -377,3 +383,30 @@ def test_what_lies_off_the_map_is_not_smoothed_into_an_obstacle(smoother: Any) -
     assert not np.any((after == 254) & (before != 254))
     free = smoother.smooth(path)
     assert any(costmap.cost_at(x, y) == 254 for x, y in free[:, :2]), "without the map it would be"
+
+
+def test_a_savitzky_golay_smoother_is_scipys_filter() -> None:
+    """Window 7, order 3, as Nav2's; the ends stay, mirrored at themselves."""
+    path = with_headings(np.random.default_rng(0).normal(0.0, 1.0, (30, 2)).cumsum(axis=0))
+    once = SavitzkyGolaySmoother(config=SavitzkyGolayConfig(do_refinement=False)).smooth(path)
+    longer = np.concatenate([2.0 * path[0] - path[3:0:-1], path, 2.0 * path[-1] - path[-2:-5:-1]])[:, :2]
+    want = savgol_filter(longer, 7, 3, axis=0)[3:-3]
+    assert once[1:-1, :2] == pytest.approx(want[1:-1])
+    assert once[[0, -1], :2] == pytest.approx(path[[0, -1], :2])
+    again = SavitzkyGolaySmoother(config=SavitzkyGolayConfig(refinement_num=1)).smooth(path)
+    assert again[:, :2] == pytest.approx(
+        SavitzkyGolaySmoother(config=SavitzkyGolayConfig(do_refinement=False)).smooth(once)[:, :2]
+    )
+    for short in (path[:6], path[:2]):
+        assert np.array_equal(SavitzkyGolaySmoother().smooth(short), short)
+    assert not np.array_equal(SavitzkyGolaySmoother().smooth(path[:7])[:, :2], path[:7, :2])
+
+
+def test_a_simple_smoother_ends_where_both_pulls_are_in_balance() -> None:
+    path = with_headings(np.random.default_rng(1).normal(0.0, 1.0, (12, 2)).cumsum(axis=0))
+    config = SmootherConfig(w_data=0.2, w_smooth=0.3, tolerance=0.0, refinement_num=0)
+    pull = np.eye(12)
+    for i in range(1, 11):
+        pull[i, i - 1 : i + 2] = -0.3, 0.2 + 0.6, -0.3
+    pulled = path[:, :2] * np.r_[1.0, np.full(10, 0.2), 1.0][:, None]
+    assert SimpleSmoother(config=config).smooth(path)[:, :2] == pytest.approx(np.linalg.solve(pull, pulled))

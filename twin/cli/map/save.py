@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import time
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -41,6 +40,7 @@ def save(
     joining: Joining,
 ) -> None:
     """Save the map of a live graph as YAML and image; as `ros2 run nav2_map_server map_saver_cli`."""
+    from twin.cli.run.folders import map_name
     from twin.navigation.maps.map_saver import SaveParameters, save_map
     from twin.nodes.navigation.mapping.map_server import occupancy_map
 
@@ -50,7 +50,7 @@ def save(
         occupied_thresh=occupied,
         free_thresh=free,
     )
-    path = yaml_path(name or Path(f"map_{int(time())}"))
+    path = yaml_path(name or map_name())
     with joining.open() as process:
         message = _first_map(process, absolute(topic), transient_local, timeout)
     occupancy = occupancy_map(message)

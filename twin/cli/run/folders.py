@@ -34,3 +34,13 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
     folder = run_folder(name) if out is None else make_folder(out)
     with written_alone(folder):
         yield folder
+
+
+def bag_folder() -> Path:
+    """Return `rosbag2_<YYYY_mm_dd-HH_MM_SS>`, as `ros2 bag record` names a bag."""
+    return Path(datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S"))
+
+
+def map_name() -> Path:
+    """Return `map_<seconds>`, as nav2's map_saver_cli names a map."""
+    return Path(f"map_{int(datetime.now().timestamp())}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -50,6 +49,7 @@ def record(
     from twin.bridge.bags.topic_choice import TopicChoice
     from twin.bridge.bags.writer import STORAGES, BagConfig
     from twin.bridge.wire.interrupts import noted_signals
+    from twin.cli.run.folders import bag_folder
 
     if not (topics or everything or regex):
         raise typer.BadParameter("name topics, or give --all or --regex")
@@ -63,7 +63,7 @@ def record(
             compression=one_of(COMPRESSIONS, compression, "compression"),
         ),
     )
-    folder = output or Path(datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S"))
+    folder = output or bag_folder()
     with joining.open() as process, noted_signals() as signals:
         recorder = Recorder(process.bus, folder, config)
         _tell([f"recording to {folder}; Ctrl-C ends it"])

@@ -43,9 +43,7 @@ class Totals:
     """The weighted sum of the critics that score."""
 
     def __init__(self, config: MPPIConfig) -> None:
-        self._names = [
-            name for name in NAMES if config.scores(name) and getattr(config, name).cost_weight != 0.0
-        ]
+        self._names = [name for name in NAMES if config.scores(name)]
         critics = [getattr(config, name) for name in self._names]
         rows = [NAMES.index(name) for name in self._names]
         # Nav2 weighs costs as fractions of 254.
