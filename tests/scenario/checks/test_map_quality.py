@@ -77,6 +77,19 @@ def test_cells_are_squares() -> None:
     assert truth.distances_of_cells(turned) == pytest.approx([0.05, 0.0, 0.0, 0.05, 0.15])
 
 
+def test_walls_are_as_far_off_as_the_nearest_square_whichever_it_is() -> None:
+    """Every square is looked at, instead of some whose centres are nearest."""
+    truth = MapTruth(HALL)
+    data = np.zeros((160, 200), np.int8)
+    data[np.random.default_rng(0).random(data.shape) < 0.02] = 100
+    grid = OccupancyMap(data=data, resolution=0.05, origin=Pose2(-1.0, -1.0, 0.0))
+    nearest = np.full(len(truth.wall_points), np.inf)
+    for cells in np.array_split(wall_cells(grid), 20):
+        off = np.abs(truth.wall_points[:, None] - cells) - 0.025
+        nearest = np.minimum(nearest, np.linalg.norm(np.maximum(off, 0.0), axis=2).min(axis=1))
+    assert truth.distances_of_walls(grid) == pytest.approx(nearest, abs=0.002)
+
+
 def test_a_wall_missing_beside_known_floor_counts_and_one_behind_unknown_ground_does_not() -> None:
     truth = MapTruth(HALL)
     whole = drawn()
