@@ -126,6 +126,13 @@ def test_what_is_missing_is_told() -> None:
     assert "of the floor is free on the map" in floor.reason
 
 
+def test_a_wall_is_on_the_map_if_it_is_there_within_10_cm() -> None:
+    for shift, found in ((0.07, True), (0.13, False)):
+        grid = drawn(shift)
+        known = OccupancyMap(data=np.abs(grid.data), resolution=0.05, origin=grid.origin)  # no place unknown
+        assert judge({"map_coverage": {"walls": 0.95}}, known).passed is found
+
+
 def test_no_map_and_no_walls_fail_with_their_reasons() -> None:
     assert judge({"map_accuracy": {"mean": 1}}, None).reason == "bot made no map"
     empty = OccupancyMap(data=np.zeros((5, 5), np.int8), resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
