@@ -67,8 +67,15 @@ def test_nothing_to_carry_is_refused() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_two_hinges_that_cancel_each_other_are_refused() -> None:
-    with pytest.raises(ConversionError, match="link 'cross' has no mass, and joints roll, pitch") as caught:
-        convert(parse_urdf(robot("0 0 1", "0 0 1"), Path("r.urdf")))
+    innocent = (
+        f"<joint name='nod' type='continuous'><parent link='end'/><child link='head'/></joint>"
+        f"<link name='head'>{INERTIAL}</link></robot>"
+    )
+    text = robot("0 0 1", "0 0 1").replace("</robot>", innocent)
+    with pytest.raises(
+        ConversionError, match="'cross' has no mass, and joints roll, pitch can turn"
+    ) as caught:
+        convert(parse_urdf(text, Path("r.urdf")))
     assert caught.value.problems[0].line == 4
 
 

@@ -14,13 +14,15 @@ from numpy.testing import assert_allclose
 
 from twin.convert import convert
 from twin.convert.export import export
+from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.inspection import inspect_file, inspect_robot
 from twin.errors import ConversionError
-from twin.geometry import Array
+from twin.geometry import Array, Pose3
 from twin.models import load
 from twin.models.description import RobotDescription
 from twin.models.mesh.meshes import read_mesh
 from twin.models.options import ReadOptions
+from twin.models.shapes import Box, Collision, Cylinder, Geometry, Sphere
 
 POINTS = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -301,3 +303,16 @@ def test_meshes_of_real_robots_are_where_pinocchio_sees_them() -> None:
         size = np.linalg.norm(np.ptp(points, axis=0))
         assert_allclose(points.min(axis=0), expected.aabb_local.min_, atol=1e-5 * size, err_msg=file.name)
         assert_allclose(points.max(axis=0), expected.aabb_local.max_, atol=1e-5 * size, err_msg=file.name)
+
+
+def test_a_wheel_rolls_as_the_ellipsoid_in_its_cylinder() -> None:
+    pose = Pose3.from_xyz_rpy((0.1, 0.2, 0.3), (math.pi / 2, 0.0, 0.0))
+
+    def ellipsoid(geometry: Geometry) -> tuple[Pose3, list[float]] | None:
+        return wheel_ellipsoid(Collision(geometry=geometry, T_link_geometry=pose))
+
+    found = ellipsoid(Cylinder(radius=0.05, length=0.02))
+    assert found == (pose, [0.05, 0.05, 0.01])
+    assert ellipsoid(Cylinder(radius=0.05, length=0.5)) == (pose, [0.05, 0.05, 0.25]), "a roller"
+    assert ellipsoid(Box(size=(0.1, 0.1, 0.1))) is None
+    assert ellipsoid(Sphere(radius=0.1)) is None

@@ -13,6 +13,7 @@ from twin.convert import convert
 from twin.geometry import Pose2, Pose3
 from twin.models import load
 from twin.models.description import RobotDescription
+from twin.models.loader import parse_urdf
 from twin.models.shapes import Box
 from twin.models.specs import CommandSpec
 from twin.sim.physics import Physics
@@ -135,6 +136,33 @@ def test_a_finger_presses_with_the_effort_it_is_allowed(effort: float) -> None:
     assert bot.pressing() == pytest.approx([expected, expected], rel=0.02)
     measured = dict(zip(bot.hardware.joint_names, bot.hardware.read().effort, strict=True))
     assert [measured[joint] for joint in FINGERS] == pytest.approx([-expected, -expected], rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_commanded_by_effort_is_pushed_the_way_of_its_command_up_to_its_velocity_limit(
+    sign: float,
+) -> None:
+    text = (
+        "<robot name='r'><link name='base'/><joint name='j' type='prismatic'><parent link='base'/>"
+        "<child link='cart'/><axis xyz='1 0 0'/><limit lower='-9' upper='9' effort='6' velocity='0.5'/>"
+        "</joint><link name='cart'><inertial><mass value='2'/>"
+        "<inertia ixx='1' iyy='1' izz='1'/></inertial></link>"
+        "<ros2_control name='c' type='system'><joint name='j'><command_interface name='effort'/></joint>"
+        "</ros2_control></robot>"
+    )
+    conversion = convert(parse_urdf(text, Path("r.urdf")), base="fixed")
+    world = World.compose(
+        Scene(name="s"),
+        [RobotPlacement(name="r", conversion=conversion, pose=Pose3.from_xyz_rpy((0.0, 0.0, 1.0)))],
+    )
+    hardware, speeds = world.robots["r"].hardware, []
+    for _ in range(50):
+        hardware.command("j", sign * 4.0)
+        hardware.apply()
+        world.step(10)
+        speeds.append(float(world.data.joint("r/j").qvel[0]))
+    assert speeds[4] == pytest.approx(sign * 4.0 / 2.0 * 0.1, rel=0.05)
+    assert speeds[-1] == pytest.approx(sign * 0.5, rel=0.02)
 
 
 @pytest.mark.parametrize(("friction", "lifted"), [(0.6, True), (0.02, False)])

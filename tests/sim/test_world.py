@@ -216,3 +216,16 @@ def test_visuals_are_for_rendering_and_change_no_motion(room: Scene) -> None:
     for world in (bare, seen):
         world.step(500)
     assert bare.state_digest() == seen.state_digest()
+
+
+def test_what_a_camera_sees_of_light_and_floor(room: Scene) -> None:
+    model = World.compose(room, [placed()]).model
+    assert model.light("sun").castshadow == 1
+    assert model.mat("floor").reflectance == 0.0, "no mirror"
+    assert ((model.geom_rgba >= 0.0) & (model.geom_rgba <= 1.0)).all()
+
+
+def test_floor_and_goods_roll_and_twist_as_mujoco_has_it_by_default(room: Scene) -> None:
+    model, default = World.compose(room, [placed()]).model, mujoco.MjSpec().default.geom.friction
+    assert model.geom("floor").friction.tolist() == [room.floor_friction, *default[1:]]
+    assert model.geom_friction[:, 1:] == pytest.approx(np.tile(default[1:], (model.ngeom, 1)))

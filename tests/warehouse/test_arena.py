@@ -225,3 +225,23 @@ def test_a_misspelt_key_is_named(tmp_path: Path) -> None:
         ScenarioError, match=r"(?s)arena.yaml:2: hall.y must go.*:3: unknown key 'raks'.*did you mean 'racks'"
     ):
         arenas.load(file)
+
+
+def test_all_that_is_painted_lies_on_what_it_is_painted_on(warehouse: Arena) -> None:
+    scene = warehouse.scene(NAMED, seed=1)
+    bodies = (*scene.statics, *scene.goods)
+    for shape in (shape for body in bodies for shape in body.shapes):
+        assert all(0.0 <= share <= 1.0 for share in shape.rgba)
+    for body in (body for body in bodies if body.name.endswith("_marking")):
+        for stripe in body.shapes:
+            assert isinstance(stripe.geometry, Box)
+            height = stripe.geometry.size[2]
+            assert stripe.T_body_geometry.xyz[2] == pytest.approx(height / 2.0)
+            assert height == 0.002
+    for good in scene.goods:
+        tops = sorted(
+            float(shape.T_body_geometry.xyz[2]) + shape.geometry.size[2] / 2.0
+            for shape in good.shapes
+            if isinstance(shape.geometry, Box)
+        )
+        assert tops[-1] - tops[-2] >= 0.002 - 1e-12, "the opening shows above the rim"

@@ -204,7 +204,7 @@ def _let_lower_friction_act(spec: mujoco.MjSpec, goods: Sequence[FreeBody]) -> N
     all else, of priority 0, goods and such links keep theirs; wheels and casters keep it against everything.
     """
     names = {good.name for good in goods}
-    solid = [geom for geom in spec.geoms if geom.contype or geom.conaffinity]
+    solid = [geom for geom in spec.geoms if geom.contype]
     ranked = [geom for geom in solid if 0 < geom.priority < OWN_CONTACT or geom.parent.name in names]
     grades = sorted({geom.friction[0] for geom in ranked}, reverse=True)
     for geom in solid:

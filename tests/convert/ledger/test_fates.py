@@ -157,6 +157,12 @@ def test_fate(element: str, entries: tuple[TagEntry, ...]) -> None:
     assert note in entry.note, entry
 
 
+def test_the_whole_ledger_reads_as_it_did(entries: tuple[TagEntry, ...]) -> None:
+    """Each line was read by a person against what the conversion does; a new fate is a new line to read."""
+    told = [f"{entry.outcome:10} {entry.element}: {entry.note}" for entry in entries]
+    assert told == Path(__file__).with_name("everything.txt").read_text("utf-8").splitlines()
+
+
 def all_of(element: str, entries: tuple[TagEntry, ...]) -> list[tuple[str, str]]:
     return [(entry.outcome, entry.note) for entry in entries if entry.element == element]
 

@@ -158,6 +158,32 @@ FOUND = {
     ),
 }  # fmt: skip
 
+MORE = {
+    "massless, with what is fixed to it": (
+        arm(AXIS + LIMIT, "").replace(
+            "</robot>",
+            "<link name='lamp'/><joint name='l' type='fixed'><parent link='tip'/><child link='lamp'/></joint>"
+            "</robot>",
+        ),
+        4,
+        "",
+    ),
+    "two without collision": (
+        arm(AXIS + LIMIT, CUBE.partition("<collision>")[0]).replace(
+            "</robot>",
+            f"<link name='lamp'><visual>{BOX}</visual></link><joint name='l' type='fixed'>"
+            "<parent link='tip'/><child link='lamp'/></joint></robot>",
+        ),
+        4,
+        "",
+    ),
+    "two faults in gazebo tags": (
+        cart(extra="<gazebo reference='bas'/><gazebo><plugin name='w' filename='wind'/></gazebo>"),
+        9,
+        "",
+    ),
+}
+"""Further ones, of which every word is compared."""
 BY_COLLISION_DETECTION = {"overlap", "wheel-rubs"}
 """Tested with the conversion, where MuJoCo is."""
 BY_OPTION = {"skipped-mesh", "turned-mesh"}
@@ -184,6 +210,16 @@ def test_fault_is_found_with_line_and_number(code: str) -> None:
     )
     assert message in found[0].message
     assert found[0].fix
+
+
+def test_findings_read_as_they_did() -> None:
+    """What a user is told of each faulty robot, all of it; a person read each line."""
+    told = [
+        f"{code}: {found.line} {found.severity} {found.code} {found.element}: {found.message} | {found.fix}"
+        for code, (text, _, _) in (FOUND | MORE).items()
+        for found in diagnose(text)
+    ]
+    assert told == Path(__file__).with_name("findings.txt").read_text("utf-8").splitlines()
 
 
 def test_sound_robots_are_left_in_peace() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from twin.errors import ModelError
 from twin.models.loader import parse_urdf
 from twin.models.specs import DriveSpec
 from twin.sensors.lidar import LidarSpec
@@ -56,6 +57,13 @@ def test_diff_drive_in_every_spelling(name: str) -> None:
     assert drive.max_wheel_torque == 3.0, (
         "the joint's effort stands in for a torque that the plugin does not give"
     )
+
+
+def test_a_torque_is_a_magnitude() -> None:
+    plugin = PLUGINS["classic ROS 2"].replace("</plugin>", "<torque>{}</torque></plugin>")
+    assert drive_of(plugin.format(0)).max_wheel_torque == 0.0
+    with pytest.raises(ModelError, match="wheel torque -1 Nm; give a magnitude"):
+        drive_of(plugin.format(-1))
 
 
 def test_skid_steer() -> None:

@@ -143,6 +143,8 @@ def test_no_collision() -> None:
         "hardest: bot/base_link hit rack_a with 80.0 N at 2.00 s"
     )
     assert not fold({"no_collision": None}, [at(1, contacts=[touch("wall", 1e-6)])]).passed
+    both = [touch("tote_a", 90.0, "left_finger"), touch("wall", 4.0), touch("rack_a", 7.0)]
+    assert fold(entry, [at(1, contacts=both)]).reason.startswith("bot/base_link hit rack_a with 7.0 N")
     just = [at(1, contacts=[touch("wall", 5.0)]), at(2, moved={"bot"})]
     assert fold(entry, just).passed, "up to max_force"
     assert not fold(entry, [at(1, contacts=[touch("wall", 5.001)]), *just]).passed
@@ -240,6 +242,8 @@ def test_recoveries() -> None:
     ]
     assert not fold({"recoveries": {"max_per_km": 1}}, km[:2]).passed
     assert fold({"recoveries": {"max_per_km": 1}}, km).passed
+    exactly = [at(t, robots=bot(x, 0.0, recoveries=t, goals=1)) for t, x in enumerate((0.0, 1000.0))]
+    assert fold({"recoveries": {"max_per_km": 1}}, exactly).passed
 
 
 def test_driven_distance() -> None:

@@ -77,6 +77,19 @@ def test_cells_are_squares() -> None:
     assert truth.distances_of_cells(turned) == pytest.approx([0.05, 0.0, 0.0, 0.05, 0.15])
 
 
+def test_walls_are_as_far_off_as_the_nearest_square_whichever_it_is() -> None:
+    """Every square is looked at, instead of some whose centres are nearest."""
+    truth = MapTruth(HALL)
+    data = np.zeros((160, 200), np.int8)
+    data[np.random.default_rng(0).random(data.shape) < 0.02] = 100
+    grid = OccupancyMap(data=data, resolution=0.05, origin=Pose2(-1.0, -1.0, 0.0))
+    nearest = np.full(len(truth.wall_points), np.inf)
+    for cells in np.array_split(wall_cells(grid), 20):
+        off = np.abs(truth.wall_points[:, None] - cells) - 0.025
+        nearest = np.minimum(nearest, np.linalg.norm(np.maximum(off, 0.0), axis=2).min(axis=1))
+    assert truth.distances_of_walls(grid) == pytest.approx(nearest, abs=0.002)
+
+
 def test_a_wall_missing_beside_known_floor_counts_and_one_behind_unknown_ground_does_not() -> None:
     truth = MapTruth(HALL)
     whole = drawn()
@@ -111,6 +124,13 @@ def test_what_is_missing_is_told() -> None:
     floor = judge({"map_coverage": {"floor": 0.95}}, part)
     assert floor.value == pytest.approx(0.81, abs=0.03)
     assert "of the floor is free on the map" in floor.reason
+
+
+def test_a_wall_is_on_the_map_if_it_is_there_within_10_cm() -> None:
+    for shift, found in ((0.07, True), (0.13, False)):
+        grid = drawn(shift)
+        known = OccupancyMap(data=np.abs(grid.data), resolution=0.05, origin=grid.origin)  # no place unknown
+        assert judge({"map_coverage": {"walls": 0.95}}, known).passed is found
 
 
 def test_no_map_and_no_walls_fail_with_their_reasons() -> None:

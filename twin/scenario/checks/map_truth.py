@@ -19,7 +19,7 @@ FREE_TO = 25
 _CELL = 0.05
 _MARGIN = 0.5
 _NEIGHBOURS = 4
-"""Among so many cells whose centres are nearest is the one whose edge is."""
+"""Among so many cells whose centres are nearest is the one whose edge is, or one that is 2 mm further."""
 _BESIDE = 0.02
 """So far before a surface lies the floor that it borders on [m]."""
 
