@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -35,6 +36,8 @@ class Execution:
         self._tell, self._told = tell, set[str]()
         self.modules: dict[str, ModuleType] = {}
         """Files that were run, by the name of their module."""
+        self.neighbours: dict[Path, dict[str, ModuleType]] = {}
+        """What files imported from their own folders."""
         self._plugins: list[Plugin[object]] = []
 
     def add(self, plugin: Plugin[object]) -> None:
@@ -46,11 +49,18 @@ class Execution:
         """Keep the version of what is about to be executed, and tell of it."""
         version = version or version_for(place)
         if self.versions.setdefault(name, version) != version:  # files of one name in two folders
-            self.versions[f"{place.file}:{place.attribute}"] = version
+            self.versions[":".join(filter(None, (str(place.file), place.attribute)))] = version
         where = str(place.file or place.module)
         if self._tell is not None and where not in self._told:
             self._told.add(where)
             self._tell(where)
+
+    def keep_imported(self, folder: Path, package: str | None = None) -> None:
+        """Keep, too, what was imported of a folder; of the one package alone, if one is named."""
+        for name, file in _imported_from(folder).items():
+            first = name.partition(".")[0]
+            if first != "twin" and package in (None, first) and version_of(first) is None:
+                self.keep(str(file.relative_to(folder)), Place("", file=file))
 
     @contextmanager
     def going_on(self) -> Iterator[None]:
@@ -88,27 +98,25 @@ def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
         yield current
 
 
-def run(plugin: Plugin[object]) -> Any:
+def run(plugin: Plugin[Any]) -> Any:
     """Import a plugin, and return what its name stands for; raises what it raises."""
-    place = plugin.place
-    if not plugin.ships and (current := _CURRENT.get()) is not None:
+    place, current = plugin.place, None if plugin.ships else _CURRENT.get()
+    if current is not None:
         current.add(plugin)
     if place.module is not None:
         module = importlib.import_module(place.module)
+        if current is not None and place.file is not None and plugin.version is None:
+            inner = place.module.count(".") + (place.file.name == "__init__.py")
+            current.keep_imported(place.file.resolve().parents[inner], place.module.partition(".")[0])
     else:
         assert place.file is not None
-        module = _run_file(place.file)
+        module = _run_file(place.file.resolve())
+        if current is not None:
+            current.keep_imported(place.file.resolve().parent)
     found: Any = module
     for part in place.attribute.split("."):
         found = getattr(found, part)
     return found
-
-
-def run_file(file: Path, attribute: str) -> ModuleType:
-    """Run a file of a user that holds no plugin; a run tells of it and keeps its hash likewise."""
-    if (current := _CURRENT.get()) is not None:
-        current.keep(f"{file.name}:{attribute}", Place(attribute, file=file))
-    return _run_file(file)
 
 
 def version_for(place: Place) -> str:
@@ -119,31 +127,55 @@ def version_for(place: Place) -> str:
     return f"sha256:{hashlib.sha256(place.file.read_bytes()).hexdigest()}"
 
 
-_MODULES: dict[str, ModuleType] = {}
-"""Of files that were run outside of any run."""
+_OUTSIDE = Execution()
+"""Of files that are run outside of any run."""
+_NEIGHBOURS: set[str] = set()
+"""Names of modules that files imported from their own folders."""
 
 
 def _run_file(file: Path) -> ModuleType:
     """Run a file as a module of its own; once in a run, which finds nothing that another one left in it."""
-    file = file.resolve()
     code = hashlib.sha256(str(file).encode() + file.read_bytes()).hexdigest()[:12]
     name = f"{file.stem}_{code}"  # a name of its own: nobody's random.py stands in for Python's
-    current = _CURRENT.get()
-    modules = _MODULES if current is None else current.modules
-    if name in modules:
-        return modules[name]
+    current = _CURRENT.get() or _OUTSIDE
+    if name in current.modules:
+        return current.modules[name]
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(file.parent))  # as Python does for a script
     try:
         sys.modules[name] = module  # dataclasses look their module up
-        spec.loader.exec_module(module)
+        with _importing_from(file.parent, current.neighbours.setdefault(file.parent, {})):
+            spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
-    finally:
-        sys.path.remove(str(file.parent))
-    modules[name] = module
+    current.modules[name] = module
     return module
+
+
+@contextmanager
+def _importing_from(folder: Path, neighbours: dict[str, ModuleType]) -> Iterator[None]:
+    """Let a file import what lies beside it, as Python does for a script: this run's, and of this folder."""
+    others = {name: sys.modules.pop(name) for name in _NEIGHBOURS & set(sys.modules)}
+    sys.modules.update(neighbours)
+    before = set(sys.modules)
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        neighbours |= {name: sys.modules[name] for name in _imported_from(folder) if name not in before}
+        _NEIGHBOURS.update(neighbours)
+        sys.modules.update({name: module for name, module in others.items() if name not in sys.modules})
+
+
+def _imported_from(folder: Path) -> dict[str, Path]:
+    """Return the files of those imported modules that lie where their names say, from a folder on."""
+    found = dict[str, Path]()
+    for name, module in list(sys.modules.items()):
+        stem, file = os.path.join(folder, *name.split(".")), getattr(module, "__file__", None)
+        if file in (f"{stem}.py", os.path.join(stem, "__init__.py")):
+            found[name] = Path(file)
+    return found

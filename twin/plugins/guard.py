@@ -52,7 +52,10 @@ def depth_of(plugin: Plugin[object], error: BaseException) -> int:
 
 
 def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int | None]]:
-    """Yield depth, file and line of the plugin's code, outermost first; of a package, all modules count."""
+    """Yield depth, file and line of the plugin's code, outermost first; of a package, all modules count.
+
+    Of a file's neighbours counts what it calls.
+    """
     file = plugin.place.file
     if file is None:
         return
@@ -61,9 +64,11 @@ def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[
         plugin.place.module is not None and file.name == "__init__.py"
     )
     package = mine.parents[inner - 1] if inner else None
+    entered = False
     for depth, frame in enumerate(traceback.extract_tb(error.__traceback__), 1):
         at = Path(frame.filename).resolve()
-        if at == mine or package in at.parents:
+        entered |= at == mine
+        if at == mine or package in at.parents or (entered and at.parent == mine.parent):
             yield depth, (file if at == mine else at), frame.lineno
 
 

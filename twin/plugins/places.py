@@ -96,7 +96,7 @@ def _line_of(file: Path, attribute: str, what: str) -> int | None:
     except (OSError, ValueError) as fault:
         raise PluginError(Problem(f"{what}: cannot be read: {fault}", file)) from None
     names = dict(_names(tree.body))
-    own = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
+    own = [node.name for node in tree.body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
     outer = attribute.partition(".")[0]
     if outer in names:
         return names[outer]
