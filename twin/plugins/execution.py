@@ -82,8 +82,8 @@ class Execution:
     def blamed(self, error: Exception) -> PluginError | None:
         """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
         faults = [(depth_of(plugin, error), plugin) for plugin in self._plugins]
-        depth, plugin = max(faults, key=lambda fault: fault[0], default=(0, None))
-        return blame(plugin, error) if plugin is not None and depth else None
+        depth, plugin = max(faults, key=lambda fault: fault[0], default=((0, 0), None))
+        return blame(plugin, error) if plugin is not None and depth[0] else None
 
 
 @contextmanager

@@ -41,20 +41,23 @@ def blame(plugin: Plugin[object], error: BaseException) -> PluginError:
         return PluginError(Problem(f"{what}: {error.msg}", Path(error.filename), error.lineno))
     text = " ".join(str(error).split())
     file, line = plugin.place.file, plugin.place.line
-    for _, file, line in _own_frames(plugin, error):  # noqa: B007  (the innermost one)
+    for _, file, line, _ in _own_frames(plugin, error):  # noqa: B007  (the innermost one)
         pass
     return PluginError(Problem(f"{what}: {text}" if text else what, file, line))
 
 
-def depth_of(plugin: Plugin[object], error: BaseException) -> int:
-    """Return how deep in the calls that an exception ended the plugin's code was; 0: not in them."""
-    return max((depth for depth, _, _ in _own_frames(plugin, error)), default=0)
+def depth_of(plugin: Plugin[object], error: BaseException) -> tuple[int, int]:
+    """Return how deep in the calls that an exception ended the plugin's files were, and its class; 0: not."""
+    frames, file = list(_own_frames(plugin, error)), plugin.place.file
+    within = f"{plugin.place.attribute}."
+    inside = (depth for depth, at, _, name in frames if at == file and name.startswith(within))
+    return max((depth for depth, *_ in frames), default=0), max(inside, default=0)
 
 
-def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int | None]]:
-    """Yield depth, file and line of the plugin's code, outermost first; of a package, all modules count.
+def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int, str]]:
+    """Yield depth, file, line and function of the plugin's code, outermost first.
 
-    Of a file's neighbours counts what it calls.
+    Of a package, all modules count; of a file, also what it calls of its neighbours.
     """
     file = plugin.place.file
     if file is None:
@@ -65,11 +68,11 @@ def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[
     )
     package = mine.parents[inner - 1] if inner else None
     entered = False
-    for depth, frame in enumerate(traceback.extract_tb(error.__traceback__), 1):
-        at = Path(frame.filename).resolve()
+    for depth, (frame, line) in enumerate(traceback.walk_tb(error.__traceback__), 1):
+        at = Path(frame.f_code.co_filename).resolve()
         entered |= at == mine
         if at == mine or package in at.parents or (entered and at.parent == mine.parent):
-            yield depth, (file if at == mine else at), frame.lineno
+            yield depth, (file if at == mine else at), line, frame.f_code.co_qualname
 
 
 def require_finite(plugin: Plugin[object], what: str, values: Iterable[float]) -> None:
