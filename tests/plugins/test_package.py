@@ -134,6 +134,10 @@ def test_a_package_installed_with_pip_is_used(tmp_path: Path) -> None:
     written(tmp_path, {**names, "stone": "stone", "yard": "yard"})
 
     assert "stone" in twin("robots", folder=tmp_path, path=site).stdout
+    twin("convert", "stone", "-o", "model", folder=tmp_path, path=site)
+    tags = json.loads((tmp_path / "model" / "report.json").read_text())["ledger"]
+    (skin,) = [tag for tag in tags if tag["element"] == "sensor 'skin'"]
+    assert skin["note"] == "left out: only runs execute a package's sensor: a sensor of type Warmth"
     plugins, executed = ran(tmp_path, site)
     assert plugins == dict.fromkeys(names.values(), "their-pack 2.1")
     assert set(executed) == {f"{place.partition(':')[0]}.py" for place in CLASSES.values()}

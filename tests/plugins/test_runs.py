@@ -210,6 +210,25 @@ def test_reading_a_scenario_runs_nothing_of_it(kind: str, write: Write) -> None:
             r"mine.py:5: .* reads a NoneType from its <sensor>",
         ),
         ("sensor", '    types = ("warmth",)\n', "", r"mine.py:5: .* names no `types`"),
+        (
+            "sensor",
+            "data=reading",
+            "data=__import__('numpy').zeros(3)",
+            r"mine.py:5: sensor 'mine.py:Mine' fails: BridgeError: .* cannot be encoded: data is a bool",
+        ),
+        (
+            "sensor",
+            "    def sample",
+            "    def __init__(self, *_):\n        pass\n\n    def sample",
+            r"mine.py:5: sensor 'mine.py:Mine' does not call super\(\).__init__\(spec, mount\)",
+        ),
+        ("sensor", "return True", "raise SystemExit(3)", r"mine.py:14: sensor .* fails: SystemExit: 3"),
+        (
+            "mission",
+            "self.finish(succeeded=True)",
+            "self.node.create_publisher(str, 'no name!', 10)",
+            r"mine.py:10: mission 'mine.py:Mine' fails: BridgeError: ",
+        ),
         ("sensor", "    def sample", "    def simple", r"mine.py:5: .* lacks sample\(time_ns\)"),
     ],
 )

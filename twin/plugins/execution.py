@@ -14,8 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from twin.errors import PluginError, TwinError
-from twin.plugins.guard import blame, depth_of
+from twin.errors import PluginError
+from twin.plugins.guard import blame, depth_of, is_told
 from twin.plugins.installed import version_of
 from twin.plugins.places import Place
 
@@ -71,15 +71,15 @@ class Execution:
         token = _CURRENT.set(self)
         try:
             yield
-        except Exception as error:
-            blamed = None if isinstance(error, TwinError) else self.blamed(error)
+        except (Exception, SystemExit) as error:
+            blamed = None if is_told(error) else self.blamed(error)
             if blamed is None:
                 raise
             raise blamed from error
         finally:
             _CURRENT.reset(token)
 
-    def blamed(self, error: Exception) -> PluginError | None:
+    def blamed(self, error: BaseException) -> PluginError | None:
         """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
         faults = [(depth_of(plugin, error), plugin) for plugin in self._plugins]
         depth, plugin = max(faults, key=lambda fault: fault[0], default=((0, 0), None))

@@ -9,14 +9,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from twin.errors import PluginError, Problem, TwinError
+from twin.errors import BridgeError, PluginError, Problem, TwinError
 
 if TYPE_CHECKING:
     from twin.plugins.plugin import Plugin
 
 
 class Guard:
-    """Around every call of a plugin: an exception becomes a `PluginError`; a `TwinError` stays what it is."""
+    """Around every call of a plugin: an exception becomes a `PluginError`, unless it is told as it is."""
 
     __slots__ = ("_plugin",)
 
@@ -30,8 +30,14 @@ class Guard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End it; what ships is not guarded: its faults are bugs of ours."""
-        if isinstance(error, Exception) and not isinstance(error, TwinError) and not self._plugin.ships:
+        told = is_told(error) or self._plugin.ships
+        if isinstance(error, Exception | SystemExit) and not told:
             raise blame(self._plugin, error) from error
+
+
+def is_told(error: BaseException | None) -> bool:
+    """Whether an error tells a user where he is wrong; those of the bus do not: whatever calls it may be."""
+    return isinstance(error, TwinError) and not isinstance(error, BridgeError)
 
 
 def blame(plugin: Plugin[object], error: BaseException) -> PluginError:

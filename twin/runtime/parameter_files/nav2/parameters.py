@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from twin.navigation import plugins
 from twin.navigation.localisation.amcl_config import AmclConfig
@@ -13,9 +13,9 @@ from twin.navigation.plugins import CONTROLLERS
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.localisation.amcl import AmclNodeConfig
 from twin.parameters import Flat
-from twin.plugins import Kind
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2 import scenario_first
+from twin.runtime.parameter_files.nav2.brought import brought, with_critics, with_layers, with_smoothers
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
@@ -47,41 +47,32 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         return config
     file = Nav2Parameters(Path(config.params_file), namespace)
     controller, planner = config.controller, config.planner
-    chosen = file.plugin("controller_server", "FollowPath")
-    if chosen == "RotationShimController":
-        primary = file.plugin("controller_server", "FollowPath", "primary_controller")
-        update = {
-            "rotation_shim": True,
-            "plugin": _CONTROLLERS.get(primary) or _brought(CONTROLLERS, primary),
-        }
-    else:
-        update = {"rotation_shim": False, "plugin": _CONTROLLERS.get(chosen) or _brought(CONTROLLERS, chosen)}
+    chosen, key = file.plugin("controller_server", "FollowPath"), "plugin"
+    shim = chosen == "RotationShimController"
+    if shim:
+        key = "primary_controller"
+        chosen = file.plugin("controller_server", "FollowPath", key)
+    used = brought(file, "controller_server", f"FollowPath.{key}", chosen, CONTROLLERS)
+    update = {"rotation_shim": shim, "plugin": used.reference if used else _CONTROLLERS.get(chosen)}
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
     if update["plugin"] and may_be and "rotation_shim" not in given:
         controller = controller.model_copy(update=update)
-    for key, section, classes in (
-        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS),
-        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS),
+    for key, section, classes, kind in (
+        ("goal_checker", "general_goal_checker", _GOAL_CHECKERS, plugins.GOAL_CHECKERS),
+        ("progress_checker", "progress_checker", _PROGRESS_CHECKERS, plugins.PROGRESS_CHECKERS),
     ):
-        chosen = classes.get(file.plugin("controller_server", section), "")
-        if chosen and key not in controller.model_fields_set:
-            controller = controller.model_copy(update={key: chosen})
+        said = file.plugin("controller_server", section)
+        checker = brought(file, "controller_server", f"{section}.plugin", said, kind) or classes.get(said)
+        if checker and key not in controller.model_fields_set:
+            controller = controller.model_copy(update={key: checker})
     chosen = file.plugin("planner_server", "GridBased")
-    found = PLANNERS.get(chosen) or _brought(plugins.PLANNERS, chosen)
+    used = brought(file, "planner_server", "GridBased.plugin", chosen, plugins.PLANNERS)
+    found = used.reference if used else PLANNERS.get(chosen)
+    file.ignored()
     if found and "plugin" not in planner.model_fields_set:
         planner = planner.model_copy(update={"plugin": found})
     return config.model_copy(update={"controller": controller, "planner": planner})
-
-
-def _controller(plugin: str) -> str | None:
-    return _CONTROLLERS.get(plugin) or _brought(CONTROLLERS, plugin)
-
-
-def _brought(kind: Kind[Any], plugin: str) -> str | None:
-    """Return the name of a user's plugin, if the file names one: `module:Class`, or an entry point."""
-    known = plugin in kind.names() and plugin not in kind.shipped
-    return plugin if ":" in plugin or known else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,6 +143,12 @@ def with_file(
     file = Nav2Parameters(Path(config.params_file), namespace)
     docking = parameters.docking
     docking = replace(docking, database=database_of(file, docking.database))
+    server, smoothers = parameters.controller_server, parameters.path_smoother.smoothers
+    if "critics" not in config.controller.model_fields_set:
+        controllers = {name: with_critics(file, name, one) for name, one in server.controllers.items()}
+        server = replace(server, controllers=controllers)
+    if not config.smoother.model_fields_set:
+        smoothers = with_smoothers(file, smoothers)
     changed = replace(
         parameters,
         smoother=file.applied(
@@ -169,12 +166,12 @@ def with_file(
         ),
         controller_server=file.applied(
             "controller_server",
-            parameters.controller_server,
+            server,
             keep=scenario_first.for_controllers(config),
         ),
         behaviors=file.applied("behavior_server", parameters.behaviors),
         docking=file.applied("docking_server", docking, keep=scenario_first.for_docking(config.docking)),
-        path_smoother=file.applied("smoother_server", parameters.path_smoother),
+        path_smoother=file.applied("smoother_server", replace(parameters.path_smoother, smoothers=smoothers)),
         navigator=file.applied(
             "bt_navigator",
             parameters.navigator,
@@ -197,6 +194,8 @@ def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapPara
         scan_topics=config.scan_topics if group.scan_topics is not None else scans or config.scan_topics,
         range_topics=config.range_topics if group.range_topics is not None else ranges or config.range_topics,
     )
+    if group.plugins is None:
+        config = replace(config, layers=with_layers(file, node, config.layers))
     changed = file.applied(node, config, keep=keep)
     if file.is_round(node) and group.robot_radius is None:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))
