@@ -55,12 +55,13 @@ class Execution:
             self._told.add(where)
             self._tell(where)
 
-    def keep_imported(self, folder: Path, package: str | None = None) -> None:
-        """Keep, too, what was imported of a folder; of the one package alone, if one is named."""
-        for name, file in _imported_from(folder).items():
+    def keep_imported(self, place: Place, file: Path) -> None:
+        """Keep what is imported, too, of a file's folder, or of a package that is not installed."""
+        folder, package = file.parents[place.depth], (place.module or "").partition(".")[0]
+        for name, other in _imported_from(folder).items():
             first = name.partition(".")[0]
-            if first != "twin" and package in (None, first) and version_of(first) is None:
-                self.keep(str(file.relative_to(folder)), Place("", file=file))
+            if first != "twin" and package in ("", first) and other != file and version_of(first) is None:
+                self.keep(str(other.relative_to(folder)), Place("", file=other))
 
     @contextmanager
     def going_on(self) -> Iterator[None]:
@@ -101,19 +102,17 @@ def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
 def run(plugin: Plugin[Any]) -> Any:
     """Import a plugin, and return what its name stands for; raises what it raises."""
     place, current = plugin.place, None if plugin.ships else _CURRENT.get()
+    file = place.file and place.file.resolve()
     if current is not None:
         current.add(plugin)
     if place.module is not None:
-        module = importlib.import_module(place.module)
-        if current is not None and place.file is not None and plugin.version is None:
-            inner = place.module.count(".") + (place.file.name == "__init__.py")
-            current.keep_imported(place.file.resolve().parents[inner], place.module.partition(".")[0])
+        with _without_neighbours():
+            found: Any = importlib.import_module(place.module)
     else:
-        assert place.file is not None
-        module = _run_file(place.file.resolve())
-        if current is not None:
-            current.keep_imported(place.file.resolve().parent)
-    found: Any = module
+        assert file is not None
+        found = _run_file(file)
+    if current is not None and file is not None and plugin.version is None:
+        current.keep_imported(place, file)
     for part in place.attribute.split("."):
         found = getattr(found, part)
     return found
@@ -146,7 +145,7 @@ def _run_file(file: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     try:
         sys.modules[name] = module  # dataclasses look their module up
-        with _importing_from(file.parent, current.neighbours.setdefault(file.parent, {})):
+        with _without_neighbours(), _importing_from(file.parent, current):
             spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
@@ -156,9 +155,19 @@ def _run_file(file: Path) -> ModuleType:
 
 
 @contextmanager
-def _importing_from(folder: Path, neighbours: dict[str, ModuleType]) -> Iterator[None]:
-    """Let a file import what lies beside it, as Python does for a script: this run's, and of this folder."""
-    others = {name: sys.modules.pop(name) for name in _NEIGHBOURS & set(sys.modules)}
+def _without_neighbours() -> Iterator[None]:
+    """Hide what files imported from their own folders, and what others may call the same."""
+    hidden = {name: sys.modules.pop(name) for name in _NEIGHBOURS & set(sys.modules)}
+    try:
+        yield
+    finally:
+        sys.modules.update({name: module for name, module in hidden.items() if name not in sys.modules})
+
+
+@contextmanager
+def _importing_from(folder: Path, current: Execution) -> Iterator[None]:
+    """Let a file import what lies beside it, as Python does for a script; once in a run."""
+    neighbours = current.neighbours.setdefault(folder, {})
     sys.modules.update(neighbours)
     before = set(sys.modules)
     sys.path.insert(0, str(folder))
@@ -166,9 +175,10 @@ def _importing_from(folder: Path, neighbours: dict[str, ModuleType]) -> Iterator
         yield
     finally:
         sys.path.remove(str(folder))
-        neighbours |= {name: sys.modules[name] for name in _imported_from(folder) if name not in before}
+        own = {name.partition(".")[0] for name in _imported_from(folder)}
+        new = (name for name in set(sys.modules) - before if name.partition(".")[0] in own)
+        neighbours |= {name: sys.modules[name] for name in new}
         _NEIGHBOURS.update(neighbours)
-        sys.modules.update({name: module for name, module in others.items() if name not in sys.modules})
 
 
 def _imported_from(folder: Path) -> dict[str, Path]:

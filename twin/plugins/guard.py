@@ -69,11 +69,7 @@ def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[
     if file is None:
         return
     mine = file.resolve()
-    inner = (plugin.place.module or "").count(".") + (
-        plugin.place.module is not None and file.name == "__init__.py"
-    )
-    package = mine.parents[inner - 1] if inner else None
-    entered = False
+    package, entered = mine.parents[plugin.place.depth - 1] if plugin.place.depth else None, False
     for depth, (frame, line) in enumerate(traceback.walk_tb(error.__traceback__), 1):
         at = Path(frame.f_code.co_filename).resolve()
         entered |= at == mine

@@ -26,6 +26,12 @@ class Place:
     line: int | None = None
     """1-based line at which it is defined; None: not told by the text."""
 
+    @property
+    def depth(self) -> int:
+        """In how many packages its file is."""
+        is_package = self.file is not None and self.file.name == "__init__.py"
+        return 0 if self.module is None else self.module.count(".") + is_package
+
 
 def in_file(file: Path, attribute: str, what: str) -> Place:
     """Return the place of `FILE.py:Class`; `what` begins a message.
