@@ -115,3 +115,56 @@ def test_a_parameter_file_of_nav2_names_a_controller_of_a_module(
     controller = parameters.controller_server.controllers["FollowPath"]
     assert (controller.lookahead, controller.speed) == (0.4, 0.3)
     assert not told
+
+
+def test_a_parameter_file_of_nav2_names_one_of_each_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written(tmp_path, (DOCS / "navigation/plugins.md").read_text("utf-8"))
+    monkeypatch.syspath_prepend(tmp_path)
+    text = """
+    controller_server:
+      ros__parameters:
+        goal_checker_plugins: [near]
+        near: {plugin: "parts:Near", xy_goal_tolerance: 0.4}
+        progress_checker_plugins: [patient]
+        patient: {plugin: "parts:Patient"}
+        FollowPath:
+          plugin: nav2_mppi_controller::MPPIController
+          critics: [GoalCritic, "parts:Calm"]
+          Calm: {weight: 2.5}
+    planner_server: {ros__parameters: {planner_plugins: [GridBased], GridBased: {plugin: "parts:Straight"}}}
+    smoother_server:
+      ros__parameters: {smoother_plugins: [mine], mine: {plugin: "parts:Every"}}
+    global_costmap/global_costmap:
+      ros__parameters:
+        plugins: [static_layer, hole, seen, spread]
+        hole: {plugin: "parts:Pit", radius: 0.7}
+        seen: {plugin: nav2_costmap_2d::ObstacleLayer}
+        spread: {plugin: nav2_costmap_2d::InflationLayer}
+    """
+    parameters, told = applied(tmp_path, text)
+    server, costmap = parameters.controller_server, parameters.global_costmap.layers
+    follow = server.controllers["FollowPath"]
+    assert follow.critics == ("GoalCritic", "Calm")
+    assert follow.own_critics["Calm"].weight == 2.5
+    assert server.goal_checkers["general_goal_checker"].xy_goal_tolerance == 0.4
+    assert server.progress_checkers["progress_checker"].plugin.name == "parts:Patient"
+    assert parameters.planner.plugin.name == "parts:Straight"
+    assert next(iter(parameters.path_smoother.smoothers)) == "mine"
+    assert costmap.plugins == (
+        "static_layer",
+        "hole",
+        "obstacle_layer",
+        "range_sensor_layer",
+        "inflation_layer",
+    )
+    assert costmap.own_layers["hole"].radius == 0.7
+    assert not told
+
+    said = r"nav2.yaml:18: .* hole.radius must be greater than 0"
+    with pytest.raises(TwinError, match=said):
+        applied(tmp_path, text.replace("radius: 0.7", "radius: -1.0"))
+    said = r"nav2.yaml:10: .* FollowPath.critics cannot be used: .*parts.py: .*'Clam'.* did you mean 'Calm'"
+    with pytest.raises(TwinError, match=said):
+        applied(tmp_path, text.replace("parts:Calm", "parts:Clam"))

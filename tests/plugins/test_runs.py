@@ -9,6 +9,7 @@ import pytest
 
 from twin import runtime
 from twin.errors import PluginError, ScenarioError
+from twin.plugins import execution
 from twin.scenario import schema
 from twin.scenario.verdict import Verdict
 
@@ -106,6 +107,40 @@ def test_a_file_of_each_kind_is_used_and_its_hash_kept(kind: str, write: Write) 
     assert verdict.plugins["mine.py:Mine"].startswith("sha256:")
 
 
+def test_what_a_file_imports_from_its_folder_is_its_own_afresh_and_in_the_verdict(write: Write) -> None:
+    file = write(f"from parts.of_it import SPEED\n{CHECK.replace('0.03', 'SPEED')}", *NAMED["check"])
+    told, verdicts = list[str](), []
+    for speed in ("0.03", "0.025"):
+        helper = file.with_name("parts") / "of_it.py"
+        helper.parent.mkdir(exist_ok=True)
+        helper.write_text(f"SPEED = {speed}\n")
+        with execution(lambda file: told.append(Path(file).name)):
+            verdicts.append(run(file))
+    assert [verdict.verdict for verdict in verdicts] == ["pass", "fail"]
+    first, second = (verdict.plugins for verdict in verdicts)
+    assert first["mine.py:Mine"] == second["mine.py:Mine"]
+    assert first["parts/of_it.py"] != second["parts/of_it.py"]
+    assert told == ["mine.py", "of_it.py"] * 2
+
+    # Of another folder, at the same time: it has a helper of the same name, and does not see this one.
+    other = file.with_name("other")
+    (other / "parts").mkdir(parents=True)
+    (other / "yours.py").write_text((file.with_name("mine.py")).read_text())
+    (other / "parts" / "of_it.py").write_text("SPEED = 7.0\n")
+    file.write_text(file.read_text() + "  - other/yours.py:Mine: {size: 7 m}\n")
+    helper.write_text("SPEED = 0.03\n# again\n")
+    verdict = run(file)
+    assert [check.passed for check in verdict.checks] == [True, True]
+    assert len(verdict.plugins) == 4
+
+
+def test_what_fails_in_a_neighbour_has_its_line(write: Write) -> None:
+    file = write("import helper\n" + CHECK.replace("pass\n", "helper.fail()\n"), *NAMED["check"])
+    file.with_name("helper.py").write_text("def fail():\n    {}['gone']\n")
+    with pytest.raises(PluginError, match=r"helper\.py:2: check 'mine\.py:Mine' fails: KeyError: 'gone'"):
+        run(file)
+
+
 @pytest.mark.parametrize("kind", NAMED)
 def test_reading_a_scenario_runs_nothing_of_it(kind: str, write: Write) -> None:
     file = write(f"raise SystemExit('this was run')\n{CODE[kind]}", *NAMED[kind])
@@ -175,6 +210,25 @@ def test_reading_a_scenario_runs_nothing_of_it(kind: str, write: Write) -> None:
             r"mine.py:5: .* reads a NoneType from its <sensor>",
         ),
         ("sensor", '    types = ("warmth",)\n', "", r"mine.py:5: .* names no `types`"),
+        (
+            "sensor",
+            "data=reading",
+            "data=__import__('numpy').zeros(3)",
+            r"mine.py:5: sensor 'mine.py:Mine' fails: BridgeError: .* cannot be encoded: data is a bool",
+        ),
+        (
+            "sensor",
+            "    def sample",
+            "    def __init__(self, *_):\n        pass\n\n    def sample",
+            r"mine.py:5: sensor 'mine.py:Mine' does not call super\(\).__init__\(spec, mount\)",
+        ),
+        ("sensor", "return True", "raise SystemExit(3)", r"mine.py:14: sensor .* fails: SystemExit: 3"),
+        (
+            "mission",
+            "self.finish(succeeded=True)",
+            "self.node.create_publisher(str, 'no name!', 10)",
+            r"mine.py:10: mission 'mine.py:Mine' fails: BridgeError: ",
+        ),
         ("sensor", "    def sample", "    def simple", r"mine.py:5: .* lacks sample\(time_ns\)"),
     ],
 )

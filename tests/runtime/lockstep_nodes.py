@@ -134,6 +134,13 @@ def faulty(bus: Bus) -> Node:
     raise KeyError("gain")
 
 
+def late(bus: Bus) -> Node:
+    """Fail in the first tick."""
+    node = bus.create_node("late")
+    node.create_timer(100_000_000, lambda: {}["too late"])
+    return node
+
+
 def answering(bus: Bus) -> Node:
     """The law of answering_peer.py."""
     node = bus.create_node("answering")

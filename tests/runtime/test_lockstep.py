@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from twin import runtime
-from twin.errors import BridgeError, ScenarioError
+from twin.errors import BridgeError, ScenarioError, TwinError
 from twin.scenario.outside import Outside
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -258,20 +258,21 @@ def test_a_navigation_goal_from_another_process(
 @pytest.mark.parametrize(
     ("place", "message"),
     [
-        ("nowhere.py:make", r"nowhere\.py: there is no such file; valid: FILE\.py:FUNCTION"),
+        ("nowhere.py:make", r"nowhere\.py: node 'nowhere\.py:make': there is no such file"),
         (
             f"{NODES}:contoller",
-            r"lockstep_nodes\.py: there is no function contoller; did you mean 'contr",
+            r"lockstep_nodes\.py: .* there is no 'contoller' in it; did you mean 'contr",
         ),
-        (f"{NODES}:faulty", r"lockstep_nodes\.py:\d+: KeyError: 'gain'"),
-        (f"{NODES}:delay", r"lockstep_nodes\.py:?\d*: TypeError: delay\(\) takes 0 positional arguments"),
+        (f"{NODES}:faulty", r"lockstep_nodes\.py:\d+: .*:faulty' fails: KeyError: 'gain'"),
+        (f"{NODES}:late", r"lockstep_nodes\.py:\d+: .*:late' fails: KeyError: 'too late'"),
+        (f"{NODES}:delay", r"lockstep_nodes\.py:\d+: .* TypeError: delay\(\) takes 0 positional arguments"),
         ("controller", r"controller names no nodes; valid: FILE\.py:FUNCTION"),
     ],
 )
 def test_what_is_wrong_with_the_users_nodes(
     place: str, message: str, scenario: Callable[[str], Scenario]
 ) -> None:
-    with pytest.raises(BridgeError, match=message):
+    with pytest.raises(TwinError, match=message):
         runtime.run(scenario(DRIVE), record=False, outside=Outside(nodes=(place,)))
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,17 @@ def test_shipped_scenarios_are_valid_for_us_and_for_editors(
     assert scenario.name == path.stem
     assert scenario.description
     editor.validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+
+
+def test_editors_take_the_keys_of_a_users_plugins(editor: jsonschema.Draft202012Validator) -> None:
+    for page in ("architecture.md", "navigation/plugins.md"):
+        for block in re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / page).read_text("utf-8"), re.DOTALL):
+            editor.validate(yaml.safe_load(block))
+    for wrong in ("controller: {sped: 1}", "controller: {plugin: mppi, sped: 1}", "planner: {sped: 1}"):
+        data = yaml.safe_load(GOOD)
+        data["robots"][0]["navigation"] = yaml.safe_load(wrong)
+        with pytest.raises(jsonschema.ValidationError):
+            editor.validate(data)
 
 
 def test_json_schema_describes_every_key() -> None:

@@ -24,15 +24,19 @@ def execute(
     """
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.programs.factory import create_nodes
+    from twin.plugins import execution
 
     show_warnings()
     if not lockstep:
-        with joining.open() as live:
+        with execution(), joining.open() as live:
             create_nodes(live.bus, place)
             live.spin()
         return
     from twin.bridge import lockstep as stepped
 
-    with stepped.join(joining.connect or None, config=joining.config, domain_id=joining.domain) as process:
+    with (
+        execution(),
+        stepped.join(joining.connect or None, config=joining.config, domain_id=joining.domain) as process,
+    ):
         create_nodes(process.bus, place)
         process.spin()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,8 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from twin.errors import PluginError, TwinError
-from twin.plugins.guard import blame, depth_of
+from twin.errors import PluginError
+from twin.plugins.guard import blame, depth_of, is_told
 from twin.plugins.installed import version_of
 from twin.plugins.places import Place
 
@@ -35,6 +36,8 @@ class Execution:
         self._tell, self._told = tell, set[str]()
         self.modules: dict[str, ModuleType] = {}
         """Files that were run, by the name of their module."""
+        self.neighbours: dict[Path, dict[str, ModuleType]] = {}
+        """What files imported from their own folders."""
         self._plugins: list[Plugin[object]] = []
 
     def add(self, plugin: Plugin[object]) -> None:
@@ -46,11 +49,19 @@ class Execution:
         """Keep the version of what is about to be executed, and tell of it."""
         version = version or version_for(place)
         if self.versions.setdefault(name, version) != version:  # files of one name in two folders
-            self.versions[f"{place.file}:{place.attribute}"] = version
+            self.versions[":".join(filter(None, (str(place.file), place.attribute)))] = version
         where = str(place.file or place.module)
         if self._tell is not None and where not in self._told:
             self._told.add(where)
             self._tell(where)
+
+    def keep_imported(self, place: Place, file: Path) -> None:
+        """Keep what is imported, too, of a file's folder, or of a package that is not installed."""
+        folder, package = file.parents[place.depth], (place.module or "").partition(".")[0]
+        for name, other in _imported_from(folder).items():
+            first = name.partition(".")[0]
+            if first != "twin" and package in ("", first) and other != file and version_of(first) is None:
+                self.keep(str(other.relative_to(folder)), Place("", file=other))
 
     @contextmanager
     def going_on(self) -> Iterator[None]:
@@ -61,19 +72,19 @@ class Execution:
         token = _CURRENT.set(self)
         try:
             yield
-        except Exception as error:
-            blamed = None if isinstance(error, TwinError) else self.blamed(error)
+        except (Exception, SystemExit) as error:
+            blamed = None if is_told(error) else self.blamed(error)
             if blamed is None:
                 raise
             raise blamed from error
         finally:
             _CURRENT.reset(token)
 
-    def blamed(self, error: Exception) -> PluginError | None:
+    def blamed(self, error: BaseException) -> PluginError | None:
         """Return what a plugin did wrong that was called from anywhere; None: it was none of them."""
         faults = [(depth_of(plugin, error), plugin) for plugin in self._plugins]
-        depth, plugin = max(faults, key=lambda fault: fault[0], default=(0, None))
-        return blame(plugin, error) if plugin is not None and depth else None
+        depth, plugin = max(faults, key=lambda fault: fault[0], default=((0, 0), None))
+        return blame(plugin, error) if plugin is not None and depth[0] else None
 
 
 @contextmanager
@@ -88,27 +99,23 @@ def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
         yield current
 
 
-def run(plugin: Plugin[object]) -> Any:
+def run(plugin: Plugin[Any]) -> Any:
     """Import a plugin, and return what its name stands for; raises what it raises."""
-    place = plugin.place
-    if not plugin.ships and (current := _CURRENT.get()) is not None:
+    place, current = plugin.place, None if plugin.ships else _CURRENT.get()
+    file = place.file and place.file.resolve()
+    if current is not None:
         current.add(plugin)
     if place.module is not None:
-        module = importlib.import_module(place.module)
+        with _without_neighbours():
+            found: Any = importlib.import_module(place.module)
     else:
-        assert place.file is not None
-        module = _run_file(place.file)
-    found: Any = module
+        assert file is not None
+        found = _run_file(file)
+    if current is not None and file is not None and plugin.version is None:
+        current.keep_imported(place, file)
     for part in place.attribute.split("."):
         found = getattr(found, part)
     return found
-
-
-def run_file(file: Path, attribute: str) -> ModuleType:
-    """Run a file of a user that holds no plugin; a run tells of it and keeps its hash likewise."""
-    if (current := _CURRENT.get()) is not None:
-        current.keep(f"{file.name}:{attribute}", Place(attribute, file=file))
-    return _run_file(file)
 
 
 def version_for(place: Place) -> str:
@@ -119,31 +126,66 @@ def version_for(place: Place) -> str:
     return f"sha256:{hashlib.sha256(place.file.read_bytes()).hexdigest()}"
 
 
-_MODULES: dict[str, ModuleType] = {}
-"""Of files that were run outside of any run."""
+_OUTSIDE = Execution()
+"""Of files that are run outside of any run."""
+_NEIGHBOURS: set[str] = set()
+"""Names of modules that files imported from their own folders."""
 
 
 def _run_file(file: Path) -> ModuleType:
     """Run a file as a module of its own; once in a run, which finds nothing that another one left in it."""
-    file = file.resolve()
     code = hashlib.sha256(str(file).encode() + file.read_bytes()).hexdigest()[:12]
     name = f"{file.stem}_{code}"  # a name of its own: nobody's random.py stands in for Python's
-    current = _CURRENT.get()
-    modules = _MODULES if current is None else current.modules
-    if name in modules:
-        return modules[name]
+    current = _CURRENT.get() or _OUTSIDE
+    if name in current.modules:
+        return current.modules[name]
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(file.parent))  # as Python does for a script
     try:
         sys.modules[name] = module  # dataclasses look their module up
-        spec.loader.exec_module(module)
+        with _without_neighbours(), _importing_from(file.parent, current):
+            spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
-    finally:
-        sys.path.remove(str(file.parent))
-    modules[name] = module
+    current.modules[name] = module
     return module
+
+
+@contextmanager
+def _without_neighbours() -> Iterator[None]:
+    """Hide what files imported from their own folders, and what others may call the same."""
+    hidden = {name: sys.modules.pop(name) for name in _NEIGHBOURS & set(sys.modules)}
+    try:
+        yield
+    finally:
+        sys.modules.update({name: module for name, module in hidden.items() if name not in sys.modules})
+
+
+@contextmanager
+def _importing_from(folder: Path, current: Execution) -> Iterator[None]:
+    """Let a file import what lies beside it, as Python does for a script; once in a run."""
+    neighbours = current.neighbours.setdefault(folder, {})
+    sys.modules.update(neighbours)
+    before = set(sys.modules)
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        own = {name.partition(".")[0] for name in _imported_from(folder)}
+        new = (name for name in set(sys.modules) - before if name.partition(".")[0] in own)
+        neighbours |= {name: sys.modules[name] for name in new}
+        _NEIGHBOURS.update(neighbours)
+
+
+def _imported_from(folder: Path) -> dict[str, Path]:
+    """Return the files of those imported modules that lie where their names say, from a folder on."""
+    found = dict[str, Path]()
+    for name, module in list(sys.modules.items()):
+        stem, file = os.path.join(folder, *name.split(".")), getattr(module, "__file__", None)
+        if file in (f"{stem}.py", os.path.join(stem, "__init__.py")):
+            found[name] = Path(file)
+    return found

@@ -9,14 +9,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from twin.errors import PluginError, Problem, TwinError
+from twin.errors import BridgeError, PluginError, Problem, TwinError
 
 if TYPE_CHECKING:
     from twin.plugins.plugin import Plugin
 
 
 class Guard:
-    """Around every call of a plugin: an exception becomes a `PluginError`; a `TwinError` stays what it is."""
+    """Around every call of a plugin: an exception becomes a `PluginError`, unless it is told as it is."""
 
     __slots__ = ("_plugin",)
 
@@ -30,8 +30,14 @@ class Guard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End it; what ships is not guarded: its faults are bugs of ours."""
-        if isinstance(error, Exception) and not isinstance(error, TwinError) and not self._plugin.ships:
+        told = is_told(error) or self._plugin.ships
+        if isinstance(error, Exception | SystemExit) and not told:
             raise blame(self._plugin, error) from error
+
+
+def is_told(error: BaseException | None) -> bool:
+    """Whether an error tells a user where he is wrong; those of the bus do not: whatever calls it may be."""
+    return isinstance(error, TwinError) and not isinstance(error, BridgeError)
 
 
 def blame(plugin: Plugin[object], error: BaseException) -> PluginError:
@@ -41,30 +47,34 @@ def blame(plugin: Plugin[object], error: BaseException) -> PluginError:
         return PluginError(Problem(f"{what}: {error.msg}", Path(error.filename), error.lineno))
     text = " ".join(str(error).split())
     file, line = plugin.place.file, plugin.place.line
-    for _, file, line in _own_frames(plugin, error):  # noqa: B007  (the innermost one)
+    for _, file, line, _ in _own_frames(plugin, error):  # noqa: B007  (the innermost one)
         pass
     return PluginError(Problem(f"{what}: {text}" if text else what, file, line))
 
 
-def depth_of(plugin: Plugin[object], error: BaseException) -> int:
-    """Return how deep in the calls that an exception ended the plugin's code was; 0: not in them."""
-    return max((depth for depth, _, _ in _own_frames(plugin, error)), default=0)
+def depth_of(plugin: Plugin[object], error: BaseException) -> tuple[int, int]:
+    """Return how deep in the calls that an exception ended the plugin's files were, and its class; 0: not."""
+    frames, file = list(_own_frames(plugin, error)), plugin.place.file
+    within = f"{plugin.place.attribute}."
+    inside = (depth for depth, at, _, name in frames if at == file and name.startswith(within))
+    return max((depth for depth, *_ in frames), default=0), max(inside, default=0)
 
 
-def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int | None]]:
-    """Yield depth, file and line of the plugin's code, outermost first; of a package, all modules count."""
+def _own_frames(plugin: Plugin[object], error: BaseException) -> Iterator[tuple[int, Path, int, str]]:
+    """Yield depth, file, line and function of the plugin's code, outermost first.
+
+    Of a package, all modules count; of a file, also what it calls of its neighbours.
+    """
     file = plugin.place.file
     if file is None:
         return
     mine = file.resolve()
-    inner = (plugin.place.module or "").count(".") + (
-        plugin.place.module is not None and file.name == "__init__.py"
-    )
-    package = mine.parents[inner - 1] if inner else None
-    for depth, frame in enumerate(traceback.extract_tb(error.__traceback__), 1):
-        at = Path(frame.filename).resolve()
-        if at == mine or package in at.parents:
-            yield depth, (file if at == mine else at), frame.lineno
+    package, entered = mine.parents[plugin.place.depth - 1] if plugin.place.depth else None, False
+    for depth, (frame, line) in enumerate(traceback.walk_tb(error.__traceback__), 1):
+        at = Path(frame.f_code.co_filename).resolve()
+        entered |= at == mine
+        if at == mine or package in at.parents or (entered and at.parent == mine.parent):
+            yield depth, (file if at == mine else at), line, frame.f_code.co_qualname
 
 
 def require_finite(plugin: Plugin[object], what: str, values: Iterable[float]) -> None:

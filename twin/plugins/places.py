@@ -26,6 +26,12 @@ class Place:
     line: int | None = None
     """1-based line at which it is defined; None: not told by the text."""
 
+    @property
+    def depth(self) -> int:
+        """In how many packages its file is."""
+        is_package = self.file is not None and self.file.name == "__init__.py"
+        return 0 if self.module is None else self.module.count(".") + is_package
+
 
 def in_file(file: Path, attribute: str, what: str) -> Place:
     """Return the place of `FILE.py:Class`; `what` begins a message.
@@ -96,7 +102,7 @@ def _line_of(file: Path, attribute: str, what: str) -> int | None:
     except (OSError, ValueError) as fault:
         raise PluginError(Problem(f"{what}: cannot be read: {fault}", file)) from None
     names = dict(_names(tree.body))
-    own = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
+    own = [node.name for node in tree.body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
     outer = attribute.partition(".")[0]
     if outer in names:
         return names[outer]

@@ -58,7 +58,7 @@ class Plugin(Generic[T]):
         if found is None:
             try:
                 found = run(self)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 if self.ships:
                     raise
                 raise blame(self, error) from error

@@ -7,12 +7,14 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import (
     BeforeValidator,
+    GetJsonSchemaHandler,
     ModelWrapValidatorHandler,
     PrivateAttr,
     ValidationInfo,
     WithJsonSchema,
     model_validator,
 )
+from pydantic_core import CoreSchema
 
 from twin.errors import nearest
 from twin.navigation.plugins import bound
@@ -20,6 +22,8 @@ from twin.plugins import Kind
 from twin.scenario.parameter_group import ParameterGroup
 from twin.scenario.plugins import PluginUse, use
 from twin.strict_yaml import Fault, Faults
+
+_OTHERS = "additionalProperties"
 
 
 class PluginGroup(ParameterGroup):
@@ -32,6 +36,15 @@ class PluginGroup(ParameterGroup):
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys that are not a user's plugin's, which has all others."""
         raise NotImplementedError
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        reference = super().__get_pydantic_json_schema__(core, handler)
+        schema = handler.resolve_ref_schema(reference)
+        users = {"properties": {"plugin": {"not": {"enum": [*cls.of.shipped]}}}, "required": ["plugin"]}
+        known = dict.fromkeys(schema["properties"], True)
+        schema |= {"if": users, "else": {"properties": known, "additionalProperties": schema.pop(_OTHERS)}}
+        return reference
 
     @property
     def users(self) -> PluginUse | None:
@@ -63,6 +76,12 @@ class PluginListGroup(ParameterGroup):
     list_of: ClassVar[Kind[Any]]
     list_key: ClassVar[str]
     _listed: Mapping[str, PluginUse] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        reference = super().__get_pydantic_json_schema__(core, handler)
+        handler.resolve_ref_schema(reference)[_OTHERS] = {"type": "object"}
+        return reference
 
     @classmethod
     def ships(cls, data: Mapping[str, Any]) -> Collection[str] | None:

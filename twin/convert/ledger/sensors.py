@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from twin.convert.ledger.fates import Fate, container_fate
 from twin.models.description import RobotDescription
-from twin.models.sensors import plugin_of
+from twin.models.sensors import SENSORS, plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
 from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
@@ -43,7 +43,10 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
     spec = _spec_of(sensor, link, description)
     if spec is None:
         kind = kind_of(sensor) or "without a type"
-        return "dropped", f"not simulated: a sensor of type {kind}"
+        left_out = (
+            "left out: only runs execute a package's sensor" if kind in SENSORS.names() else "not simulated"
+        )
+        return "dropped", f"{left_out}: a sensor of type {kind}"
     camera = isinstance(spec, CameraSpec)
     cls = None if camera else plugin_of(spec).load()
     missing = cls.left_out(spec) if cls is not None else ""

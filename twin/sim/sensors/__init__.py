@@ -17,5 +17,8 @@ def create_sensor(spec: SensorSpec, mount: Mount) -> SampledSensor:
         PluginError: It is a user's, and fails.
     """
     mount.check_rate(spec)
-    sensor: SampledSensor = plugin_of(spec).create(spec, mount)
+    plugin = plugin_of(spec)
+    sensor: SampledSensor = plugin.create(spec, mount)
+    if not hasattr(sensor, "spec"):
+        raise plugin.error("does not call super().__init__(spec, mount)")
     return sensor

@@ -49,6 +49,7 @@ def rerun(
     from twin.bridge.programs import ros_args
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.programs.factory import create_nodes
+    from twin.plugins import execution
 
     show_warnings()
     add_interfaces(interfaces)
@@ -59,7 +60,7 @@ def rerun(
         bus.node_options = NodeOptions(arguments=arguments)
         create_nodes(bus, place)
 
-    with BagReader(bag) as reader:
+    with execution(), BagReader(bag) as reader:
         for name in (*(topics or ()), *(outputs or ())):
             if name not in reader.topics:
                 raise reader.no_topic(name)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from twin.bridge.parameters import files
 from twin.errors import NavigationError, Problem, TwinError
 from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.navigation.plugins import CRITICS
 from twin.parameters.declaration import fields_of, names_of
 from twin.parameters.placed import overlay, parameters_of
 from twin.runtime.parameter_files.absent import Absent
@@ -25,6 +26,7 @@ from twin.runtime.parameter_files.nav2.names import (
     declared,
     flat,
     is_same,
+    is_users,
     renamed,
 )
 
@@ -146,7 +148,7 @@ class Nav2Parameters:
 
     def wrong(self, node: str, name: str, why: str) -> None:
         """Note that a value cannot be."""
-        entry = self._said(node).get(name)
+        entry = renamed(self._said(node)).get(name)
         self._problems.append(Problem(f"{node}: {name} {why}", self.path, entry and entry.line))
 
     def ignored(self) -> list[str]:
@@ -242,7 +244,9 @@ class Nav2Parameters:
             if name not in known or section == name or not isinstance(entry.value, list):
                 continue
             there = {other.removeprefix(section).partition(".")[0] for other in known if "." in other}
-            valid = sorted({*there, "Oscillation"})
+            listed = map(str, self._said(node)[entry.said].value)
+            own = {critic.rpartition(":")[2] for critic in listed if is_users(CRITICS, critic)}
+            valid = sorted({*there, *own, "Oscillation"})
             for critic in (one for one in entry.value if one not in valid):
                 if close := _similar(critic, valid):
                     said = f"{node} has no critic '{critic}'; did you mean '{close[0]}'?"

@@ -12,6 +12,7 @@ from twin.controllers.limiter import AxisLimits
 from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.parameters.declaration import fields_of, names_of
 from twin.parameters.placed import parameters_of
+from twin.plugins import Kind
 
 PLANNERS = {
     "NavfnPlanner": "grid_based",
@@ -103,6 +104,9 @@ def converted(values: dict[str, Value]) -> dict[str, Value]:
         elif corners is not None:
             out["footprint"] = footprint._replace(value=corners)
             out.pop(names_of(CostmapConfig).robot_radius, None)  # as in Nav2, where the polygon goes first
+    for name, entry in out.items():
+        if name.endswith(".critics") and isinstance(entry.value, list):  # a user's has its class's name
+            out[name] = entry._replace(value=[str(critic).rpartition(":")[2] for critic in entry.value])
     return out
 
 
@@ -121,6 +125,11 @@ def corners_of(text: str) -> list[list[float]] | None:
     if not all(type(part) in (int, float) and math.isfinite(part) for corner in corners for part in corner):
         return None
     return [[float(part) for part in corner] for corner in corners]
+
+
+def is_users(kind: Kind[Any], plugin: str) -> bool:
+    """Whether a plugin is a user's: `module:Class`, or an entry point's name."""
+    return ":" in plugin.replace("::", "") or (plugin in kind.names() and plugin not in kind.shipped)
 
 
 def _is_triple(value: object) -> bool:

@@ -17,6 +17,7 @@ from twin.parameters import Flat
 from twin.parameters.declaration import names_of
 from twin.plugins import Kind
 from twin.runtime.defaults.navigation import NavigationParameters, with_scenario
+from twin.runtime.parameter_files.nav2.brought import brought, with_critics, with_layers, with_smoothers
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
@@ -40,13 +41,12 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         return config
     file = Nav2Parameters(Path(config.params_file), namespace)
     controller, planner = config.controller, config.planner
-    chosen = file.plugin("controller_server", "FollowPath")
+    chosen, key = file.plugin("controller_server", "FollowPath"), "plugin"
     if shim := _shipped(CONTROLLERS, chosen) == "rotation_shim":
-        chosen = file.plugin("controller_server", "FollowPath", "primary_controller")
-    update = {
-        "rotation_shim": shim,
-        "plugin": _brought(CONTROLLERS, chosen) or _shipped(CONTROLLERS, chosen),
-    }
+        key = "primary_controller"
+        chosen = file.plugin("controller_server", "FollowPath", key)
+    used = brought(file, "controller_server", f"FollowPath.{key}", chosen, CONTROLLERS)
+    update = {"rotation_shim": shim, "plugin": used.reference if used else _shipped(CONTROLLERS, chosen)}
     given = controller.model_fields_set
     may_be = "plugin" not in given or controller.plugin == update["plugin"]
     if update["plugin"] and may_be and "rotation_shim" not in given:
@@ -55,11 +55,14 @@ def with_plugins(config: NavigationConfig, namespace: str) -> NavigationConfig:
         ("goal_checker", "general_goal_checker", plugins.GOAL_CHECKERS),
         ("progress_checker", "progress_checker", plugins.PROGRESS_CHECKERS),
     ):
-        checker = _shipped(kind, file.plugin("controller_server", section))
+        said = file.plugin("controller_server", section)
+        checker = brought(file, "controller_server", f"{section}.plugin", said, kind) or _shipped(kind, said)
         if checker and key not in controller.model_fields_set:
             controller = controller.model_copy(update={key: checker})
     chosen = file.plugin("planner_server", "GridBased")
-    found = PLANNERS.get(chosen) or _brought(plugins.PLANNERS, chosen)
+    used = brought(file, "planner_server", "GridBased.plugin", chosen, plugins.PLANNERS)
+    found = used.reference if used else PLANNERS.get(chosen)
+    file.ignored()
     if found and "plugin" not in planner.model_fields_set:
         planner = planner.model_copy(update={"plugin": found})
     return config.model_copy(update={"controller": controller, "planner": planner})
@@ -69,12 +72,6 @@ def _shipped(kind: Kind[Any], plugin: str) -> str | None:
     """Return the name of what ships for a plugin of Nav2, whose class begins as the one here does."""
     classes = ((name, target.rpartition(":")[2]) for name, target in kind.shipped.items())
     return next((name for name, own in classes if plugin.startswith(own)), None)
-
-
-def _brought(kind: Kind[Any], plugin: str) -> str | None:
-    """Return the name of a user's plugin, if the file names one: `module:Class`, or an entry point."""
-    known = plugin in kind.names() and plugin not in kind.shipped
-    return plugin if ":" in plugin or known else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,16 +141,22 @@ def with_file(
     file = Nav2Parameters(Path(config.params_file), namespace)
     docking = parameters.docking
     docking = replace(docking, database=database_of(file, docking.database))
+    server, smoothers = parameters.controller_server, parameters.path_smoother.smoothers
+    if "critics" not in config.controller.model_fields_set:
+        controllers = {name: with_critics(file, name, one) for name, one in server.controllers.items()}
+        server = replace(server, controllers=controllers)
+    if not config.smoother.model_fields_set:
+        smoothers = with_smoothers(file, smoothers)
     changed = replace(
         parameters,
         smoother=file.applied("velocity_smoother", parameters.smoother, keep=_limits(config)),
         global_costmap=_costmap(file, parameters.global_costmap, config.global_costmap),
         local_costmap=_costmap(file, parameters.local_costmap, config.local_costmap),
         planner=file.applied("planner_server", parameters.planner, prefix="GridBased."),
-        controller_server=file.applied("controller_server", parameters.controller_server),
+        controller_server=file.applied("controller_server", server),
         behaviors=file.applied("behavior_server", parameters.behaviors),
         docking=file.applied("docking_server", docking, keep=_DOCKS),
-        path_smoother=file.applied("smoother_server", parameters.path_smoother),
+        path_smoother=file.applied("smoother_server", replace(parameters.path_smoother, smoothers=smoothers)),
         navigator=file.applied("bt_navigator", parameters.navigator),
         waypoints=file.applied("waypoint_follower", parameters.waypoints),
     )
@@ -186,6 +189,8 @@ def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapPara
         scan_topics=config.scan_topics if group.scan_topics is not None else scans or config.scan_topics,
         range_topics=config.range_topics if group.range_topics is not None else ranges or config.range_topics,
     )
+    if group.plugins is None:
+        config = replace(config, layers=with_layers(file, node, config.layers))
     changed = file.applied(node, config)
     if file.is_round(node) and group.robot_radius is None:
         changed = replace(changed, layers=replace(changed.layers, footprint=()))

@@ -1,0 +1,3 @@
+"""Which classes of this package a run has used."""
+
+USED = set()
