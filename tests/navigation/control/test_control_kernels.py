@@ -11,7 +11,7 @@ import pytest
 
 from twin.geometry import Array, Pose2
 from twin.navigation.control.dwb import kernels as dwb
-from twin.navigation.control.footprint_cover import FootprintCover, collides, outline_hits
+from twin.navigation.control.footprint_cover import CoverOf, collides, outline_hits
 from twin.navigation.control.maneuver_kernel import contact, most_contact, search
 from twin.navigation.control.mppi.arrays import Ground, Limits
 from twin.navigation.control.mppi.controls import (
@@ -78,7 +78,7 @@ class Driven:
             np.array([0.04, 0.1]),
             costmap.costs,
             20.0,
-            FootprintCover.of(FOOTPRINT, costmap, consider_footprint=True),
+            CoverOf(FOOTPRINT, consider_footprint=True).on(costmap),
             self.PATH,
             self.GOALS,
             self.FORWARD,
@@ -163,7 +163,7 @@ def test_dwb_looks_at_the_costs_under_the_way_and_at_the_footprint() -> None:
 def test_a_footprint_that_circles_cover_touches_what_its_outline_touches() -> None:
     rng = np.random.default_rng(2)
     costmap = hall(*rng.integers(5, 75, (25, 2)).tolist())
-    cover = FootprintCover.of(FOOTPRINT, costmap, consider_footprint=True)
+    cover = CoverOf(FOOTPRINT, consider_footprint=True).on(costmap)
     assert np.hypot(*np.diff(cover.outline, axis=0).T).max() <= 0.5 + 1e-5, "half a cell apart"
     touched, compared = 0, 0
     for x, y, yaw in rng.uniform((10.0, 10.0, -3.0), (70.0, 70.0, 3.0), (1500, 3)).astype(np.float32):
@@ -179,7 +179,7 @@ def test_a_footprint_that_circles_cover_touches_what_its_outline_touches() -> No
         touched, compared = touched + want, compared + 1
     assert compared > 1000
     assert 100 < touched < 900
-    centre = FootprintCover.of(FOOTPRINT, costmap, consider_footprint=False)
+    centre = CoverOf(FOOTPRINT, consider_footprint=False).on(costmap)
     at = np.float32(40.0), np.float32(40.0), np.float32(1.0), np.float32(0.0)
     for cost, want in ((252, False), (253, True), (254, True)):
         assert collides(costmap.costs, cost, centre, centre.outline, *at) == want
@@ -279,7 +279,7 @@ def test_controls_move_by_the_noise_that_did_well() -> None:
 
 def ground(costmap: Costmap, allowed: float = 9.0) -> Ground:
     tables = np.full((3, 256), allowed, dtype=np.float32)
-    cover = FootprintCover.of(FOOTPRINT, costmap, consider_footprint=True)
+    cover = CoverOf(FOOTPRINT, consider_footprint=True).on(costmap)
     return Ground(costs=costmap.costs, per_metre=np.float32(20.0), tables=tables, cover=cover)
 
 
@@ -349,17 +349,17 @@ def test_a_drive_that_cannot_turn_in_place_goes_slowly_towards_a_path_behind() -
 
 
 BOX = rectangle(0.4, 0.2)
-FRAME = (-1.0, -1.0, 0.05)
+HERE, FRAME = (0.0, 0.0, 0.0), (-1.0, -1.0, 0.05)
 
 
 def test_how_much_a_pose_touches() -> None:
     costs = np.zeros((40, 40), dtype=np.uint8)
-    assert contact(costs, BOX, 0.0, 0.0, 0.0, FRAME) == 0
+    assert contact(costs, BOX, HERE, FRAME) == 0
     for columns in (slice(23, 24), slice(20, 24)):
         costs[20, columns] = 254
-        hits = footprint_hits(costs, BOX, 0.0, 0.0, 0.0, *FRAME)
+        hits = footprint_hits(costs, BOX, HERE, FRAME)
         assert hits > 0
-        assert contact(costs, BOX, 0.0, 0.0, 0.0, FRAME) == 2 + hits
+        assert contact(costs, BOX, HERE, FRAME) == 2 + hits
     assert [most_contact(touched) for touched in (0, 2, 8, 16)] == [1, 6, 13, 22]
 
 

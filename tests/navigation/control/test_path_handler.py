@@ -18,14 +18,14 @@ def straight(x0: float, x1: float, *, yaw: float = 0.0, y: float = 0.0, spacing:
     return np.column_stack([x, np.full_like(x, y), np.full_like(x, yaw)])
 
 
-def following(path: Array, **config: float | bool) -> PathHandler:
-    handler = PathHandler(config=PathHandlerConfig(**config))  # type: ignore[arg-type]
+def following(path: Array, *, to_cusps: bool = True) -> PathHandler:
+    handler = PathHandler(to_cusps=to_cusps)
     handler.accept(path)
     return handler
 
 
 def test_defaults_are_nav2s() -> None:
-    assert compared("path handler", PathHandlerConfig()) == (4, {"enforce_path_inversion": True})
+    assert compared("path handler", PathHandlerConfig()) == (2, {})
     assert PathHandlerConfig().max_robot_pose_search_dist == 3.0  # the local costmap's extent in its example
 
 
@@ -74,7 +74,7 @@ def test_what_comes_after_a_cusp_waits_until_that_is_reached(at: Pose2, turned: 
     assert local.poses[-1, 0] == pytest.approx(0.5 if turned else 2.0)
     if turned:
         assert local.length == pytest.approx(1.5 - (2.0 - local.poses[0, 0]))
-    free = following(CUSP, enforce_path_inversion=False).local(Pose2(1.0, 0.0, 0.0))
+    free = following(CUSP, to_cusps=False).local(Pose2(1.0, 0.0, 0.0))
     assert free.length == pytest.approx(2.0, abs=0.06)
     assert free.poses[-1, 0] == pytest.approx(1.0, abs=0.06), "of a metre ahead and a metre back"
 
