@@ -130,7 +130,8 @@ HIT, SHORT, MAX, RAND, DECAY, FAR, SIGMA = 0.6, 0.2, 0.15, 0.3, 0.4, 9.0, 0.08
 @pytest.mark.parametrize("depth", [0.0, 0.03])
 def test_what_the_beam_model_says_of_a_wall(origin: Pose2, depth: float) -> None:
     """Thrun et al., table 6.1, of single beams; the likelihood of a scan is their product."""
-    model = BeamModel(wall(origin), z_hit=HIT, z_short=SHORT, z_max=MAX, z_rand=RAND, lambda_short=DECAY)
+    mixture = AmclConfig(z_hit=HIT, z_short=SHORT, z_max=MAX, z_rand=RAND, lambda_short=DECAY)
+    model = BeamModel(wall(origin), mixture)
     lidar, at = Pose2(0.2, 0.1, 0.0), Pose2(1.0, 4.0, 0.3)
     robot = np.array([origin @ at])
     away = 4.0 - (at @ lidar).x + depth
@@ -164,7 +165,7 @@ def test_what_the_beam_model_says_of_a_wall(origin: Pose2, depth: float) -> None
 
 def test_a_reading_that_the_beam_model_rules_out_is_as_unlikely_as_can_be() -> None:
     """But no pose is ruled out by a single beam."""
-    model = BeamModel(wall(ORIGINS[0]), z_hit=1.0, z_short=0.0, z_max=0.0, z_rand=0.0, lambda_short=0.1)
+    model = BeamModel(wall(ORIGINS[0]), AmclConfig(z_hit=1.0, z_short=0.0, z_max=0.0, z_rand=0.0))
     for reading in (0.1, math.inf):
         beams = chosen_beams([reading], [0.0], Pose2(0.0, 0.0, 0.0), most=1, min_range=0.0, max_range=FAR)
         assert model.log_likelihood(np.array([[1.0, 4.0, 0.0]]), beams, 0.0, SIGMA)[0] == pytest.approx(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from twin.navigation.planning.hybrid_kernel import (
     FOUND,
     OUT_OF_NODES,
     UNREACHABLE,
+    Drive,
     _popped,
     _pushed,
     curve_cost,
@@ -25,6 +27,17 @@ from twin.navigation.planning.hybrid_kernel import (
 POINT = np.zeros((1, 2))
 BOX = np.array([[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]])
 PENALTIES = np.array([2.0, 1.2, 0.3, 1.7])  # of costs, of turning, of turning otherwise, of reversing
+
+
+def drive(costs: np.ndarray, corners: Array = POINT, **others: Any) -> Drive:
+    given = {
+        "radius": 6.0,
+        "reverse": False,
+        "clear_below": 0,
+        "allow_unknown": False,
+        "penalties": PENALTIES,
+    }
+    return Drive(costs=costs, corners=corners, **(given | others))
 
 
 def grid(cost: int = 0, size: tuple[int, int] = (40, 60)) -> np.ndarray:
@@ -43,7 +56,7 @@ def grid(cost: int = 0, size: tuple[int, int] = (40, 60)) -> np.ndarray:
     ],
 )
 def test_what_a_pose_costs_is_what_lies_under_its_centre(cost: int, allow_unknown: bool, want: int) -> None:
-    assert pose_cost(grid(cost), POINT, 5.5, 5.5, 0.0, 0, allow_unknown) == want
+    assert pose_cost(drive(grid(cost), allow_unknown=allow_unknown), 5.5, 5.5, 0.0) == want
 
 
 @pytest.mark.parametrize(
@@ -51,18 +64,18 @@ def test_what_a_pose_costs_is_what_lies_under_its_centre(cost: int, allow_unknow
     [(0.0, 0.0, 7), (59.9, 39.9, 7), (-0.1, 5.0, -1), (5.0, -0.1, -1), (60.0, 5.0, -1), (5.0, 40.0, -1)],
 )
 def test_off_the_map_a_pose_collides(x: float, y: float, want: int) -> None:
-    assert pose_cost(grid(7), POINT, x, y, 0.0, 0, False) == want
+    assert pose_cost(drive(grid(7)), x, y, 0.0) == want
 
 
 @pytest.mark.parametrize("under", [254, 255])
 def test_the_footprint_is_looked_at_unless_the_centre_is_clear(under: int) -> None:
     costs = grid(50)
     costs[20, 12] = under  # under the front edge of a box at (10, 20)
-    blocked = pose_cost(costs, BOX, 10.2, 20.2, 0.0, 50, False)
-    assert blocked == -1
-    assert pose_cost(costs, BOX, 10.2, 20.2, 0.0, 51, False) == 50, "a centre of less cost is clear"
-    assert pose_cost(costs, BOX, 10.2, 20.2, math.pi / 2.0, 50, False) == 50, "turned, it lies beside it"
-    assert pose_cost(costs, BOX, 10.2, 20.2, 0.0, 50, True) == (-1 if under == 254 else 50)
+    unclear, ahead = drive(costs, BOX, clear_below=50), (10.2, 20.2, 0.0)
+    assert pose_cost(unclear, *ahead) == -1
+    assert pose_cost(unclear._replace(clear_below=51), *ahead) == 50, "a centre of less cost is clear"
+    assert pose_cost(unclear, 10.2, 20.2, math.pi / 2.0) == 50, "turned, it lies beside it"
+    assert pose_cost(unclear._replace(allow_unknown=True), *ahead) == (-1 if under == 254 else 50)
 
 
 @pytest.mark.parametrize(("turn", "length"), [(0, 1.3), (1, 0.9), (-1, 0.9), (0, -0.7), (1, -0.4), (0, 0.05)])
@@ -74,11 +87,10 @@ def test_a_piece_costs_its_length_weighted_by_the_costs_a_cell_apart(turn: int, 
     poses = [advance(*start, turn, length * (i + 1) / count, radius) for i in range(count)]
     under = [float(costs[int(y), int(x)]) for x, y, _ in poses]
     want = distance * (1.0 + 2.0 * np.mean(under) / 252.0)
-    rest = (turn, length, radius, 0, False, 2.0)
-    assert piece_cost(costs, POINT, *start, *rest) == pytest.approx(want)
+    assert piece_cost(drive(costs), *start, turn, length) == pytest.approx(want)
     x, y, _ = poses[-1]
     costs[int(y), int(x)] = 254
-    assert piece_cost(costs, POINT, *start, *rest) == math.inf
+    assert piece_cost(drive(costs), *start, turn, length) == math.inf
 
 
 @pytest.mark.parametrize(
@@ -103,8 +115,7 @@ def curve(
     costs: np.ndarray, start: Array, goal: Array, *, reverse: bool = False, last_turn: int = 0
 ) -> tuple:
     turns, lengths = np.empty(5, np.int64), np.empty(5)
-    rest = (PENALTIES, last_turn, 1, turns, lengths)
-    return curve_cost(costs, POINT, start, goal, 6.0, reverse, 0, False, *rest)
+    return curve_cost(drive(costs, reverse=reverse), start, goal, last_turn, 1, turns, lengths)
 
 
 @pytest.mark.parametrize(
@@ -164,8 +175,7 @@ def searched(
 ) -> tuple[int, list[tuple[float, float, float]], float]:
     """Without a heuristic, in moves of two cells; return the outcome, the poses, and what they cost."""
     outcome, last, poses, g, parent, move = expand(
-        costs,
-        POINT,
+        drive(costs, radius=radius),
         np.array(start),
         np.array(goal),
         np.zeros(costs.size),
@@ -174,11 +184,6 @@ def searched(
         0.0,
         72,
         2.0 / radius,
-        radius,
-        False,
-        0,
-        False,
-        PENALTIES,
         1.0,
         3.0,
         most,

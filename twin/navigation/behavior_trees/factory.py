@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import inspect
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -33,7 +32,7 @@ def nodes_of(*modules: ModuleType) -> Registry:
         for module in modules
         for name, cls in vars(module).items()
         if isinstance(cls, type) and issubclass(cls, TreeNode) and cls.__module__ == module.__name__
-        if not name.startswith("_") and not inspect.isabstract(cls)
+        if not name.startswith("_") and not cls.__abstractmethods__
     }
 
 

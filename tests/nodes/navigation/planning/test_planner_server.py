@@ -169,8 +169,7 @@ def test_what_cannot_be_smoothed_has_its_code(servers: Servers) -> None:
 
 
 def test_parameters_change_the_next_plan(bench: Bench, servers: Servers) -> None:
-    parameters = servers.planner.node.parameters
-    assert parameters.get("GridBased.w_traversal_cost").value == 2.0
+    assert servers.planner.node.get_parameter("GridBased.w_traversal_cost").value == 2.0
     assert isinstance(servers.plan(Pose2(2.0, 0.0, 0.0)).result.path, Path)
 
 
