@@ -14,7 +14,6 @@ from twin.navigation.recovery import (
     COLLISION_AHEAD,
     TIMEOUT,
     AssistedTeleop,
-    BackUp,
     BehaviorConfig,
     DriveOnHeading,
     Spin,
@@ -41,11 +40,8 @@ def test_defaults_are_nav2s() -> None:
 def test_goals_that_nobody_sets_are_those_of_nav2s_actions() -> None:
     assert Spin().target_yaw == pytest.approx(1.57, abs=1e-3)
     assert (DriveOnHeading().target_distance, DriveOnHeading().speed) == (0.15, 0.15)
-    assert (BackUp().target_distance, BackUp().speed) == (-0.15, 0.15)
     assert Wait().duration == 1.0
-    assert {behavior().time_allowance for behavior in (Spin, DriveOnHeading, BackUp, AssistedTeleop)} == {
-        10.0
-    }
+    assert {behavior().time_allowance for behavior in (Spin, DriveOnHeading, AssistedTeleop)} == {10.0}
 
 
 @pytest.mark.parametrize("yaw", [2.0, -2.0])
@@ -96,7 +92,9 @@ def test_driving_looks_two_seconds_ahead(away: float, blocked: bool) -> None:
     assert step.failed_reason == (COLLISION_AHEAD if blocked else None)
     near = DriveOnHeading(config=config, target_distance=0.4, speed=0.3)
     assert near.update(HERE, DT, wall(0.8)).failed_reason is None, "and no farther than it is to drive"
-    assert BackUp(config=config).update(HERE, DT, wall(0.8)).failed_reason is None
+    assert (
+        DriveOnHeading(config=config, target_distance=-0.15).update(HERE, DT, wall(0.8)).failed_reason is None
+    )
 
 
 @pytest.mark.parametrize(("yaw", "blocked"), [(0.5, False), (1.2, True), (-0.4, False), (-1.2, True)])

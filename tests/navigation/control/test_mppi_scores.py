@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from twin.geometry import Pose2
-from twin.navigation.control.footprint_cover import FootprintCover
+from twin.navigation.control.footprint_cover import CoverOf
 from twin.navigation.control.mppi import arrays
 from twin.navigation.control.mppi.arrays import Batch, Commands, Ground, Limits, Wanted
 from twin.navigation.control.mppi.config import (
@@ -20,7 +20,7 @@ from twin.navigation.control.mppi.config import (
 )
 from twin.navigation.control.mppi.path_critics import furthest_reached
 from twin.navigation.control.mppi.rollout_kernel import roll_out
-from twin.navigation.control.mppi.scoring import CostTables, Totals, cost_tables
+from twin.navigation.control.mppi.scoring import Totals, cost_tables
 from twin.navigation.costmaps.costmap import Costmap, inflation_costs
 from twin.navigation.costmaps.footprint import rectangle
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
@@ -40,7 +40,9 @@ def away(cost: int) -> float:
 
 @pytest.mark.parametrize("near_goal", [False, True])
 def test_what_costs_are_worth(near_goal: bool) -> None:
-    pointwise, obstacles, speed = cost_tables(MPPIConfig(), COSTMAP, near_goal=near_goal, vx_max=0.8)
+    pointwise, obstacles, speed = cost_tables(
+        MPPIConfig(), COSTMAP.inscribed_radius, COSTMAP.cost_scaling_factor, near_goal, 0.8
+    )
     for cost in (60, 120, 180, 240):
         surface = away(cost) - 0.2
         assert pointwise[cost] == (0.0 if near_goal else cost)
@@ -54,15 +56,6 @@ def test_what_costs_are_worth(near_goal: bool) -> None:
     assert speed[[253, 254]].tolist() == [0.25, 0.25]
     for free in (0, 255):
         assert (pointwise[free], obstacles[free], speed[free]) == (0.0, 0.0, pytest.approx(0.8))
-
-
-def test_tables_are_made_anew_when_something_changes() -> None:
-    tables, config = CostTables(MPPIConfig()), MPPIConfig()
-    for near_goal, vx_max in ((False, 0.5), (True, 0.5), (True, 0.9), (False, 0.9)):
-        want = cost_tables(config, COSTMAP, near_goal=near_goal, vx_max=vx_max)
-        found = tables.of(COSTMAP, near_goal=near_goal, vx_max=vx_max)
-        assert np.array_equal(found, want)
-        assert tables.of(COSTMAP, near_goal=near_goal, vx_max=vx_max) is found
 
 
 def test_the_total_is_the_sum_of_the_weighted_scores_raised_to_their_powers() -> None:
@@ -136,7 +129,7 @@ def test_rollouts_are_driven_and_scored_step_by_step(symmetric: bool) -> None:
     patches = np.kron(random.integers(0, 253, (16, 16)), np.ones((5, 5))).astype(np.uint8)
     patches[50:] = 255
     costmap = Costmap(costs=patches, resolution=0.05, inscribed_radius=0.2, cost_scaling_factor=4.0)
-    cover = FootprintCover.of(rectangle(0.4, 0.3), costmap, consider_footprint=False)
+    cover = CoverOf(rectangle(0.4, 0.3), consider_footprint=False).on(costmap)
     tables = random.uniform(0.0, 1.0, (3, 256)).astype(np.float32)
     tables[2] *= 0.4
     ground = Ground(costs=patches, per_metre=np.float32(20.0), tables=tables, cover=cover)
@@ -191,7 +184,7 @@ def test_what_a_rollout_touches(along: float, hit: bool, near: bool) -> None:
         inflation_radius=1.0,
     )
     costmap = LayeredCostmap(config=config, static_map=room).costmap
-    cover = FootprintCover.of(footprint, costmap, consider_footprint=True, padding=0.08)
+    cover = CoverOf(footprint, consider_footprint=True, padding=0.08).on(costmap)
     tables = np.zeros((3, 256), dtype=np.float32)
     tables[2] = 9.0
     none = np.zeros(1, dtype=np.float32)
