@@ -51,6 +51,12 @@ def test_no_other_curve_of_five_pieces_is_shorter(reverse: bool, pieces: list[tu
     assert curve(*pose, reverse)[0] <= driven + 1e-4
 
 
+def test_a_straight_piece_that_is_hardly_there_costs_no_full_turn() -> None:
+    for turn in (1, -1):
+        pose = advance(*advance(0.0, 0.0, 0.0, turn, 1.08203125, 1.0), 0, 1.2e-7, 1.0)
+        assert curve(*pose, False)[0] == pytest.approx(1.08203125, abs=1e-6)
+
+
 def test_known_lengths() -> None:
     # Turning on the spot by half a turn takes Reeds and Shepp three arcs of 60 degrees.
     assert curve(3.0, 0.0, 0.0, False)[0] == pytest.approx(3.0)

@@ -17,6 +17,8 @@ from twin.navigation._jit import jit
 
 _HALF_PI = 0.5 * math.pi
 _ZERO = 1e-10
+_POINT = 1e-6
+"""A straight piece that is shorter has no direction but that of rounding."""
 
 Turns = NDArray[np.int64]
 
@@ -63,7 +65,7 @@ def _dubins(kind: int, x: float, y: float, phi: float) -> tuple[bool, float, flo
     xi, eta = x - sine, y - 1.0 + cosine
     radius, theta = math.hypot(xi, eta), math.atan2(eta, xi)
     if kind == 0:  # left, straight, left
-        t = _forward(theta)
+        t = _forward(theta if radius > _POINT else phi)
         return True, t, radius, _forward(phi - t)
     if radius > 4.0 + _ZERO:
         return False, 0.0, 0.0, 0.0
