@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -52,9 +53,9 @@ def test_no_other_curve_of_five_pieces_is_shorter(reverse: bool, pieces: list[tu
 
 
 def test_a_straight_piece_that_is_hardly_there_costs_no_full_turn() -> None:
-    for turn in (1, -1):
-        pose = advance(*advance(0.0, 0.0, 0.0, turn, 1.08203125, 1.0), 0, 1.2e-7, 1.0)
-        assert curve(*pose, False)[0] == pytest.approx(1.08203125, abs=1e-6)
+    for turn, arc, ahead in itertools.product((1, -1), np.linspace(0.5, 2.0, 50), (1e-9, 1.2e-7, 9e-7, 1e-5)):
+        pose = advance(*advance(0.0, 0.0, 0.0, turn, arc, 1.0), 0, ahead, 1.0)
+        assert curve(*pose, False)[0] == pytest.approx(arc + ahead, abs=1e-6)
 
 
 def test_known_lengths() -> None:
