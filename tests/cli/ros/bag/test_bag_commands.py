@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
 
@@ -87,8 +89,19 @@ def recording(talker: Talker, folder: Path, *arguments: str) -> subprocess.Popen
         stderr=subprocess.PIPE,
         text=True,
     )
-    wait_for(lambda: any(f.stat().st_size > 4000 for f in folder.glob("*_0.*")))
+    wait_for(lambda: any(map(holds_messages, [*folder.glob("*_0.mcap"), *folder.glob("*_0.db3")])))
     return process
+
+
+def holds_messages(file: Path) -> bool:
+    """Whether a file that is being written has messages on the disk; an empty database has 4 kB as well."""
+    if file.suffix != ".db3":
+        return file.stat().st_size > 4000
+    with closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True)) as database:
+        try:
+            return bool(database.execute("SELECT COUNT(*) FROM messages").fetchone()[0])
+        except sqlite3.OperationalError:  # its tables are not there yet
+            return False
 
 
 def texts(path: Path) -> list[int]:
