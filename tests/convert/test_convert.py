@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.oracles.odd.case import chain
 from twin.convert import Conversion, convert
 from twin.errors import ConversionError
 from twin.geometry import Pose3, matrix_from_quat_wxyz
@@ -313,3 +314,13 @@ def test_what_the_file_does_not_say_is_called_a_guess() -> None:
 def test_conversion_is_deterministic() -> None:
     texts = {convert(load("warehouse_bot")).spec.to_xml() for _ in range(2)}
     assert len(texts) == 1
+
+
+@pytest.mark.parametrize(("links", "refused"), [(450, False), (451, True)])
+def test_a_chain_as_deep_as_mujocos_reader_goes(links: int, refused: bool) -> None:
+    robot = parse_urdf(chain("fixed", links), Path("chain.urdf"))
+    if refused:
+        with pytest.raises(ConversionError, match="more than 450 links hang on each other, down to 'l450'"):
+            convert(robot)
+    else:
+        convert(robot)
