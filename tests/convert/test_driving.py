@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import mujoco
 import pytest
 
 from twin.convert import convert
+from twin.convert.contact_roles import commanded_wheels
 from twin.geometry import Pose3
 from twin.models import load
 from twin.models.description import RobotDescription
+from twin.models.specs import CommandSpec
 
 STRAIGHT_TOLERANCE = 0.005
 SPIN_TOLERANCE = math.radians(0.3)
@@ -118,3 +121,18 @@ def test_heavy_robot_follows_a_speed_step_within_its_tyres_grip(bare_world: Call
         world.command(joint, 5.0)
     world.step(0.2)
     assert world.data.qvel[0] == pytest.approx(0.5, abs=0.01)
+
+
+def test_wheels_are_those_of_the_drive_and_others_that_are_told_a_speed() -> None:
+    description = load("diff_bot")
+
+    def wheels(**interfaces: Literal["velocity", "effort"]) -> list[str]:
+        commands = {
+            name: CommandSpec(joint=name, interface=interface) for name, interface in interfaces.items()
+        }
+        return [wheel.joint.name for wheel in commanded_wheels(replace(description, commands=commands))]
+
+    both = ["wheel_left_joint", "wheel_right_joint"]
+    assert wheels() == wheels(wheel_left_joint="velocity", wheel_right_joint="velocity") == both
+    description = replace(description, drive=None)
+    assert wheels(wheel_left_joint="effort", wheel_right_joint="velocity") == both[1:]

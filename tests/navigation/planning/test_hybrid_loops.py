@@ -15,6 +15,7 @@ from twin.navigation.planning.hybrid_kernel import (
     OUT_OF_NODES,
     UNREACHABLE,
     Drive,
+    _curve_length,
     _popped,
     _pushed,
     curve_cost,
@@ -143,6 +144,15 @@ def test_a_curve_of_several_pieces_costs_their_sum_or_is_blocked() -> None:
     costs = grid()
     costs[int(goal[1]), int(goal[0])] = 254
     assert curve(costs, start, goal)[0] == math.inf
+
+
+def test_how_far_it_is_to_the_goal_at_least() -> None:
+    def left(away: float) -> float:
+        goal = np.array(advance(20.5, 10.5, 0.3, 0, away, 6.0))
+        return _curve_length(drive(grid()), 20.5, 10.5, 0.3, goal, np.empty(5, np.int64), np.empty(5))
+
+    assert left(9.9) == pytest.approx(9.9 * 6.0)
+    assert left(10.1) == 0.0, "ten radii away the turns hardly matter"
 
 
 def test_the_least_key_is_taken_first() -> None:
