@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -132,6 +134,20 @@ def test_what_a_file_imports_from_its_folder_is_its_own_afresh_and_in_the_verdic
     verdict = run(file)
     assert [check.passed for check in verdict.checks] == [True, True]
     assert len(verdict.plugins) == 4
+
+
+def test_a_neighbour_is_found_whatever_the_program_has_imported_by_its_name(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write(f"from gear.of_it import SPEED\n{CHECK.replace('0.03', 'SPEED')}", *NAMED["check"])
+    own = ModuleType("gear")
+    monkeypatch.setitem(sys.modules, "gear", own)
+    helper = file.with_name("gear") / "of_it.py"
+    helper.parent.mkdir()
+    helper.write_text("SPEED = 0.03\n")
+    file.with_name("numpy").mkdir()  # nobody's folder stands in for an installed package
+    assert run(file).verdict == "pass"
+    assert sys.modules["gear"] is own
 
 
 def test_what_fails_in_a_neighbour_has_its_line(write: Write) -> None:

@@ -17,16 +17,10 @@ _interrupts: list[int] = []
 def ends_on_interrupt() -> Iterator[None]:
     """Exit with 130 when Ctrl-C ends the block, whatever became of the KeyboardInterrupt on its way."""
     _interrupts.clear()
-
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        _interrupts.append(number)
-        if not _is_callback_of_c(frame):
-            raise KeyboardInterrupt
-
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, on_signal)
+        signal.signal(signal.SIGINT, _on_signal)
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup wants it
-            _be_ctrl_c(signal.SIGHUP)
+            signal.signal(signal.SIGHUP, _on_signal)
     try:
         yield
     except KeyboardInterrupt:
@@ -63,10 +57,14 @@ def raise_swallowed() -> None:
 
 
 def sigterm_is_ctrl_c() -> None:
-    """Let SIGTERM, with which CI systems end a job that takes too long, end the command as Ctrl-C does."""
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        _be_ctrl_c(signal.SIGTERM)
+    """Let SIGTERM, with which CI systems end a job that takes too long, end the command as Ctrl-C does.
+
+    Also where Ctrl-C itself is ignored, as in what a shell's script has put into the background.
+    """
+    signal.signal(signal.SIGTERM, _on_signal)
 
 
-def _be_ctrl_c(number: signal.Signals) -> None:
-    signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
+def _on_signal(number: int, frame: FrameType | None) -> None:
+    _interrupts.append(number)
+    if not _is_callback_of_c(frame):
+        raise KeyboardInterrupt

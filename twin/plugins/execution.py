@@ -128,8 +128,8 @@ def version_for(place: Place) -> str:
 
 _OUTSIDE = Execution()
 """Of files that are run outside of any run."""
-_NEIGHBOURS: set[str] = set()
-"""Names of modules that files imported from their own folders."""
+_NEIGHBOURS: dict[str, ModuleType] = {}
+"""What files imported from their own folders, by name: the newest one."""
 
 
 def _run_file(file: Path) -> ModuleType:
@@ -157,7 +157,9 @@ def _run_file(file: Path) -> ModuleType:
 @contextmanager
 def _without_neighbours() -> Iterator[None]:
     """Hide what files imported from their own folders, and what others may call the same."""
-    hidden = {name: sys.modules.pop(name) for name in _NEIGHBOURS & set(sys.modules)}
+    hidden = {name: module for name, module in _NEIGHBOURS.items() if sys.modules.get(name) is module}
+    for name in hidden:
+        del sys.modules[name]
     try:
         yield
     finally:
@@ -168,6 +170,7 @@ def _without_neighbours() -> Iterator[None]:
 def _importing_from(folder: Path, current: Execution) -> Iterator[None]:
     """Let a file import what lies beside it, as Python does for a script; once in a run."""
     neighbours = current.neighbours.setdefault(folder, {})
+    others = {name: sys.modules.pop(name) for name in _called_as_what_lies_in(folder)}
     sys.modules.update(neighbours)
     before = set(sys.modules)
     sys.path.insert(0, str(folder))
@@ -179,6 +182,16 @@ def _importing_from(folder: Path, current: Execution) -> Iterator[None]:
         new = (name for name in set(sys.modules) - before if name.partition(".")[0] in own)
         neighbours |= {name: sys.modules[name] for name in new}
         _NEIGHBOURS.update(neighbours)
+        sys.modules.update(others)
+
+
+def _called_as_what_lies_in(folder: Path) -> list[str]:
+    """Return the imported modules that hide what lies in a folder, unless they are Python's or installed."""
+    lies = {file.stem for file in folder.iterdir() if file.suffix == ".py" or file.is_dir()}
+    lies -= {"twin", "__main__", *sys.stdlib_module_names}
+    lies -= {name.partition(".")[0] for name in _imported_from(folder)}
+    hiding = (name for name in sys.modules if name.partition(".")[0] in lies)
+    return [name for name in hiding if version_of(name) is None]
 
 
 def _imported_from(folder: Path) -> dict[str, Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -118,10 +119,16 @@ def test_no_display(monkeypatch: pytest.MonkeyPatch) -> None:
         live_view("r2d2", robot, Posture(robot), LiveViewConfig())
 
 
+def _in_the_background() -> None:
+    """Ignore Ctrl-C, as what a shell's script starts with `&` does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def test_the_command_ends_cleanly_and_takes_its_viewer_along() -> None:
     port = player.free_port()
     command = [sys.executable, "-m", "twin.cli", "view", "r2d2", "--web", "--no-open", "--port", str(port)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as twin:
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(command, preexec_fn=_in_the_background, **pipes) as twin:
         try:
             assert twin.stdout is not None
             first = twin.stdout.readline()

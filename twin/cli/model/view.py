@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -59,6 +58,7 @@ def view(
     Ctrl-C ends it, and so does closing the viewer. Exit code 0, or 2 for a file with errors.
     """
     from twin.cli.console import stderr
+    from twin.cli.interrupted import sigterm_is_ctrl_c, was_interrupted
     from twin.files.writing import check_file
     from twin.models import load
     from twin.recording.view.posture import Posture
@@ -75,11 +75,22 @@ def view(
         return
     from twin.recording.view.live_view import LiveViewConfig, live_view
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the viewer too
+    sigterm_is_ctrl_c()  # ends the viewer too
     config = LiveViewConfig(web=web, port=port, open_page=not no_open, watch=watch, show=layers, read=read)
-    raise typer.Exit(
-        live_view(file, description, posture, config, on_ready=lambda url: stderr().print(f"open {url}"))
-    )
+    try:
+        code = live_view(
+            file,
+            description,
+            posture,
+            config,
+            on_ready=lambda url: stderr().print(f"open {url}"),
+            interrupted=was_interrupted,
+        )
+    except Exception:
+        if not was_interrupted():  # while a module in C was imported, or a thread started
+            raise
+        code = 0
+    raise typer.Exit(code)
 
 
 def joint_values(words: Sequence[str]) -> dict[str, float]:

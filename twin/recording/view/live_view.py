@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import threading
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -50,6 +49,7 @@ def live_view(
     config: LiveViewConfig,
     *,
     on_ready: Callable[[str], None] = lambda url: None,
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> int:
     """Show a robot until its viewer is closed or Ctrl-C is pressed; both servers end with it.
 
@@ -59,6 +59,7 @@ def live_view(
         posture: Where its joints stand at first.
         config: How to show it.
         on_ready: Called with the address of the page when it is served.
+        interrupted: Whether there was a Ctrl-C that was not raised, as while Python imports.
 
     Returns:
         The viewer's exit code; 0 after Ctrl-C.
@@ -78,15 +79,13 @@ def live_view(
             on_ready(server.url)
             if config.open_page and has_display():
                 webbrowser.open(server.url)
-            # Checking converts the robot, which may take seconds: meanwhile it can be seen and moved.
-            check = threading.Thread(
-                target=lambda: session.diagnose(inspect_robot(description)), name="check", daemon=True
-            )
-            check.start()
             watcher = Watcher(description) if config.watch else None
+            # Checking converts the robot, which may take seconds; the server lets it be moved meanwhile.
+            session.diagnose(inspect_robot(description))
             while (code := _exit_code(viewer)) is None:
+                if interrupted():
+                    return 0
                 if watcher is not None and watcher.changed():
-                    check.join()
                     watcher = reload(session, name_or_path, config.read, watcher)
             return code
     except KeyboardInterrupt:
