@@ -25,6 +25,7 @@ from twin.bridge.wire.naming import Naming
 from twin.bridge.wire.ros2dds import bridge_token
 from twin.bridge.wire.session import SessionConfig, open_session
 from twin.errors import BridgeError
+from twin.savings import ALL, Savings
 
 _EXTERNAL_DEPTH = 10_000
 
@@ -37,7 +38,9 @@ class Bus:
     Callbacks run only in `spin`; what other processes send waits until `admit`. Use it as a context manager.
     """
 
-    def __init__(self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool) -> None:
+    def __init__(
+        self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool, savings: Savings = ALL
+    ) -> None:
         self.zenoh = session
         """The session, for those who hear no topic by it, or tell `in_process`."""
         self.in_process = InProcess(is_private=not networked)
@@ -47,6 +50,8 @@ class Bus:
         self.session_id = str(session.zid())
         self.networked = networked
         """Whether other processes may take part."""
+        self.savings = savings
+        """What is not done over again."""
         self.use_sim_time = True
         """What the parameter of that name says in every node."""
         self.standard_services = StandardServices(at_once=networked)
@@ -97,14 +102,21 @@ class Bus:
         return cls.of(config, clock, domain_id=domain_id)
 
     @classmethod
-    def of(cls, config: SessionConfig, clock: Clock, *, domain_id: int | None = None) -> Self:
+    def of(
+        cls,
+        config: SessionConfig,
+        clock: Clock,
+        *,
+        domain_id: int | None = None,
+        savings: Savings = ALL,
+    ) -> Self:
         """Open a bus on a session of any configuration.
 
         Raises:
             BridgeError: an endpoint or the configuration's file cannot be used.
         """
         naming = Naming(config.wire, config.domain_id if domain_id is None else domain_id)
-        return cls(open_session(config), clock, naming, config.networked)
+        return cls(open_session(config), clock, naming, config.networked, savings)
 
     def create_node(
         self,

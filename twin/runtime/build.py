@@ -31,6 +31,7 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.missions import IdleMission, build_mission
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
+from twin.savings import ALL, Savings
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone
@@ -78,6 +79,7 @@ def build(
     network: SessionConfig = INPROC,
     outside: Outside = ALONE,
     crash_folder: Path | None = None,
+    savings: Savings = ALL,
 ) -> Parts:
     """Build the world, the bus and all nodes.
 
@@ -87,6 +89,7 @@ def build(
         network: How other processes may take part.
         outside: The user's own nodes, and how the run keeps time with other processes.
         crash_folder: Where the last states go if the physics diverges.
+        savings: What is not done over again.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -117,7 +120,7 @@ def build(
     )
     clock = Clock()
     name = outside.session if network.networked else "twin"
-    bus = Bus.of(replace(network, name=name), clock)
+    bus = Bus.of(replace(network, name=name), clock, savings=savings)
     bus.starting()
     for tap in taps:
         bus.tap(tap)

@@ -21,6 +21,7 @@ from twin.runtime.defaults import from_description as derive
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
 from twin.runtime.stacks.robot import RobotStack
+from twin.savings import ALL, Savings
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -61,6 +62,7 @@ class OpenRun:
         bag: Path | None = None,
         bag_hidden_topics: bool = False,
         save_model: Path | None = None,
+        savings: Savings = ALL,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -78,6 +80,7 @@ class OpenRun:
             bag: Folder for a bag of every message.
             bag_hidden_topics: Whether topics of actions are in the bag too.
             save_model: Folder for the compiled world as MJCF.
+            savings: What is not done over again; it changes nothing but the speed.
 
         Raises:
             TwinError: The run cannot be made.
@@ -97,6 +100,7 @@ class OpenRun:
                 network=network or SessionConfig(listen=outside.endpoints(listen)),
                 outside=outside,
                 crash_folder=out,
+                savings=savings,
             )
             ending.callback(parts.bus.close)
             if bag_tap is not None:
@@ -236,13 +240,23 @@ def run(
     bag: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     watch: Callable[[Run], bool] | None = None,
+    savings: Savings = ALL,
 ) -> Verdict:
     """Run a scenario to its verdict; see `OpenRun` and `OpenRun.advance_to_end`.
 
     Raises:
         TwinError: The run cannot be made, or the physics diverged.
     """
-    started = OpenRun(scenario, out=out, record=record, pace=pace, listen=listen, outside=outside, bag=bag)
+    started = OpenRun(
+        scenario,
+        out=out,
+        record=record,
+        pace=pace,
+        listen=listen,
+        outside=outside,
+        bag=bag,
+        savings=savings,
+    )
     try:
         started.advance_to_end(progress, watch)
         return started.finish()

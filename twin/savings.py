@@ -1,0 +1,13 @@
+"""What a run does not do over again; no message, no digest and no verdict shows whether it did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Savings:
+    """Each can be switched off; a run without them is slower, and the oracle of the one with them."""
+
+
+ALL = Savings()
