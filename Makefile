@@ -29,9 +29,10 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation, messages to a put
+bench: $(VENV)/.ready  ## CPU time as ratios: a run to its own physics and rays alone, layer by layer, a conversion to MuJoCo's compilation, messages to a put; memory
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
+	$(BIN)/python -m benchmarks.measures.memory
 	$(BIN)/python -m benchmarks.measures.cdr_cost
 	$(BIN)/python -m benchmarks.measures.lockstep_cost
 	$(BIN)/python -m benchmarks.measures.tracking

@@ -1,0 +1,48 @@
+"""The limit of a run is the run's own work; its layers add up to the run."""
+
+from __future__ import annotations
+
+import time
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from benchmarks.measures import run_cost
+from benchmarks.measures.layers import LAYERS, picture
+from benchmarks.measures.run_cost import SCENARIOS
+from twin.scenario.schema import load
+
+
+def test_a_replay_ends_as_the_run_did_also_if_the_robot_was_carried_away() -> None:
+    overrides = {
+        "duration": "1.5 s",
+        "faults.0.kidnapping.at": "1.2 s",
+        "world.obstacles": "[{name: cart, pose: {x: 1, y: 2}, size: [1, 1, 1], route: [[3, 2]]}]",
+    }
+    replay = run_cost.replay(load(SCENARIOS / "warehouse_kidnapped.yaml", overrides))
+    assert replay.simulated_s == pytest.approx(1.5)
+    assert replay.cost() > 0.0
+    assert replay.cost() > 0.0  # from the start again
+
+
+def test_a_replay_that_leaves_something_out_is_no_limit() -> None:
+    replay = run_cost.replay(load(SCENARIOS / "diff_bot_figure8.yaml", {"duration": "1 s"}))
+    written, steps, casters = replay._steps[-1]
+    replay._steps[-1] = written, steps - 1, casters
+    with pytest.raises(RuntimeError, match="does not end as the run did"):
+        replay.cost()
+
+
+def test_layers_add_up_to_the_run() -> None:
+    scenario = load(SCENARIOS / "diff_bot_figure8.yaml", {"duration": "1 s"})
+    began = time.process_time()
+    layers = run_cost.by_layer(scenario)
+    assert tuple(layers) == LAYERS
+    assert min(layers[name] for name in ("physics", "rays", "nodes", "messages", "recording")) > 0.0
+    assert 0.0 < sum(layers.values()) < time.process_time() - began
+
+
+def test_the_picture_has_a_bar_for_each_layer() -> None:
+    root = ElementTree.fromstring(picture("warehouse", {"physics": 1.0, "rays": 0.25}))
+    bars = [float(rect.get("width", "")) for rect in root if rect.tag.endswith("rect")][1:]
+    assert bars[0] == pytest.approx(4.0 * bars[1])
