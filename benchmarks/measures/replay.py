@@ -9,7 +9,6 @@ has to end in the run's own state, bit for bit: that proves it to be the same wo
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -22,6 +21,7 @@ from twin.geometry import Array
 from twin.runtime.open_run import OpenRun
 from twin.sim.sensors.rays import RayCaster
 
+_HALF_A_STEP_S = 5e-4
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _WRITTEN = (
     "ctrl",
@@ -58,6 +58,7 @@ class Replay:
             run.advance_to_end()
         self.simulated_s = world.time_ns * 1e-9
         self._end = self._state()
+        self.rewind()
 
     @contextmanager
     def _noting(self) -> Iterator[None]:
@@ -91,25 +92,29 @@ class Replay:
         pairs = zip(self._arrays, self._known, strict=True)
         return [(array, array.copy()) for array, known in pairs if not np.array_equal(array, known)]
 
-    def cost(self) -> float:
-        """Do it again; return the CPU time [s].
+    def rewind(self) -> None:
+        """Go back to the start."""
+        mujoco.mj_copyData(self._data, self._model, self._start)
+        self._next, self._cast = 0, None
+
+    def advance(self, until_s: float) -> None:
+        """Do again what was done up to a simulated time [s]; inf is the end.
 
         Raises:
             RuntimeError: It does not end as the run did.
         """
         model, data, step = self._model, self._data, mujoco.mj_step
-        mujoco.mj_copyData(data, model, self._start)
-        seen = None
-        began = time.process_time()
-        for written, steps, casters in self._steps:
+        while self._next < len(self._steps):
+            if data.time > until_s - _HALF_A_STEP_S:
+                return
+            written, steps, casters = self._steps[self._next]
+            self._next += 1
             for array, values in written:
                 array[...] = values
             step(model, data, steps)
             if casters:
                 mujoco.mj_kinematics(model, data)  # a step leaves the poses one step old
                 for caster in casters:
-                    seen = caster.cast()
-        spent = time.process_time() - began
-        if not np.array_equal(self._state(), self._end) or not np.array_equal(seen, self._seen):
+                    self._cast = caster.cast()
+        if not np.array_equal(self._state(), self._end) or not np.array_equal(self._cast, self._seen):
             raise RuntimeError("the replay does not end as the run did: a run writes what is not noted here")
-        return spent

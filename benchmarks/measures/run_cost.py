@@ -1,22 +1,34 @@
 """What the whole run costs, as a ratio to its limit: its own physics steps and rays alone.
 
-`make bench` prints it. It is CPU time of one process; runs and replays take turns on the same machine, and
-the best of some rounds counts: so the ratios hold on a noisy machine, while the absolute figures do not. A
-second table, and a picture, split one more run by layer.
+`make bench` prints it. It is CPU time of one process, in which the runs and the replay take turns every two
+simulated seconds; each such block is the same work in every round, and its best time counts. So the ratios
+hold on a noisy machine, while the absolute figures do not. A second table, and a picture, split one more run
+by layer.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
+import math
 import tempfile
-from collections import defaultdict
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from benchmarks.measures.layers import Layers, picture
 from benchmarks.measures.replay import Replay
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import Scenario, load
 
+BLOCK_S = 2.0
+"""Simulated time that limit and runs are driven in turns."""
+SETTLE_S = 0.05
+"""After each block, for the threads of a recording to end what they are at: it is their block's cost."""
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
@@ -36,15 +48,35 @@ def replay(scenario: Scenario) -> Replay:
         run.close()
 
 
-def cost(scenario: Scenario, *, record: bool) -> float:
-    """Return the CPU time of a run from its first tick to its last [s]."""
-    with tempfile.TemporaryDirectory() as folder:
-        run = OpenRun(scenario, out=Path(folder), record=record)
-        try:
-            run.advance_to_end()
-            return run.finish().metrics["cpu_time_s"]
-        finally:
-            run.close()
+def costs(scenario: Scenario, limit: Replay, *, record: bool) -> dict[str, list[float]]:
+    """Return the CPU time [s] of limit, run and, if wanted, recorded run, block by block in turns."""
+    limit.rewind()
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as ending:
+        advance: dict[str, Callable[[float], object]] = {"limit": limit.advance}
+        for name in ("run", "recorded") if record else ("run",):
+            run = OpenRun(scenario, out=Path(folder), record=name == "recorded")
+            ending.callback(run.close)
+            advance[name] = partial(_advance, run)
+        gc.freeze()  # as a run does
+        ending.callback(gc.unfreeze)
+        taken: dict[str, list[float]] = {name: [] for name in advance}
+        for block in range(1, math.ceil(limit.simulated_s / BLOCK_S) + 1):
+            for name, until in advance.items():
+                began = time.process_time()
+                until(block * BLOCK_S)
+                time.sleep(SETTLE_S)
+                taken[name].append(time.process_time() - began)
+    return taken
+
+
+def _advance(run: OpenRun, until_s: float) -> None:
+    run.advance(lambda: run.run.world.time_ns >= until_s * 1e9)
+
+
+def best_of(rounds: int, measure: Callable[[], dict[str, list[float]]]) -> dict[str, float]:
+    """Return the CPU times [s] of several rounds: of each block the best."""
+    taken = [measure() for _ in range(rounds)]
+    return {name: float(np.min([one[name] for one in taken], axis=0).sum()) for name in taken[0]}
 
 
 def by_layer(scenario: Scenario) -> dict[str, float]:
@@ -68,22 +100,18 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="where to draw the layers, as SVG")
     options = parser.parse_args()
     scenario, other = load(options.scenario), with_mppi(options.scenario)
-    limit, mppi_limit = replay(scenario), None if other is None else replay(other)
-    best: dict[str, float] = defaultdict(lambda: float("inf"))
-    for _ in range(options.rounds):
-        taken = {"limit": limit.cost(), "run": cost(scenario, record=False)}
-        taken |= {"recorded": cost(scenario, record=True), "limit again": limit.cost()}
-        if other is not None and mppi_limit is not None:
-            taken |= {"MPPI": cost(other, record=False), "limit of MPPI": mppi_limit.cost()}
-        best.update({name: min(spent, best[name]) for name, spent in taken.items()})
-    raw = min(best["limit"], best["limit again"])
+    limit = replay(scenario)
+    best = best_of(options.rounds, lambda: costs(scenario, limit, record=True))
+    raw = best["limit"]
     rows = [
         ("its physics and rays alone", limit, raw, raw),
         ("run", limit, best["run"], raw),
         ("run with recording", limit, best["recorded"], raw),
     ]
-    if mppi_limit is not None:
-        rows.append(("run with MPPI", mppi_limit, best["MPPI"], best["limit of MPPI"]))
+    if other is not None:
+        mppi_limit = replay(other)
+        mppi = best_of(options.rounds, lambda: costs(other, mppi_limit, record=False))
+        rows.append(("run with MPPI", mppi_limit, mppi["run"], mppi["limit"]))
     print(f"{scenario.name}, {limit.simulated_s:.1f} s simulated, best of {options.rounds}")
     print(f"{'':28}{'CPU s':>8}{'x real time':>13}{'x its limit':>13}")
     for name, its, spent, least in rows:

@@ -3,8 +3,8 @@
 `python -m benchmarks.measures.time_step` prints the tables of docs/fidelity.md. Contacts are as twin makes
 them for each step: their time constant is 4 ms, or two steps if that is longer, as MuJoCo asks for. Runs of
 one seed have the same noise; after some seconds they are different runs all the same, as every rounding
-steers the robot elsewhere: so they are compared by what came of many, and only drives without feedback pose by
-pose.
+steers the robot elsewhere: so they are compared by what came of many, and only drives without feedback pose
+by pose.
 """
 
 from __future__ import annotations
