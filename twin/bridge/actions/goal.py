@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,13 @@ import numpy as np
 
 from twin.bridge.actions.states import ACTIVE, GoalEvent
 from twin.bridge.msgs import UUID, GoalInfo, GoalStatus, stamp
+from twin.bridge.node.tasks import Steps
 
 if TYPE_CHECKING:
     from twin.bridge.actions.server import ActionServer
 
-Execute = Callable[["GoalHandle"], Generator[None, None, Any]]
-"""Executes a goal: each yield waits for the next spin, the return value is the result message."""
+Execute = Callable[["GoalHandle"], Steps]
+"""Executes a goal; the return value is the result message."""
 
 
 class _Answer:
