@@ -249,7 +249,9 @@ class Node(NodeParameters, NodeGraph):
         for execution in tuple(self._executions):
             if execution.step():
                 self.remove_execution(execution)
-        self.due_ns = min([due.due_ns for due in (*self._timers, *self._executions)], default=NEVER_NS)
+        due = [timer.due_ns for timer in self._timers]
+        due += [execution.due_ns for execution in self._executions]
+        self.due_ns = min(due, default=NEVER_NS)
 
     def wake(self) -> None:
         """Spin the next time: what is due has changed."""

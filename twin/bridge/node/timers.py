@@ -82,9 +82,9 @@ class Rate:
         self.period_ns = period_ns
         self._clock = clock
 
-    def sleep(self) -> Generator[None, None, None]:
+    def sleep(self) -> Generator[Any, None, None]:
         """Wait until the clock reaches the next multiple of the period."""
         start_ns = self._clock.now_ns
         until_ns = next_due(self.period_ns, start_ns)
         while start_ns <= self._clock.now_ns < until_ns:
-            yield
+            yield until_ns
