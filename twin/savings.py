@@ -11,6 +11,8 @@ class Savings:
 
     due: bool = True
     """Nodes run only when something has come, or is due; otherwise all of them in every spin."""
+    services_in_process: bool = True
+    """Requests and responses go through Zenoh only if another process may have a part in it."""
 
 
 ALL = Savings()

@@ -9,8 +9,8 @@ NEVER_NS = 2**63 - 1
 """A time that does not come [ns]: what is due then waits for something to arrive."""
 
 Steps = Generator[int | None, None, Any]
-"""Each yield waits for a spin of the node: a bare one for the next, one of a time [ns] for that time, or for what
-makes the node spin before: it looks again."""
+"""Each yield waits for a spin of the node: a bare one for the next; one of a time [ns] for that time, or for
+what makes the node spin before, so that it looks again."""
 
 
 class Execution(Protocol):
