@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class GoalHandle:
         """Whether a client wants the goal to end; answer with `canceled()` and return."""
         return self.status == GoalStatus.STATUS_CANCELING
 
-    @property
+    @cached_property  # every status message lists the last goals
     def info(self) -> GoalInfo:
         """Id and time of acceptance."""
         return GoalInfo(uuid_msg(self.goal_id), stamp(self.accepted_ns))

@@ -242,10 +242,12 @@ class Node(NodeParameters, NodeGraph):
             endpoint, data, external = inbox.popleft()
             if endpoint is not None:
                 endpoint.handle(data, external)
-        if self._timers:
-            now_ns = self.bus.clock.now_ns
-            for timer in tuple(self._timers):
-                timer.run(now_ns)
+        if not self._timers and not self._executions:
+            self.due_ns = NEVER_NS
+            return
+        now_ns = self.bus.clock.now_ns
+        for timer in tuple(self._timers):
+            timer.run(now_ns)
         for execution in tuple(self._executions):
             if execution.step():
                 self.remove_execution(execution)
