@@ -123,8 +123,6 @@ class ActionServer:
         """When `step` has something to do, if nothing arrives before [ns]."""
         if self._running:
             return min(run.due_ns for run in self._running)
-        if self._queue:
-            return 0
         for ended in self._ended.values():
             return ended.time_ns + self._result_timeout_ns + 1
         return tasks.NEVER_NS
