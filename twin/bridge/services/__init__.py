@@ -1,9 +1,221 @@
-"""Services and their clients."""
+"""Services and their clients: from inbox to inbox if no other process can take part, else over Zenoh."""
 
 from __future__ import annotations
 
-from twin.bridge.services.client import Client
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, Any
+
+import zenoh
+
+from twin.bridge.cdr.codec import codec
+from twin.bridge.qos import QoS
 from twin.bridge.services.future import Future
-from twin.bridge.services.service import Respond, Service
+from twin.bridge.services.questions import InProcessQuestion, Question, ZenohQuestion
+from twin.bridge.topics import Endpoint
+from twin.bridge.types import ServiceType
+from twin.bridge.wire.admission import Admission, read
+from twin.bridge.wire.external import Arrival
+from twin.bridge.wire.keys import Attachment, pack_attachment
+from twin.bridge.wire.ros2dds import pack_request_id
+from twin.bridge.wire.session import direct
+from twin.errors import BridgeError
+
+if TYPE_CHECKING:
+    from twin.bridge.node import Node
 
 __all__ = ["Client", "Future", "Respond", "Service"]
+
+_QOS = QoS(depth=10)
+_FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
+
+Respond = Callable[[Any], None]
+"""Sends the response; may be called in a later spin."""
+
+
+class Service(Endpoint):
+    """Answers requests in its node's spin."""
+
+    def __init__(
+        self, node: Node, srv_type: ServiceType, name: str, callback: Callable[[Any, Respond], None]
+    ) -> None:
+        super().__init__(node, "SS", name, srv_type.name, _QOS)
+        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._callback = callback
+        self._open: set[Question] = set()
+        bus = node.bus
+        self._admission = Admission(bus.external, self.interface)
+        for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
+            queryable = bus.zenoh.declare_queryable(key, direct(self._on_query), complete=True)
+            self._declared.append(queryable)
+        self._listeners = bus.in_process.listeners(self.key)
+        self._listeners.receivers.append(self)
+        self.announce()
+
+    def enqueue(self, data: Question, external: bool) -> None:
+        """Put a request into the node's inbox."""
+        self.node.inbox.append([self, data, external])
+
+    def destroy(self) -> None:
+        """Leave the graph; who still waits for a response learns that there will be none."""
+        if self._declared:
+            self._listeners.receivers.remove(self)
+        super().destroy()
+        for entry in self.node.inbox:
+            if entry[0] is self:
+                entry[0] = None
+                self._open.add(entry[1])
+        while self._open:
+            self._open.pop().drop()
+
+    def handle(self, data: Question, external: bool) -> None:
+        """Decode and call back."""
+        request = read(self.node.bus.external, self.name, self._requests, data.payload)
+        if request is None:
+            data.drop()
+            return
+
+        def respond(response: Any) -> None:
+            if type(response) is not self._responses.cls:
+                what = type(response).__name__
+                raise TypeError(f"{self.name} answers with {self._responses.msgtype}, not {what}")
+            if data not in self._open:
+                if not self._declared:
+                    return  # destroyed meanwhile: the client knows
+                raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
+            self._open.discard(data)
+            data.reply(self._responses.encode(response), self.node.now_ns)
+
+        self._open.add(data)
+        self._callback(request, respond)
+
+    def _on_query(self, query: zenoh.Query) -> None:
+        bus, source = self.node.bus, self._admission.source(query)
+        if source is None:
+            query.drop()  # type: ignore[no-untyped-call]
+        elif bus.in_own_thread():
+            self.enqueue(ZenohQuestion(query, source), False)
+        else:
+            size = len(query.payload) if query.payload else 0
+            bus.external.push(Arrival(source, self, ZenohQuestion(query, source), size))
+
+
+class Client(Endpoint):
+    """Asks a service; the response arrives in the node's spin."""
+
+    def __init__(self, node: Node, srv_type: ServiceType, name: str) -> None:
+        super().__init__(node, "SC", name, srv_type.name, _QOS)
+        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._sequence = 0
+        self._pending: dict[Future, None] = {}
+        node.bus.standard_services.want(name, node.bus.nodes)
+        self._bridged = node.bus.naming.wire == "ros2dds"
+        self._querier = node.bus.zenoh.declare_querier(
+            self.key,
+            # The bridge's queryables do not say that they are complete.
+            target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_FOREVER_S,
+        )
+        self._declared.append(self._querier)
+        self._services = node.bus.in_process.listeners(self.key)
+        self._short = node.bus.savings.services_in_process
+        self.announce()
+
+    @property
+    def service_is_ready(self) -> bool:
+        """Whether somebody offers the service now."""
+        if self._short and self._services.is_direct:
+            return bool(self._services.receivers)
+        return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
+
+    def wait_for_service(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
+        """Wait in an execution: `ready = yield from client.wait_for_service()`.
+
+        Args:
+            timeout_ns: Of the bus's clock [ns]; then the value is False. None waits for ever.
+        """
+        start_ns = self.node.now_ns
+        while not self.service_is_ready:
+            if timeout_ns is not None and self.node.now_ns - start_ns >= timeout_ns:
+                return False
+            yield
+        return True
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Forget a request: its future stays undone, and a response that comes later is ignored."""
+        self._pending.pop(future, None)
+
+    def destroy(self) -> None:
+        """Leave the graph; futures that are not done end with an error."""
+        super().destroy()
+        for future in tuple(self._pending):
+            future.finish(None, f"the client of {self.name} was destroyed before an answer came")
+        self._pending.clear()
+
+    def call_async(self, request: Any) -> Future:
+        """Send a request.
+
+        Raises:
+            TypeError: a request of another type.
+            BridgeError: the client is destroyed.
+        """
+        if not self._declared:
+            raise BridgeError(f"the client of {self.name} is destroyed")
+        if type(request) is not self._requests.cls:
+            raise TypeError(f"{self.name} takes {self._requests.msgtype}, not {type(request).__name__}")
+        self._sequence += 1
+        bus, future = self.node.bus, Future(self.name)
+        self._pending[future] = None
+        source = Attachment(self._sequence, bus.clock.now_ns, self.gid)
+
+        def deliver(data: Any) -> None:
+            if bus.in_own_thread():
+                self.enqueue(data, False)
+            else:
+                bus.external.push(Arrival(source, self, data))
+
+        answered: list[bool] = []
+
+        def on_response(payload: bytes) -> None:
+            answered.append(True)
+            deliver((future, payload))
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                on_response(reply.ok.payload.to_bytes())
+
+        def on_end() -> None:
+            # May run in any thread, the bus's own too: it must not overtake a reply that waits outside.
+            if not answered:
+                deliver((future, None))
+
+        payload = self._requests.encode(request)
+        if self._short and self._services.is_direct and bus.in_own_thread():
+            InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers)
+        else:
+            self._querier.get(
+                direct(on_reply, on_end),
+                payload=payload,
+                attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
+            )
+        return future
+
+    def enqueue(self, data: tuple[Future, bytes | None], external: bool) -> None:
+        """Put a response, or the end of the query, into the node's inbox."""
+        if self._declared:
+            self.node.inbox.append([self, data, external])
+
+    def handle(self, data: tuple[Future, bytes | None], external: bool) -> None:
+        """Decode and finish the future; the end of a query matters only if no response came before."""
+        future, payload = data
+        if future not in self._pending:  # done, removed, or the client destroyed
+            return
+        del self._pending[future]
+        if payload is None:
+            future.finish(None, f"nobody answered on the service {self.name}; is its node running?")
+            return
+        response = read(self.node.bus.external, self.name, self._responses, payload)
+        if response is None:
+            future.finish(None, f"the service {self.name} answered with something else than a response")
+            return
+        future.finish(response)

@@ -1,31 +1,14 @@
-"""Requests on their way to a service, as the service sees them."""
+"""Requests as a service sees them: each is answered once or dropped, and the client learns which."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 import zenoh
 
-from twin.bridge.qos import QoS
+from twin.bridge.wire.external import Receiver
 from twin.bridge.wire.keys import Attachment, pack_attachment
 from twin.bridge.wire.naming import parse_key
-
-QOS = QoS(depth=10)
-
-
-class Question(Protocol):
-    """A request; it is either answered once or dropped, and the client learns which."""
-
-    @property
-    def payload(self) -> bytes:
-        """The request as CDR."""
-
-    def reply(self, payload: bytes, now_ns: int) -> None:
-        """Answer at a time [ns] with a response as CDR."""
-
-    def drop(self) -> None:
-        """Answer never."""
 
 
 class ZenohQuestion:
@@ -54,22 +37,33 @@ class ZenohQuestion:
 
 
 class InProcessQuestion:
-    """A request from a client of the same bus, to all services of the name: mostly one."""
+    """A request of a client of the same bus."""
 
     def __init__(
-        self, payload: bytes, services: int, on_reply: Callable[[bytes], None], on_end: Callable[[], None]
+        self, payload: bytes, on_response: Callable[[bytes], None], on_end: Callable[[], None]
     ) -> None:
+        """Take a request as CDR, and who is told of each response and, when there can be no more, of that."""
         self.payload = payload
-        self._waiting = services
-        self._on_reply, self._on_end = on_reply, on_end
+        self._on_response, self._on_end = on_response, on_end
+        self._open = 1
 
-    def reply(self, payload: bytes, now_ns: int) -> None:
+    def ask(self, services: Sequence[Receiver]) -> None:
+        """Put it into the inboxes of all services of the name: mostly one."""
+        self._open += len(services)
+        for service in services:
+            service.enqueue(self, False)
+        self.drop()
+
+    def reply(self, payload: bytes, _now_ns: int) -> None:
         """Answer with a response as CDR."""
-        self._on_reply(payload)
+        self._on_response(payload)
         self.drop()
 
     def drop(self) -> None:
-        """Do without one service's answer."""
-        self._waiting -= 1
-        if not self._waiting:
+        """Answer never: one less may."""
+        self._open -= 1
+        if not self._open:
             self._on_end()
+
+
+Question = ZenohQuestion | InProcessQuestion
