@@ -1,9 +1,10 @@
-"""Action servers: goals executed by generators that each spin advances."""
+"""Action servers: goals executed by generators that spins advance."""
 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
@@ -24,7 +25,6 @@ Policy = Literal["preempt", "parallel", "queue", "reject"]
 
 _KEPT_GOALS = 16
 """rcl keeps all until they expire; every status message would list them."""
-_MAX_NS = 2**63 - 1
 
 
 class _Ended(NamedTuple):
@@ -35,11 +35,13 @@ class _Ended(NamedTuple):
     time_ns: int
 
 
-class _Run(NamedTuple):
+@dataclass(eq=False)
+class _Run:
     """A goal being executed."""
 
     handle: GoalHandle
-    generator: Generator[None, None, Any]
+    generator: tasks.Steps
+    due_ns: int = 0
 
 
 class ActionServer:
@@ -116,6 +118,15 @@ class ActionServer:
     def _is_closed(self) -> bool:
         return self._closed or self._node.is_destroyed
 
+    @property
+    def due_ns(self) -> int:
+        """When `step` has something to do, if nothing arrives before [ns]."""
+        if self._running:
+            return min(run.due_ns for run in self._running)
+        for ended in self._ended.values():
+            return ended.time_ns + self._result_timeout_ns + 1
+        return tasks.NEVER_NS
+
     def step(self) -> bool:
         """Advance every execution to its next yield; an exception in one is a bug and propagates.
 
@@ -138,7 +149,7 @@ class ActionServer:
             if run not in self._running:
                 continue
             try:
-                next(run.generator)
+                run.due_ns = next(run.generator) or 0
             except StopIteration as end:
                 self._return(run, end.value)
             if run not in self._running:  # it ended itself, by destroying its node
@@ -158,6 +169,7 @@ class ActionServer:
 
     def execute_goal(self, handle: GoalHandle, execute: Execute | None) -> None:
         """Execute an accepted goal, or queue it; see `GoalHandle.execute`."""
+        self._node.wake()
         if self._policy == "queue" and (self._running or self._queue):
             self._queue.append((handle, execute or self._execute))
         else:
@@ -263,7 +275,7 @@ class ActionServer:
             if not is_cancelable(handle.status):
                 return codes.ERROR_GOAL_TERMINATED, []
             return codes.ERROR_NONE, [handle]
-        until_ns = until_ns or _MAX_NS
+        until_ns = until_ns or tasks.NEVER_NS
         return codes.ERROR_NONE, [
             handle
             for handle in self._handles.values()
@@ -283,6 +295,7 @@ class ActionServer:
     def _end(self, handle: GoalHandle, result: Any) -> None:
         result = new(self._type.Result) if result is None else result
         self._ended[handle.goal_id] = _Ended(handle.status, result, self._node.now_ns)
+        self._node.wake()
         for respond in self._waiting.pop(handle.goal_id, ()):
             respond(self._type.GetResult.Response(handle.status, result))
         if len(self._ended) > _KEPT_GOALS:
