@@ -11,9 +11,10 @@ from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
 from twin.bridge.actions.states import GoalEvent, is_cancelable, transition
 from twin.bridge.msgs import GoalStatus, GoalStatusArray, ns, stamp
 from twin.bridge.node import tasks
-from twin.bridge.qos import LATCHED
+from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.services import Respond
 from twin.bridge.srvs import CancelGoal
+from twin.bridge.topics import Publisher
 from twin.bridge.types import ActionType
 from twin.bridge.types.default_values import new
 from twin.errors import BridgeError
@@ -95,7 +96,10 @@ class ActionServer:
         self._waiting: dict[bytes, list[Respond]] = {}
         self._closed = False
         base = f"{self.name}/_action"
-        self._feedback = node.create_publisher(action_type.FeedbackMessage, f"{base}/feedback")
+        feedback = f"{action_type.name}_FeedbackMessage"
+        self._feedback: Publisher[Any] = node.add_endpoint(
+            Publisher(node, feedback, node.resolve_name(f"{base}/feedback"), as_qos(10))
+        )
         self._status = node.create_publisher(GoalStatusArray, f"{base}/status", LATCHED)
         self._services = (
             node.create_deferred_service(action_type.SendGoal, f"{base}/send_goal", self._on_goal),

@@ -7,8 +7,7 @@ a message is ignored, as in ROS 2: its own serializer returns a buffer of an est
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain
 from operator import attrgetter
 from struct import Struct, pack, unpack_from
@@ -47,46 +46,63 @@ from twin.bridge.types.fields import array_types
 
 M = TypeVar("M")
 _Read = Callable[[bytes], tuple[M, int]]
+_Functions = tuple[Callable[[M], bytes], _Read[M]]
 
 _TWIST = Struct("<4s6d")
 _CLOCK = Struct("<4siI")
 
 
-@dataclass(frozen=True)
 class Codec(Generic[M]):
-    """How one message type travels."""
+    """How one message type travels; what that needs is made for the first message."""
 
-    msgtype: str
-    """package/msg/Name."""
-    cls: type[M]
-    encode: Callable[[M], bytes]
-    """Raises BridgeError, naming the field, if one has a value that it cannot hold."""
-    read: _Read[M]
-    """Returns the message and where in the payload it ends. Raises on bytes that do not begin with such a
-    message; which exception is not specified. Takes no more memory than some times the payload, whatever
-    lengths the payload tells."""
+    def __init__(self, msg_type: type[M] | str, functions: Callable[[type[M]], _Functions[M]]) -> None:
+        self._given = msg_type
+        self.msgtype: str = msg_type if isinstance(msg_type, str) else msg_type.__msgtype__  # type: ignore[attr-defined]
+        """package/msg/Name."""
+        self._functions = functions
+
+    @cached_property
+    def cls(self) -> type[M]:
+        """The messages' class."""
+        return types.get(self._given) if isinstance(self._given, str) else self._given
+
+    @cached_property
+    def encode(self) -> Callable[[M], bytes]:
+        """Takes a message; raises BridgeError, naming the field, if one has a value that it cannot hold."""
+        return _explained(self._functions(self.cls)[0])
+
+    @cached_property
+    def read(self) -> _Read[M]:
+        """Returns the message and where in the payload it ends.
+
+        Raises on bytes that do not begin with such a message; which exception is not specified. Takes no more
+        memory than some times the payload, whatever lengths the payload tells.
+        """
+        return self._functions(self.cls)[1]
 
     def decode(self, payload: bytes) -> M:
         """Return the message; raises what `read` does."""
         return self.read(payload)[0]
 
 
-def codec(cls: type[M]) -> Codec[M]:
-    """Return the codec of a message class; rosbags generates its code now, not in the loop."""
-    general = general_codec(cls)
-    fast = _FAST.get(general.msgtype) or _of_only_a_path(cls)
-    if fast is None:
-        return general
-    encode, read = fast
-    return Codec(general.msgtype, cls, _explained(encode), read)
+def codec(msg_type: type[M] | str) -> Codec[M]:
+    """Return the codec of a message class; by its full name the class is not made before it is needed."""
+    return Codec(msg_type, _fastest)
 
 
 def general_codec(cls: type[M]) -> Codec[M]:
     """Return rosbags' codec of a message class."""
+    return Codec(cls, _general)
+
+
+def _fastest(cls: type[M]) -> _Functions[M]:
+    return _FAST.get(cls.__msgtype__) or _of_only_a_path(cls) or _general(cls)  # type: ignore[attr-defined]
+
+
+def _general(cls: type[M]) -> _Functions[M]:
     msgtype: str = cls.__msgtype__  # type: ignore[attr-defined]
     if is_wide(msgtype):
-        return Codec(msgtype, cls, _explained(encode_wide), lambda payload: decode_wide(payload, msgtype))
-    types.store.get_msgdef(msgtype)
+        return encode_wide, lambda payload: decode_wide(payload, msgtype)
     serialize = types.store.serialize_cdr
     arrays = array_types(msgtype)
 
@@ -97,7 +113,7 @@ def general_codec(cls: type[M]) -> Codec[M]:
                 break
         return bytes(serialize(message, msgtype, little_endian=True))
 
-    return Codec(msgtype, cls, _explained(encode), lambda payload: read_cdr(types.store, payload, msgtype))
+    return encode, lambda payload: read_cdr(types.store, payload, msgtype)
 
 
 def _explained(encode: Callable[[M], bytes]) -> Callable[[M], bytes]:
@@ -209,7 +225,7 @@ def _little_endian(cls: type[M], read: _Read[M]) -> _Read[M]:
     return either
 
 
-def _of_only_a_path(cls: Any) -> tuple[Callable[[Any], bytes], _Read[Any]] | None:
+def _of_only_a_path(cls: Any) -> _Functions[Any] | None:
     """Return the codec of a message that has a path and nothing else, as requests to check one: its bytes."""
     definition = types.store.fielddefs.get(cls.__msgtype__)
     match definition and definition[1]:
@@ -224,7 +240,7 @@ def _of_only_a_path(cls: Any) -> tuple[Callable[[Any], bytes], _Read[Any]] | Non
     return None
 
 
-_FAST: dict[str, tuple[Callable[[Any], bytes], _Read[Any]]] = {
+_FAST: dict[str, _Functions[Any]] = {
     Twist.__msgtype__: (_encode_twist, _little_endian(Twist, _decode_twist)),
     Clock.__msgtype__: (_encode_clock, _little_endian(Clock, _decode_clock)),
     TFMessage.__msgtype__: (_encode_tf, _little_endian(TFMessage, _decode_tf)),

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_typestore
 
 from twin.bridge import types
 from twin.bridge.cdr.general import read_cdr
 from twin.bridge.types.fields import Field, fields_of
+from twin.bridge.types.lazy_store import LazyTypestore
 
-_wire = get_typestore(Stores.EMPTY)
+_wire = LazyTypestore()
 _UNITS = "twin/msg/Units"
 _UINT32S: Any = (Nodetype.SEQUENCE, ((Nodetype.BASE, ("uint32", 0)), 0))
 _wire.register({_UNITS: ([], [("units", _UINT32S)])})
@@ -57,7 +57,7 @@ def decode_wide(payload: bytes, typename: str) -> tuple[Any, int]:
 
 
 def _register(name: str) -> None:
-    if name in _wire.types:
+    if name in _wire.fielddefs:
         return
     constants, fields = types.store.fielddefs[name]
     wire: Any = {name: (constants, [(field, _wire_type(description)) for field, description in fields])}

@@ -50,6 +50,8 @@ class Parameters(ABC):
         """Called for every change."""
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
+        self._descriptions: dict[str, Callable[[str], str]] = {}
+        """What tells the description of a parameter, of which the descriptor then has none."""
 
     @property
     @abstractmethod
@@ -94,8 +96,14 @@ class Parameters(ABC):
         self._raise_refusal(result, name, value, Type(descriptor.type))
         return self._parameters[name]
 
-    def declare_together(self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]]) -> None:
+    def declare_together(
+        self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]], describe: Callable[[str], str]
+    ) -> None:
         """Declare many parameters, and tell of them in one event.
+
+        Args:
+            parameters: (name, value, descriptor without description) of each.
+            describe: Takes a name and returns the description, when somebody asks for it.
 
         Raises:
             BridgeError: as `declare_parameter`.
@@ -105,6 +113,7 @@ class Parameters(ABC):
         try:
             for each in parameters:
                 self.declare_parameter(*each)
+                self._descriptions[each[0]] = describe
         finally:
             self._tell = tell
         tell(together)
@@ -121,7 +130,7 @@ class Parameters(ABC):
         """
         if self._known(name).read_only:
             raise errors.ParameterImmutableException(self.fully_qualified_name, name)
-        del self._parameters[name], self._descriptors[name]
+        self._forget(name)
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a parameter; one without a value if undeclared ones are allowed.
@@ -166,7 +175,11 @@ class Parameters(ABC):
         Raises:
             BridgeError: not declared.
         """
-        return new(ParameterDescriptor) if self._undeclared_is_fine(name) else replace(self._known(name))
+        if self._undeclared_is_fine(name):
+            return new(ParameterDescriptor)
+        described = self._descriptions.get(name)
+        descriptor = self._known(name)
+        return replace(descriptor, description=described(name) if described else descriptor.description)
 
     def list_parameters(self, prefixes: Sequence[str] = (), depth: int = 0) -> ListParametersResult:
         """Return names below the prefixes, at most `depth` levels deep; 0 is as deep as there are names."""
@@ -197,6 +210,7 @@ class Parameters(ABC):
         if descriptor.dynamic_typing:
             descriptor.type = parameter.kind.value
         self._parameters[name], self._descriptors[name] = parameter, descriptor
+        self._descriptions.pop(name, None)
         return parameter
 
     def set_parameters_atomically(self, parameters: Sequence[Parameter]) -> SetParametersResult:
@@ -257,8 +271,7 @@ class Parameters(ABC):
         name = parameter.name
         if parameter.kind is Type.NOT_SET and declared_as is None:
             event.deleted_parameters.append(parameter.to_parameter_msg())
-            self._parameters.pop(name, None)
-            self._descriptors.pop(name, None)
+            self._forget(name)
             return
         kept = declared_as or self._descriptors.get(name) or new(ParameterDescriptor, dynamic_typing=True)
         self._descriptors[name] = kept
@@ -268,6 +281,10 @@ class Parameters(ABC):
         is_new = self.get_parameter_or(name).kind is Type.NOT_SET
         (event.new_parameters if is_new else event.changed_parameters).append(parameter.to_parameter_msg())
         self._parameters[name] = parameter
+
+    def _forget(self, name: str) -> None:
+        for kept in (self._parameters, self._descriptors, self._descriptions):
+            kept.pop(name, None)
 
     def _event(self) -> ParameterEvent:
         return new(ParameterEvent, stamp=stamp(self.bus.clock.now_ns), node=self.fully_qualified_name)

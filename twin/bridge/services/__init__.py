@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 
-from twin.bridge.cdr.codec import codec
+from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import QoS
 from twin.bridge.services.future import Future
 from twin.bridge.services.questions import InProcessQuestion, Question, ZenohQuestion
@@ -32,6 +32,11 @@ Respond = Callable[[Any], None]
 """Sends the response; may be called in a later spin."""
 
 
+def codecs(srv_type: ServiceType) -> tuple[Codec[Any], Codec[Any]]:
+    """Return how requests and responses travel."""
+    return codec(f"{srv_type.name}_Request"), codec(f"{srv_type.name}_Response")
+
+
 class Service(Endpoint):
     """Answers requests in its node's spin."""
 
@@ -39,7 +44,7 @@ class Service(Endpoint):
         self, node: Node, srv_type: ServiceType, name: str, callback: Callable[[Any, Respond], None]
     ) -> None:
         super().__init__(node, "SS", name, srv_type.name, _QOS)
-        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._requests, self._responses = codecs(srv_type)
         self._callback = callback
         self._open: set[Question] = set()
         bus = node.bus
@@ -104,7 +109,7 @@ class Client(Endpoint):
 
     def __init__(self, node: Node, srv_type: ServiceType, name: str) -> None:
         super().__init__(node, "SC", name, srv_type.name, _QOS)
-        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._requests, self._responses = codecs(srv_type)
         self._sequence = 0
         self._pending: dict[Future, None] = {}
         node.bus.standard_services.want(name, node.bus.nodes)

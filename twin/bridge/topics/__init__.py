@@ -10,7 +10,7 @@ import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr.codec import codec
+from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import INFINITE_NS, QoS
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
@@ -99,8 +99,8 @@ class Endpoint:
 class Publisher(Endpoint, Generic[M]):
     """Publishes messages of one type on a topic."""
 
-    def __init__(self, node: Node, cls: type[M], name: str, qos: QoS) -> None:
-        self.codec = codec(cls)
+    def __init__(self, node: Node, msg_type: type[M] | str, name: str, qos: QoS) -> None:
+        self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._sequence = 0
@@ -156,7 +156,7 @@ class Subscription(Endpoint, Generic[M]):
     def __init__(
         self,
         node: Node,
-        cls: type[M],
+        msg_type: type[M] | str,
         name: str,
         callback: Callable[[M], Any],
         qos: QoS,
@@ -164,7 +164,7 @@ class Subscription(Endpoint, Generic[M]):
         wanted: Callable[[bytes], bool] | None = None,
     ) -> None:
         """Hear a topic; a payload for which `wanted` returns False is not decoded."""
-        self.codec = codec(cls)
+        self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
