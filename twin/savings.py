@@ -9,5 +9,8 @@ from dataclasses import dataclass
 class Savings:
     """Each can be switched off; a run without them is slower, and the oracle of the one with them."""
 
+    by_reference: bool = True
+    """Within a process a message that nobody changes any more is handed over as it is, not as bytes."""
+
 
 ALL = Savings()

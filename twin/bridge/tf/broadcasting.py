@@ -36,9 +36,11 @@ class TransformBroadcaster:
     def __init__(self, node: Node) -> None:
         self._publisher = node.create_publisher(TFMessage, "/tf", _DYNAMIC)
 
-    def send_transform(self, transforms: TransformStamped | Iterable[TransformStamped]) -> None:
-        """Publish one or more transforms in one message."""
-        self._publisher.publish(TFMessage(_as_list(transforms)))
+    def send_transform(
+        self, transforms: TransformStamped | Iterable[TransformStamped], *, frozen: bool = False
+    ) -> None:
+        """Publish one or more transforms in one message; see `Publisher.publish` for `frozen`."""
+        self._publisher.publish(TFMessage(_as_list(transforms)), frozen=frozen)
 
 
 class StaticTransformBroadcaster:
@@ -65,7 +67,7 @@ class TransformListener:
         self._broadcasters: dict[bytes, Broadcaster] = {}
         self._expires = False
         self.on_message: list[Callable[[TFMessage, object], None]] = []
-        """Called with every message and its broadcaster, whose `str` is its name."""
+        """Called with every message, which is left as it is, and its broadcaster, whose `str` is its name."""
         for topic, qos, static in (("/tf", _DYNAMIC, False), ("/tf_static", _STATIC_LISTENER, True)):
             self._subscribe(topic, qos, static)
 
@@ -97,7 +99,7 @@ class TransformListener:
             source = subscription.source
             self._on_message(message, static, None if source is None else source.gid)
 
-        subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
+        subscription = self._node.create_subscription(TFMessage, topic, on_message, qos, frozen=True)
 
     def _expire(self) -> None:
         self.buffer.waiting.expire(self._node.now_ns)

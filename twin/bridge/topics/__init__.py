@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import zenoh
 import zenoh.ext
 
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
+from twin.bridge.cdr.exact import exactness
 from twin.bridge.qos import INFINITE_NS, QoS
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 M = TypeVar("M")
 
+_Heard = Union["Sample[M]", tuple[bytes, zenoh.Sample | Attachment]]
+"""A message of this process, or what came through Zenoh and whence."""
+
 _HEARTBEAT_S = 0.5  # rmw_zenoh's period
 _KEEP_ALL = 100_000
 """What keep_all keeps at most: no unbounded memory."""
@@ -32,7 +36,7 @@ _KEEP_ALL = 100_000
 class Sample(Generic[M]):
     """A message as published; `payload` is valid during the tap's call and encoded when first read."""
 
-    __slots__ = ("_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
+    __slots__ = ("_payload", "_shared", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
 
     def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
         self.publisher = publisher
@@ -46,6 +50,26 @@ class Sample(Generic[M]):
         self.message = message
         """The publisher's own object: not to be changed or kept."""
         self._payload: bytes | None = None
+        self._shared: M | None = None
+
+    def settle(self, frozen: bool) -> None:
+        """Let what is received be the message as it is now; one that is frozen need not become bytes."""
+        if frozen and exactness(self.msgtype)(self.message):
+            self._shared = self.message
+        else:
+            _ = self.payload
+
+    @property
+    def shared(self) -> M:
+        """What is received, the same object for all who do not change it."""
+        if self._shared is None:
+            self._shared = self.publisher.codec.decode(self.payload)
+        return self._shared
+
+    @property
+    def source(self) -> Attachment:
+        """Count, time and gid of the publisher."""
+        return Attachment(self.sequence, self.time_ns, self.publisher.gid)
 
     @property
     def payload(self) -> bytes:
@@ -103,6 +127,7 @@ class Publisher(Endpoint, Generic[M]):
         self.codec = codec(cls)
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
+        self._by_reference = node.bus.savings.by_reference
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
@@ -118,8 +143,13 @@ class Publisher(Endpoint, Generic[M]):
             return bool(self._listeners.receivers)
         return self._latched or self._zenoh.matching_status.matching
 
-    def publish(self, message: M) -> None:
+    def publish(self, message: M, *, frozen: bool = False) -> None:
         """Publish at the clock's time.
+
+        Args:
+            message: What to say.
+            frozen: Whether nobody changes the message, or an array in it, from now on: then those who hear
+                it within the process may be given the object itself.
 
         Raises:
             TypeError: a message of another type.
@@ -139,10 +169,10 @@ class Publisher(Endpoint, Generic[M]):
         listeners = self._listeners
         if listeners is not None and listeners.is_direct and self._bus.in_own_thread():
             if listeners.receivers:
-                payload = self.codec.encode(message) if sample is None else sample.payload
-                data = payload, Attachment(self._sequence, time_ns, self.gid)
+                sample = sample or Sample(self, self._sequence, time_ns, message)
+                sample.settle(frozen and self._by_reference)
                 for receiver in listeners.receivers:
-                    receiver.enqueue(data, False)
+                    receiver.enqueue(sample, False)
             return
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         if sample is not None or self.has_subscribers:
@@ -161,15 +191,28 @@ class Subscription(Endpoint, Generic[M]):
         callback: Callable[[M], Any],
         qos: QoS,
         *,
+        frozen: bool = False,
         wanted: Callable[[bytes], bool] | None = None,
     ) -> None:
-        """Hear a topic; a payload for which `wanted` returns False is not decoded."""
+        """Hear a topic.
+
+        Args:
+            node: Whose inbox it fills.
+            cls: Type of the messages.
+            name: Absolute name.
+            callback: Takes a message.
+            qos: What is asked for.
+            frozen: Whether the callback leaves messages as they are, so that it can be given the object that
+                others hear too.
+            wanted: A payload for which it returns False is not decoded.
+        """
         self.codec = codec(cls)
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
-        self._origin: zenoh.Sample | Attachment | None = None
+        self._origin: zenoh.Sample | Sample[M] | Attachment | None = None
         self._callback = callback
+        self._shares = frozen and node.bus.savings.by_reference
         self._wanted = wanted
         self._pending: deque[list[Any]] = deque()
         self._inbox = node.inbox
@@ -195,12 +238,14 @@ class Subscription(Endpoint, Generic[M]):
     @property
     def source(self) -> Attachment | None:
         """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if isinstance(self._origin, Sample):
+            return self._origin.source
         if not isinstance(self._origin, zenoh.Sample):
             return self._origin
         return parse_attachment(attachment_of(self._origin))  # read only if asked for: few want to know
 
-    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
-        """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
+    def enqueue(self, data: _Heard[M], external: bool) -> None:
+        """Put a message into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
             self.dropped += 1
@@ -212,21 +257,27 @@ class Subscription(Endpoint, Generic[M]):
         if self._lifespan_ns is not None:
             self._received_ns.append(self.node.now_ns)
 
-    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
-        """Decode and call back."""
+    def handle(self, data: _Heard[M], external: bool) -> None:
+        """Decode, unless that is done, and call back."""
         self._pending.popleft()
         if self._lifespan_ns is not None:
             age_ns = self.node.now_ns - self._received_ns.popleft()
             if age_ns > self._lifespan_ns:
                 self.dropped += 1
                 return
-        payload, origin = data
-        if self._wanted is not None and not self._wanted(payload):
-            return
-        message = read(self.node.bus.external, self.name, self.codec, payload)
-        if message is None:
-            return
-        self._origin = origin
+        if isinstance(data, Sample):
+            if self._wanted is not None and not self._wanted(data.payload):
+                return
+            message: M | None = data.shared if self._shares else self.codec.decode(data.payload)
+            self._origin = data
+        else:
+            payload, origin = data
+            if self._wanted is not None and not self._wanted(payload):
+                return
+            message = read(self.node.bus.external, self.name, self.codec, payload)
+            if message is None:
+                return
+            self._origin = origin
         self._callback(message)
         self._origin = None
 
