@@ -160,24 +160,18 @@ class Publisher(Endpoint, Generic[M]):
         if not self._declared:
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
-        time_ns = self._bus.clock.now_ns
-        sample = None
-        if self._bus.taps:
-            sample = Sample(self, self._sequence, time_ns, message)
-            for tap in self._bus.taps:
-                tap(sample)
-        listeners = self._listeners
-        if listeners is not None and listeners.is_direct and self._bus.in_own_thread():
+        bus, listeners = self._bus, self._listeners
+        sample = Sample(self, self._sequence, bus.clock.now_ns, message)
+        for tap in bus.taps:
+            tap(sample)
+        if listeners is not None and listeners.is_direct and bus.in_own_thread():
             if listeners.receivers:
-                sample = sample or Sample(self, self._sequence, time_ns, message)
                 sample.settle(frozen and self._by_reference)
                 for receiver in listeners.receivers:
                     receiver.enqueue(sample, False)
-            return
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
-        if sample is not None or self.has_subscribers:
-            payload = self.codec.encode(message) if sample is None else sample.payload
-            self._zenoh.put(payload, attachment=pack_attachment(self._sequence, time_ns, self.gid))
+        elif bus.taps or self.has_subscribers:
+            self._zenoh.put(sample.payload, attachment=pack_attachment(*sample.source))
 
 
 class Subscription(Endpoint, Generic[M]):
@@ -268,16 +262,16 @@ class Subscription(Endpoint, Generic[M]):
         if isinstance(data, Sample):
             if self._wanted is not None and not self._wanted(data.payload):
                 return
-            message: M | None = data.shared if self._shares else self.codec.decode(data.payload)
+            message = data.shared if self._shares else self.codec.decode(data.payload)
             self._origin = data
         else:
             payload, origin = data
             if self._wanted is not None and not self._wanted(payload):
                 return
-            message = read(self.node.bus.external, self.name, self.codec, payload)
-            if message is None:
+            received = read(self.node.bus.external, self.name, self.codec, payload)
+            if received is None:
                 return
-            self._origin = origin
+            message, self._origin = received, origin
         self._callback(message)
         self._origin = None
 
