@@ -1,8 +1,8 @@
 """Functions that encode and decode one type, made of its fields: as few structs as there are, and no calls.
 
 CDR of ROS 2: numbers are aligned to their size, counted from the end of the encapsulation; a text is its
-length with its terminating zero, and its bytes; a wstring is the number of its UTF-16 units and each of them as
-an uint32, without a terminator (rosidl_typesupport_fastrtps_cpp, serialization_helpers.hpp).
+length with its terminating zero, and its bytes; a wstring is the number of its UTF-16 units and each of them
+as an uint32, without a terminator (rosidl_typesupport_fastrtps_cpp, serialization_helpers.hpp).
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ import zenoh.ext
 
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
-from twin.bridge.cdr.exact import exactness
 from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
@@ -31,52 +31,6 @@ _Heard = Union["Sample[M]", tuple[bytes, zenoh.Sample | Attachment]]
 _HEARTBEAT_S = 0.5  # rmw_zenoh's period
 _KEEP_ALL = 100_000
 """What keep_all keeps at most: no unbounded memory."""
-
-
-class Sample(Generic[M]):
-    """A message as published; `payload` is valid during the tap's call and encoded when first read."""
-
-    __slots__ = ("_payload", "_shared", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
-
-    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
-        self.publisher = publisher
-        self.sequence = sequence
-        """The publisher's count, from 1."""
-        self.topic: str = publisher.name
-        """Absolute name."""
-        self.msgtype = publisher.codec.msgtype
-        self.time_ns = time_ns
-        """Simulated time of publishing [ns]."""
-        self.message = message
-        """The publisher's own object: not to be changed or kept."""
-        self._payload: bytes | None = None
-        self._shared: M | None = None
-
-    def settle(self, frozen: bool) -> None:
-        """Let what is received be the message as it is now; one that is frozen need not become bytes."""
-        if frozen and exactness(self.msgtype)(self.message):
-            self._shared = self.message
-        else:
-            _ = self.payload
-
-    @property
-    def shared(self) -> M:
-        """What is received, the same object for all who do not change it."""
-        if self._shared is None:
-            self._shared = self.publisher.codec.decode(self.payload)
-        return self._shared
-
-    @property
-    def source(self) -> Attachment:
-        """Count, time and gid of the publisher."""
-        return Attachment(self.sequence, self.time_ns, self.publisher.gid)
-
-    @property
-    def payload(self) -> bytes:
-        """The message as CDR."""
-        if self._payload is None:
-            self._payload = self.publisher.codec.encode(self.message)
-        return self._payload
 
 
 class Endpoint:
@@ -162,8 +116,10 @@ class Publisher(Endpoint, Generic[M]):
         self._sequence += 1
         bus, listeners = self._bus, self._listeners
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
-        for tap in bus.taps:
-            tap(sample)
+        if bus.taps:
+            sample.settle(frozen and self._by_reference)
+            for tap in bus.taps:
+                tap(sample)
         if listeners is not None and listeners.is_direct and bus.in_own_thread():
             if listeners.receivers:
                 sample.settle(frozen and self._by_reference)
