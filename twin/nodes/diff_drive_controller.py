@@ -17,7 +17,7 @@ from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
-from twin.geometry import Array, Pose2, Pose3
+from twin.geometry import Array, Pose2
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Flat, Le, PeriodNs, Positive
@@ -127,8 +127,7 @@ class DiffDriveControllerNode:
             frozen=True,
         )
         if self.config.enable_odom_tf:
-            T_odom_base = Pose3.from_pose2(pose)
-            moved = transform_stamped(self.config.odom_frame, self.config.base_frame, now, T_odom_base)
+            moved = transform_stamped(self.config.odom_frame, self.config.base_frame, now, pose)
             self._tf.send_transform(moved, frozen=True)
 
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from twin.bridge.cdr.compiled import MAGIC, decoder, encoder
+from twin.bridge.cdr.decoder import decoder
+from twin.bridge.cdr.encoder import encoder
+from twin.bridge.cdr.maker import MAGIC
 from twin.bridge.messages.from_values import checked
 
 M = TypeVar("M")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from twin.bridge.conversions import transform_from_pose3
+from twin.bridge.conversions import transform_from_pose2, transform_from_pose3
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
 from twin.bridge.qos import LATCHED, QoS
 from twin.bridge.tf.buffer import TransformBuffer
 from twin.bridge.tf.cache import UNKNOWN_AUTHORITY
 from twin.bridge.tf.wait import TransformFuture
-from twin.geometry import Pose3
+from twin.geometry import Pose2, Pose3
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -25,9 +25,12 @@ _EXPIRY_NS = 10_000_000
 """How often waits are looked at that may have to be given up [ns]."""
 
 
-def transform_stamped(parent: str, child: str, time_ns: int, T_parent_child: Pose3) -> TransformStamped:
-    """Return a transform as a message."""
-    return TransformStamped(header(time_ns, parent), child, transform_from_pose3(T_parent_child))
+def transform_stamped(
+    parent: str, child: str, time_ns: int, T_parent_child: Pose3 | Pose2
+) -> TransformStamped:
+    """Return a transform, in space or in the plane, as a message."""
+    convert: Any = transform_from_pose2 if isinstance(T_parent_child, Pose2) else transform_from_pose3
+    return TransformStamped(header(time_ns, parent), child, convert(T_parent_child))
 
 
 class TransformBroadcaster:

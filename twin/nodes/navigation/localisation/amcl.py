@@ -26,7 +26,7 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty, SetInitialPose
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.errors import MapError
-from twin.geometry import Array, Pose2, Pose3
+from twin.geometry import Array, Pose2
 from twin.navigation.localisation.amcl import Amcl, Estimate
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.input_watch import InputWatch
@@ -276,8 +276,7 @@ class AmclNode:
     def _broadcast(self, estimate: Estimate, stamp_ns: int) -> None:
         if self.config.tf_broadcast:
             valid_until, frames = stamp_ns + self.config.transform_tolerance_ns, self._robot_pose.frames
-            T_map_odom = Pose3.from_pose2(estimate.T_map_odom)
-            moved = transform_stamped(frames.map, frames.odom, valid_until, T_map_odom)
+            moved = transform_stamped(frames.map, frames.odom, valid_until, estimate.T_map_odom)
             self._tf.send_transform(moved, frozen=True)
 
     def _publish_pose(self, estimate: Estimate, stamp_ns: int) -> None:

@@ -24,7 +24,7 @@ from twin.bridge.msgs import (
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import GetMap
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2
 from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.slam import Slam, SlamUpdate
 from twin.navigation.mapping.warm_up import warm_up
@@ -138,9 +138,8 @@ class SlamToolboxNode:
                 if not self._started:
                     self._started = True
                     self._publish_map()
-        T_map_odom = Pose3.from_pose2(self.slam.T_map_odom)
         valid_until = stamp_ns + self.config.transform_timeout_ns
-        moved = transform_stamped(frames.map, frames.odom, valid_until, T_map_odom)
+        moved = transform_stamped(frames.map, frames.odom, valid_until, self.slam.T_map_odom)
         self._tf.send_transform(moved, frozen=True)
 
     def _publish_pose(self, update: SlamUpdate, stamp_ns: int) -> None:
