@@ -108,7 +108,7 @@ class Run:
 
     def clock(self) -> None:
         """6. `/clock`."""
-        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)))
+        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)), frozen=True)
 
     def _check(self) -> None:
         observation = self._observer.observe()

@@ -120,16 +120,29 @@ class Node(NodeParameters, NodeGraph):
         return self.add_endpoint(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
 
     def create_subscription(
-        self, msg_type: type[M], topic: str, callback: Callable[[M], Any], qos: QoS | int = 10
+        self,
+        msg_type: type[M],
+        topic: str,
+        callback: Callable[[M], Any],
+        qos: QoS | int = 10,
+        *,
+        frozen: bool = False,
     ) -> Subscription[M]:
         """Call back for every message on a topic, in this node's spin.
+
+        Args:
+            msg_type: Class of the messages.
+            topic: Name, which is resolved and remapped.
+            callback: Takes a message.
+            qos: What is asked for; a number is the depth of a reliable, volatile one.
+            frozen: Whether the callback, and whoever it passes them to, leaves messages as they are: then it
+                can be given the object that others hear too. Without it every message is its own.
 
         Raises:
             BridgeError: an invalid name.
         """
-        return self.add_endpoint(
-            Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
-        )
+        name = self.resolve_name(topic)
+        return self.add_endpoint(Subscription(self, msg_type, name, callback, as_qos(qos), frozen=frozen))
 
     def create_timer(
         self, period_ns: Period, callback: Callable[[], Any], *, autostart: bool = True

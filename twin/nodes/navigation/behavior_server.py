@@ -168,13 +168,13 @@ class BehaviorServerNode:
                     if step.done:
                         elapsed = duration(self.node.now_ns - started)
                         return new(served.action.Result, total_elapsed_time=elapsed)
-                    self._publisher.publish(twist_from_planar(step.v, step.w))
+                    self._publisher.publish(twist_from_planar(step.v, step.w), frozen=True)
                     handle.publish_feedback(_feedback(served, behavior.progress))
                     yield due
             except _Failed as failure:
                 return _aborted(handle, name, served, failure)
             finally:
-                self._publisher.publish(twist_from_planar(0.0, 0.0))
+                self._publisher.publish(twist_from_planar(0.0, 0.0), frozen=True)
 
         return execute
 

@@ -68,7 +68,7 @@ class ControllerServerNode:
         """What was followed until another path came."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._display = ControllerDisplay(node, robot_pose.frames.map)
-        node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        node.create_subscription(Odometry, "odom", self._on_odom, 1, frozen=True)
         node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
         ActionServer(node, FollowPath, "follow_path", self._execute)
 
@@ -201,4 +201,4 @@ class ControllerServerNode:
         return False
 
     def _drive(self, v: float, w: float) -> None:
-        self._publisher.publish(twist_from_planar(v, w))
+        self._publisher.publish(twist_from_planar(v, w), frozen=True)

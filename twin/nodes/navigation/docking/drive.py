@@ -47,7 +47,7 @@ class DockDrive:
 
     def stop(self) -> None:
         """Command to stand."""
-        self._publisher.publish(twist_from_planar(0.0, 0.0))
+        self._publisher.publish(twist_from_planar(0.0, 0.0), frozen=True)
 
     def drive(
         self,
@@ -99,7 +99,7 @@ class DockDrive:
     def _step(self, control: LineApproach, pose: Pose2) -> bool:
         """Command one period; return whether the robot is there."""
         step = control.update(pose, self._period_ns * 1e-9)
-        self._publisher.publish(twist_from_planar(step.v, step.w))
+        self._publisher.publish(twist_from_planar(step.v, step.w), frozen=True)
         if step.failed_reason is not None:
             _, lateral, yaw = control.errors(pose)
             where = f"{lateral:+.3f} m aside, {math.degrees(yaw):+.1f}° off"
