@@ -111,7 +111,7 @@ def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | 
     """Return the type of a key, and its default."""
     if declaration.config is not None:
         inner = group_of(declaration.config)
-        return (inner, inner()) if inner.model_fields else None
+        return (inner, inner.model_construct()) if inner.model_fields else None
     domain = declaration.domain
     if domain is None:
         return None
