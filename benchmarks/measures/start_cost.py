@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -76,7 +77,9 @@ tell(first, start(sys.argv[1]), start(sys.argv[2]))
 
 def told(code: str, *args: str) -> list[Any]:
     """Return what a process says of itself: its CPU time [s], and more."""
-    run = subprocess.run([sys.executable, "-c", code, *args], capture_output=True, check=True, text=True)
+    warm = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    command = [sys.executable, "-c", code, *args]
+    run = subprocess.run(command, capture_output=True, check=True, text=True, env=warm)
     answer: list[Any] = json.loads(run.stdout.splitlines()[-1])
     return answer
 
