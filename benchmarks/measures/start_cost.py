@@ -1,7 +1,7 @@
 """What a start costs, as ratios of CPU time that hold on a noisy machine: each to its own limit, in turns.
 
-- From `twin run` to the first tick, with recording and warm caches, to the bare imports of those libraries that
-  the run has loaded by then.
+- From `twin run` to the first tick, with recording and warm caches, to the bare imports of those libraries
+  that the run has loaded by then.
 - Another run in the same process, of the same and of another scenario, to the first start of the process.
 - `twin --help` to the imports of typer and rich.
 
@@ -112,7 +112,8 @@ def main() -> None:
     options = parser.parse_args()
     files = [str(file) for file in options.scenarios]
     with tempfile.TemporaryDirectory() as folder:
-        needed = {file: told(_FIRST_TICK, "run", file, "--out", folder)[1] for file in files}  # and warm caches
+        # This also fills the caches.
+        needed = {file: told(_FIRST_TICK, "run", file, "--out", folder)[1] for file in files}
         best: dict[str, float] = {}
 
         def took(name: str, cpu: float) -> None:

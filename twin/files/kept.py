@@ -1,7 +1,7 @@
 """What was computed at some cost and may be needed again, in the user's cache folder.
 
-Each value is one file, written whole. One that is missing, broken or of somebody else's making is as if it had
-never been there: whoever asks computes it anew, and says by its key and its content whether it still holds.
+Each value is one file, written whole. One that is missing or broken is as if it had never been there: whoever
+asks computes it anew, and knows by its key and its content whether it still holds.
 """
 
 from __future__ import annotations

@@ -29,7 +29,9 @@ M = TypeVar("M", bound=BaseModel)
 class StrictModel(BaseModel):
     """Base of every file schema: unknown keys are errors, values are frozen, docstrings describe."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, str_min_length=1, defer_build=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, str_min_length=1, defer_build=True
+    )
 
     @classmethod
     def descriptions(cls) -> Mapping[str, str]:

@@ -21,7 +21,7 @@ _MAP_UPDATE_INTERVAL_NS = 2_000_000_000
 
 
 def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNode | None:
-    """Create the nodes that the scenario's `localisation` asks for, and import no others; return the one that maps, if any."""
+    """Create the nodes that the scenario's `localisation` asks for; return the one that maps, if any."""
     config = context.config.localisation
     if config is None or config.type == "none":
         return None

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class RobotStack:
-    """Builds and holds the nodes of one robot; what a robot lacks (drive, lidar, arm) is left out, and not imported."""
+    """Builds and holds the nodes of one robot; what a robot lacks is not even imported."""
 
     def __init__(self, context: StackContext) -> None:
         bus, handle, namespace = context.bus, context.handle, context.namespace
