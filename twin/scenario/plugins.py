@@ -162,7 +162,7 @@ class OneOfKind(OneOf):
         found: dict[str, Any] = {}
         for key, value in data.items():
             found[key] = value
-            if ":" not in key and key not in cls.of.names():
+            if ":" not in key and key not in cls.of.shipped and key not in cls.of.names():
                 faults.append(Fault((key,), "", cls.of.names()))
             elif key not in cls.model_fields:
                 try:
