@@ -17,7 +17,7 @@ import llvmlite
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 from numba.extending import typeof_impl
 
 from twin.navigation._jit import Kernel
@@ -36,7 +36,7 @@ class KernelCache(FunctionCache):
         Machine code needs numba's runtime; of all else that a compilation needs it is loaded without.
         """
         rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]
+        with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:

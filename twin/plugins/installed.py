@@ -33,7 +33,9 @@ def _packages(_path: tuple[str, ...]) -> Mapping[str, list[str]]:
 
 @lru_cache
 def _points(_path: tuple[str, ...]) -> EntryPoints:
-    return metadata.entry_points()
+    """Return all that are installed: one look through the packages does for every group."""
+    found: EntryPoints = metadata.entry_points()  # type: ignore[assignment]
+    return found
 
 
 @lru_cache

@@ -35,7 +35,7 @@ class ParameterGroup(StrictModel):
         """Return what is told of the keys."""
         groups = [base for base in cls.__mro__ if issubclass(base, ParameterGroup)]
         declared = ChainMap(*(dict(group.declared) for group in groups))
-        return {name: one.text for name, one in declared.items()} | super().descriptions()
+        return {name: one.text for name, one in declared.items()} | dict(super().descriptions())
 
     if TYPE_CHECKING:
 

@@ -36,6 +36,6 @@ class _Later:
         validator = self.model.__pydantic_validator__
         if info.mode == "json":  # whose strictness is another: a list may be a tuple
             made: BaseModel = validator.validate_json(to_json(value), strict=True, context=info.context)
-            return made
-        made = validator.validate_python(value, context=info.context)
+        else:
+            made = validator.validate_python(value, context=info.context)
         return made

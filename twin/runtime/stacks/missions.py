@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.action_types import (
     BackUp,
@@ -41,7 +41,9 @@ from twin.scenario.missions import (
     VelocityProfile,
 )
 from twin.strict_yaml import StrictModel
-from twin.warehouse.arena import Arena
+
+if TYPE_CHECKING:
+    from twin.warehouse.arena import Arena
 
 
 class IdleMission:

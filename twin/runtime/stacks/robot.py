@@ -19,10 +19,10 @@ from twin.nodes.transforms import TransformListenerNode
 from twin.runtime.defaults import from_description as derive
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.localisation import build_localisation
-from twin.runtime.stacks.odometry_filter import odometry_filter, warn_of_unpublished_sources
 
 if TYPE_CHECKING:
     from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+    from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
 
 
 class RobotStack:
@@ -41,12 +41,15 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        fusion, told = odometry_filter(context, self.frames)
+        fusion: EkfNodeConfig | None = None
+        if context.config.odometry.type != "wheels":
+            from twin.nodes.navigation.localisation.ekf import EkfNode
+            from twin.runtime.stacks.odometry_filter import odometry_filter, warn_of_unpublished_sources
+
+            fusion, told = odometry_filter(context, self.frames)
         self.drive = self._build_drive(description, enable_odom_tf=fusion is None or not fusion.publish_tf)
         fused = None
         if fusion is not None:
-            from twin.nodes.navigation.localisation.ekf import EkfNode
-
             fused = EkfNode(bus, fusion, namespace=namespace)
             for sentence in told:
                 fused.node.get_logger().warn(sentence)
