@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
 from twin.bridge.actions import ActionServer, Execute, GoalHandle
@@ -16,8 +16,10 @@ from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.navigation import recovery
 from twin.navigation.warm_up import warm_up_behaviors
-from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
+
+if TYPE_CHECKING:
+    from twin.nodes.navigation.costmaps.costmap import CostmapNode
 
 Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.AssistedTeleop
 B = TypeVar("B", bound=Behavior)
@@ -66,7 +68,8 @@ class BehaviorServerNode:
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("behavior_server", namespace)
-        warm_up_behaviors()
+        if costmap is not None:
+            warm_up_behaviors()
         self.config = config
         self._robot_pose = robot_pose
         self._costmap = costmap
