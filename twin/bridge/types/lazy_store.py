@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from rosbags.interfaces import Msgdef
+from rosbags.serde import primitives as primitives  # for generated code: not in the loop
 from rosbags.serde.cdr import generate_deserialize_cdr, generate_getsize_cdr, generate_serialize_cdr
 from rosbags.typesys.base import normalize_fieldname
 from rosbags.typesys.store import Typestore
