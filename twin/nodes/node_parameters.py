@@ -58,7 +58,9 @@ def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = 
 
 
 def descriptor_of(declaration: Declaration, *, read_only: bool = False) -> ParameterDescriptor:
-    """Return what a value is checked by; words say more than ranges, whose edges are always valid."""
+    """Return what `ros2 param describe` tells, but for the text; words say more than ranges, whose edges are
+    always valid.
+    """
     domain = declaration.domain
     assert domain is not None
     descriptor = new(

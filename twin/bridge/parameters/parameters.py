@@ -50,8 +50,8 @@ class Parameters(ABC):
         """Called for every change."""
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
-        self._descriptions: dict[str, Callable[[str], str]] = {}
-        """What tells the description of a parameter, of which the descriptor then has none."""
+        self._texts: dict[str, Callable[[str], str]] = {}
+        """Who tells a parameter's description, if the descriptor has none."""
 
     @property
     @abstractmethod
@@ -97,13 +97,13 @@ class Parameters(ABC):
         return self._parameters[name]
 
     def declare_together(
-        self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]], describe: Callable[[str], str]
+        self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]], text_of: Callable[[str], str]
     ) -> None:
         """Declare many parameters, and tell of them in one event.
 
         Args:
-            parameters: (name, value, descriptor without description) of each.
-            describe: Takes a name and returns the description, when somebody asks for it.
+            parameters: Names, values and descriptors, which need no description.
+            text_of: Returns a parameter's description by its name; called when somebody asks for it.
 
         Raises:
             BridgeError: as `declare_parameter`.
@@ -113,7 +113,7 @@ class Parameters(ABC):
         try:
             for each in parameters:
                 self.declare_parameter(*each)
-                self._descriptions[each[0]] = describe
+                self._texts[each[0]] = text_of
         finally:
             self._tell = tell
         tell(together)
@@ -130,7 +130,8 @@ class Parameters(ABC):
         """
         if self._known(name).read_only:
             raise errors.ParameterImmutableException(self.fully_qualified_name, name)
-        self._forget(name)
+        del self._parameters[name], self._descriptors[name]
+        self._texts.pop(name, None)
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a parameter; one without a value if undeclared ones are allowed.
@@ -177,9 +178,10 @@ class Parameters(ABC):
         """
         if self._undeclared_is_fine(name):
             return new(ParameterDescriptor)
-        described = self._descriptions.get(name)
-        descriptor = self._known(name)
-        return replace(descriptor, description=described(name) if described else descriptor.description)
+        known = self._known(name)
+        if not known.description and name in self._texts:
+            return replace(known, description=self._texts[name](name))
+        return replace(known)
 
     def list_parameters(self, prefixes: Sequence[str] = (), depth: int = 0) -> ListParametersResult:
         """Return names below the prefixes, at most `depth` levels deep; 0 is as deep as there are names."""
@@ -210,7 +212,7 @@ class Parameters(ABC):
         if descriptor.dynamic_typing:
             descriptor.type = parameter.kind.value
         self._parameters[name], self._descriptors[name] = parameter, descriptor
-        self._descriptions.pop(name, None)
+        self._texts.pop(name, None)
         return parameter
 
     def set_parameters_atomically(self, parameters: Sequence[Parameter]) -> SetParametersResult:
@@ -271,7 +273,8 @@ class Parameters(ABC):
         name = parameter.name
         if parameter.kind is Type.NOT_SET and declared_as is None:
             event.deleted_parameters.append(parameter.to_parameter_msg())
-            self._forget(name)
+            for kept in (self._parameters, self._descriptors, self._texts):
+                kept.pop(name, None)
             return
         kept = declared_as or self._descriptors.get(name) or new(ParameterDescriptor, dynamic_typing=True)
         self._descriptors[name] = kept
@@ -281,10 +284,6 @@ class Parameters(ABC):
         is_new = self.get_parameter_or(name).kind is Type.NOT_SET
         (event.new_parameters if is_new else event.changed_parameters).append(parameter.to_parameter_msg())
         self._parameters[name] = parameter
-
-    def _forget(self, name: str) -> None:
-        for kept in (self._parameters, self._descriptors, self._descriptions):
-            kept.pop(name, None)
 
     def _event(self) -> ParameterEvent:
         return new(ParameterEvent, stamp=stamp(self.bus.clock.now_ns), node=self.fully_qualified_name)
