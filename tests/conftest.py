@@ -1,4 +1,4 @@
-"""What tests start as processes is this checkout's code, wherever the package is installed; a cache of their own."""
+"""What tests start as processes is this checkout's code, wherever the package is installed."""
 
 from __future__ import annotations
 

@@ -59,9 +59,7 @@ def test_the_oldest_go_first(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(module, "MOST", 3)
     for number in range(6):
         keep("tree", str(number), number)
-        for file in (
-            folder / "tree"
-        ).iterdir():  # as if a second had passed, whatever the file system's clock
+        for file in (folder / "tree").iterdir():  # as if a second had passed
             stat = file.stat()
             module.os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns - 1_000_000_000))
     assert [kept("tree", str(number)) for number in range(6)] == [None, None, None, 3, 4, 5]
