@@ -141,6 +141,30 @@ def test_unwritable_folder(make_world: Any, tmp_path: Path) -> None:
         RerunSink(tmp_path / "file" / "a.rrd").declare(make_world())
 
 
+def test_a_full_disk_ends_the_run(make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also if it fills up while the run is not looking: told with the block after, and again at the end."""
+    sink = RerunSink(tmp_path / "a.rrd")
+    run = make_run(duration_s=3.0)
+    sink.declare(run.world)
+
+    def full(recording: Any, path: Path) -> None:
+        raise RecordingError(f"{path}: is the disk full?")
+
+    monkeypatch.setattr("twin.recording.stream.flush", full)
+
+    def play() -> None:
+        for samples in run.ticks():
+            for sample in samples:
+                sink.on_sample(sample)
+            sink.on_tick(run.world)
+
+    with pytest.raises(RecordingError, match="is the disk full"):
+        play()
+    assert run.world.time_ns <= 1_900_000_000
+    with pytest.raises(RecordingError, match="is the disk full"):
+        sink.close()
+
+
 def test_config_names_every_problem() -> None:
     with pytest.raises(RecordingError, match=r"poses_hz is 0.*loss_s is -1"):
         RecordingConfig(poses_hz=0, loss_s=-1)

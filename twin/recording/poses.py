@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from twin.geometry import Array
 from twin.recording.columns import Chunk, sim_time, transforms
@@ -47,12 +48,8 @@ class Poses(Rows[tuple[int, Array, Array]]):
         """Yield what has moved."""
         times, xyz, quat_wxyz = zip(*rows, strict=True)
         poses = np.concatenate((np.array(xyz), np.array(quat_wxyz)), axis=2)
-        moved = np.empty(poses.shape[:2], dtype=bool)
-        for pose, has_moved in zip(poses, moved, strict=True):
-            (np.abs(pose - self._sent) > self._tolerance).any(axis=1, out=has_moved)
-            np.copyto(self._sent, pose, where=has_moved[:, np.newaxis])
         self._stage.visit(poses[:, self._bases, :3].reshape(-1, 3))
-        at, bodies = np.nonzero(moved)
+        at, bodies = np.nonzero(self._moved(poses))
         if len(at):
             kept = poses[at, bodies]
             yield transforms(
@@ -63,3 +60,22 @@ class Poses(Rows[tuple[int, Array, Array]]):
                 kept[:, :3],
                 kept[:, [4, 5, 6, 3]],
             )
+
+    def _moved(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which of poses, shape (times, n, 7), are sent, shape (times, n)."""
+        before = np.concatenate((self._sent[np.newaxis], poses[:-1]))
+        moved: NDArray[np.bool_] = (np.abs(poses - before) > self._tolerance).any(axis=2)
+        # A body that moves all the time, or never does, is compared with the pose before; others creep.
+        rests = ~(np.abs(poses - self._sent) > self._tolerance).any(axis=(0, 2))
+        moved[:, rests] = False
+        always = moved.all(axis=0)
+        self._sent[always] = poses[-1, always]
+        creeps = np.flatnonzero(~(rests | always))
+        if len(creeps):
+            sent = self._sent[creeps]
+            for i, pose in enumerate(poses[:, creeps]):
+                differs = (np.abs(pose - sent) > self._tolerance).any(axis=1)
+                sent[differs] = pose[differs]
+                moved[i, creeps] = differs
+            self._sent[creeps] = sent
+        return moved

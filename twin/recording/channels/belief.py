@@ -142,9 +142,10 @@ class BeliefChannel(Channel[Link]):
 
     def _poses(self, link: Link, T_map_anchor: Pose2) -> dict[str, Pose2]:
         """Return where the robot was, as far as that is known, by the name of the trail."""
-        poses = {"odometry": T_map_anchor @ link.pose}
+        T_odom_base = link.pose
+        poses = {"odometry": T_map_anchor @ T_odom_base}
         if self._T_map_odom is not None:
-            poses["estimate"] = self._T_map_odom @ link.pose
+            poses["estimate"] = self._T_map_odom @ T_odom_base
         if link.truth is not None:
             poses["truth"] = link.truth.to_pose2()
         return poses
