@@ -304,7 +304,7 @@ def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    config = RecordingConfig(poses_hz=scenario.recording.poses_hz, block_s=3.0)
+    config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
     return RerunSink(
         out / f"{scenario.name}.rrd",
         config=config,
