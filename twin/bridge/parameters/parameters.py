@@ -273,8 +273,9 @@ class Parameters(ABC):
         name = parameter.name
         if parameter.kind is Type.NOT_SET and declared_as is None:
             event.deleted_parameters.append(parameter.to_parameter_msg())
-            for kept in (self._parameters, self._descriptors, self._texts):
-                kept.pop(name, None)
+            self._parameters.pop(name, None)
+            self._descriptors.pop(name, None)
+            self._texts.pop(name, None)
             return
         kept = declared_as or self._descriptors.get(name) or new(ParameterDescriptor, dynamic_typing=True)
         self._descriptors[name] = kept
