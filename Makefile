@@ -29,7 +29,8 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a run to its own physics and rays alone, layer by layer, a conversion to MuJoCo's compilation, messages to a put; memory
+bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, a conversion to MuJoCo's compilation, messages to a put; memory
+	$(BIN)/python -m benchmarks.measures.start_cost
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
 	$(BIN)/python -m benchmarks.measures.memory
