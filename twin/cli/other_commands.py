@@ -6,6 +6,7 @@ An entry point names a `typer.Typer`. Every command is loaded when it is called,
 from __future__ import annotations
 
 import sys
+from functools import cached_property
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,11 @@ class Commands(TyperGroup):
         super().__init__(**given)
         self.commands = OwnCommands()
 
+    @cached_property
+    def others(self) -> dict[str, list[EntryPoint]]:
+        """Entry points by name."""
+        return _others()
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the list of commands."""
         _import_help()
@@ -41,15 +47,15 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
-        return [*self.commands, *(name for name in _others() if name not in self.commands)]
+        return [*self.commands, *(name for name in self.others if name not in self.commands)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return what a list shows of a command."""
         if own := TABLE.get(cmd_name):
             return TyperCommand(cmd_name, help=own.summary, rich_help_panel=own.panel)
-        if cmd_name not in (others := _others()):
+        if cmd_name not in self.others:
             return None
-        return TyperCommand(cmd_name, help=_summary(others[cmd_name][0]), rich_help_panel=PANEL)
+        return TyperCommand(cmd_name, help=_summary(self.others[cmd_name][0]), rich_help_panel=PANEL)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command itself and its arguments.
@@ -60,7 +66,7 @@ class Commands(TyperGroup):
         name = args[0]
         if name in self.commands:
             return name, self.commands[name], args[1:]
-        if points := _others().get(name):
+        if points := self.others.get(name):
             return name, _load(name, points), args[1:]
         if name in _BESIDE_TWIN and not ctx.resilient_parsing:
             distribution, folder = _BESIDE_TWIN[name]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,9 @@ def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, 
     return data
 
 
+@lru_cache(maxsize=16)
 def _compose(text: str) -> yaml.Node | None:
+    """Return the nodes of a text, which nobody changes: of two equal runs the second reads nothing."""
     loader = _CoreLoader(text)
     try:
         return loader.get_single_node()
