@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
-from twin.recording.frames import WORLD, Frames
+from twin.recording.frames import Frames
+from twin.recording.writer import Rows, Writer
 
-if TYPE_CHECKING:  # rerun takes 0.6 s to import: only a run that records pays for it
+if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays for it
     import rerun as rr
 
     from twin.bridge.topics import Sample
-    from twin.recording.belief import Belief
-    from twin.recording.channels.channel import Channel, Context
-    from twin.recording.columns import TransformColumns
+    from twin.recording.channels.channel import Context
     from twin.recording.extents import RobotBox, Stage
+    from twin.recording.poses import Poses
     from twin.sim.world import World
 
+    _Take = Callable[[Sample[Any]], None]
+
 _NS = 1_000_000_000
-_RING_RADIUS = 0.3
-"""Around the estimated pose of a robot that has no body [m]."""
+_COLLECTING = 0.9
+"""Part of what a killed run loses during which rows are collected; the rest of it is for writing them."""
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 
 
@@ -37,8 +37,8 @@ class RecordingConfig:
 
     poses_hz: float = 25.0
     """Rate at which poses of bodies, trails and errors are sampled; only what moved is kept."""
-    block_s: float = 1.0
-    """Simulated time between two writes to the file [s]; a killed run loses at most this much."""
+    loss_s: float = 1.0
+    """A killed run loses at most so much simulated time at its end [s]."""
     move_tolerance: float = 1e-4
     """A body has moved when a coordinate [m] or quaternion component differs by more from what was kept."""
     trail_step_m: float = 0.05
@@ -49,7 +49,7 @@ class RecordingConfig:
     def __post_init__(self) -> None:
         problems = [
             f"recording.{name} is {getattr(self, name)}; valid: a positive number"
-            for name in ("poses_hz", "block_s", "trail_step_m", "max_particles")
+            for name in ("poses_hz", "loss_s", "trail_step_m", "max_particles")
             if not getattr(self, name) > 0
         ]
         if problems:
@@ -60,9 +60,9 @@ class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
     The simulator's truth is drawn in `world`; a lidar's points lie where it truly saw them; what the robot
-    believes is a ghost with a trail of its own. Rows wait in buffers and go to the file once a block. Order:
-    construct, `bus.tap(sink.on_sample)`, `declare(world)`, then `on_tick(world)` after every tick and
-    `close(verdict)`.
+    believes is a ghost with a trail of its own. The run only puts rows aside: a writer makes columns of them
+    and sends them, a block of simulated time at once. Order: construct, `bus.tap(sink.on_sample)`,
+    `declare(world)`, then `on_tick(world)` after every tick and `close(verdict)`.
     """
 
     def __init__(
@@ -86,10 +86,11 @@ class RerunSink:
         self._ids = (application_id, recording_id)
         self._world: World | None = None
         self._early: list[Any] = []
-        self._channels: dict[tuple[str, str], Channel | None] = {}
-        self._beliefs: dict[str, Belief] = {}
+        self._sources: list[Rows[Any]] = []
+        self._takers: dict[tuple[str, str], _Take | None] = {}
         self._period = period_of(self._config.poses_hz)
-        self._block_ns = round(_NS * self._config.block_s)
+        self._block_ns = round(_NS * _COLLECTING * self._config.loss_s)
+        self._writing_ns = round(_NS * (1.0 - _COLLECTING) * self._config.loss_s)
         self._closed = False
 
     def declare(self, world: World, wheels: Mapping[str, Collection[str]] = NO_WHEELS) -> None:
@@ -104,72 +105,72 @@ class RerunSink:
         """
         from twin.recording.blueprint import layout
         from twin.recording.channels.channel import Context
-        from twin.recording.columns import TransformColumns
         from twin.recording.extents import Stage, robot_box
+        from twin.recording.poses import Poses
         from twin.recording.shapes import declare_shapes
         from twin.recording.stream import declare_frames, open_recording
 
         self._world = world
-        self._names = np.array(world.body_names, dtype=object)
         shapes = world.shapes()
-        xyz, _ = world.body_poses()
-        self._frames = Frames(world.body_names)
-        robots = [robot_box(world, shapes, name) for name in self._frames.robots]
-        self._robots: dict[str, RobotBox] = {box.robot: box for box in robots}
-        self._bases = [world.body_names.index(box.base) for box in robots]
-        self._stage: Stage = Stage(world, shapes, robots)
-        blueprint = layout(self._stage, robots)
+        frames = Frames(world.body_names)
+        self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
+        self._stage: Stage = Stage(world, shapes, self._robots)
+        blueprint = layout(self._stage, self._robots)
         self._recording: rr.RecordingStream = open_recording(self._path, *self._ids, blueprint)
-        self._poses: TransformColumns = TransformColumns("/tf")
+        self._poses: Poses = Poses(
+            world.body_names,
+            self._stage,
+            [world.body_names.index(box.base) for box in self._robots],
+            self._config.move_tolerance,
+        )
+        self._sources.append(self._poses)
         self._context: Context = Context(
             recording=self._recording,
-            frames=self._frames,
-            belief=self._belief,
+            frames=frames,
             true_pose=world.pose,
             start_ns=world.time_ns,
+            period=self._period,
+            trail_step_m=self._config.trail_step_m,
             max_particles=self._config.max_particles,
+            radii={box.robot: box.radius for box in self._robots},
             wheels=wheels,
         )
-        declare_frames(self._recording, self._frames)
+        declare_frames(self._recording, frames)
         self._set_stage()
         declare_shapes(self._recording, shapes, world.pose)
-        self._last_xyz = np.full_like(xyz, np.inf)
-        self._last_quat = np.zeros((len(xyz), 4))
-        self._next_pose_ns = world.time_ns
-        self._next_block_ns = world.time_ns + self._block_ns
+        self._writer = Writer(self._recording, self._end_block)
+        self._next_pose_ns = self._next_block_ns = self._written_ns = world.time_ns
         self.on_tick(world)
-        self._send()
+        self._takers.clear()
         early, self._early = self._early, []
         for sample in early:
             self.on_sample(sample)
 
     def on_sample(self, sample: Sample[Any]) -> None:
         """Keep what is shown of a message (a callback for `Bus.tap`)."""
-        if self._world is None:
-            # The bus lends a message only during the call.
-            kept = {name: getattr(sample, name) for name in ("topic", "msgtype", "time_ns", "payload")}
-            self._early.append(SimpleNamespace(**kept, message=deepcopy(sample.message)))
-            return
         key = (sample.topic, sample.msgtype)
-        if key not in self._channels:
-            from twin.recording.channels.table import open_channel
-
-            self._channels[key] = open_channel(self._context, sample.topic, sample.msgtype)
-        channel = self._channels[key]
-        if channel is not None and not self._closed:
-            channel.take(sample)
+        if key not in self._takers:
+            self._takers[key] = self._taker(*key)
+        take = self._takers[key]
+        if take is not None:
+            take(sample)
 
     def on_tick(self, world: World) -> None:
-        """Sample the poses when they are due, and write the block when it is full."""
+        """Sample the poses when they are due, and have the block written when it is full.
+
+        Raises:
+            RecordingError: A block could not be written.
+        """
         time_ns = world.time_ns
         if time_ns >= self._next_pose_ns:
             self._next_pose_ns = next_due(self._period, time_ns)
-            self._sample_poses(time_ns, world)
+            self._poses.rows.append((time_ns, *world.body_poses()))
         if time_ns >= self._next_block_ns:
+            self._writer.write(self._sources)
             self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
-            self._send()
-            if self._stage.grow():
-                self._set_stage()
+            self._written_ns = time_ns + self._writing_ns
+        elif time_ns >= self._written_ns:
+            self._writer.wait()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
         """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored.
@@ -183,38 +184,46 @@ class RerunSink:
         from twin.recording.stream import end_recording, log_verdict
 
         self._closed = True
-        self._sample_poses(self._world.time_ns, self._world)
+        self._takers.clear()
+        self._poses.rows.append((self._world.time_ns, *self._world.body_poses()))
         try:
+            self._writer.write(self._sources)
+            self._writer.wait()
             if verdict is not None:
                 log_verdict(self._recording, verdict)
             self._stage.fit()
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            self._recording.send_blueprint(layout(self._stage, [*self._robots.values()], self._world.time_ns))
-            self._send()
+            self._recording.send_blueprint(layout(self._stage, self._robots, self._world.time_ns))
         finally:
+            self._writer.close()
             end_recording(self._recording, self._path)
 
-    def _sample_poses(self, time_ns: int, world: World) -> None:
-        xyz, quat = world.body_poses()
-        tolerance = self._config.move_tolerance
-        moved = (np.abs(xyz - self._last_xyz) > tolerance).any(axis=1)
-        moved |= (np.abs(quat - self._last_quat) > tolerance).any(axis=1)
-        rows = np.flatnonzero(moved)
-        self._stage.visit(xyz[self._bases])
-        if len(rows):
-            self._last_xyz[rows] = xyz[rows]
-            self._last_quat[rows] = quat[rows]
-            names = self._names[rows].tolist()
-            self._poses.append(time_ns, WORLD, names, xyz[rows], quat[rows][:, [1, 2, 3, 0]])
+    def _taker(self, topic: str, msgtype: str) -> _Take | None:
+        """Return what to do with the messages of a topic, if anything."""
+        from twin.recording.channels.table import SHOWN_TYPES, open_channel
 
-    def _send(self) -> None:
+        if self._closed or msgtype not in SHOWN_TYPES:
+            return None
+        if self._world is None:
+            return self._keep
+        channel = open_channel(self._context, topic, msgtype)
+        if channel is None:
+            return None
+        self._sources.append(channel)
+        return channel.take
+
+    def _keep(self, sample: Sample[Any]) -> None:
+        """Keep a sample until the world is there; the bus lends its message only during the call."""
+        kept = {name: getattr(sample, name) for name in ("topic", "msgtype", "time_ns", "payload")}
+        self._early.append(SimpleNamespace(**kept, message=deepcopy(sample.message)))
+
+    def _end_block(self) -> None:
+        """Make room for robots that left the stage, and see to it that all is in the file."""
         from twin.recording.stream import flush
 
-        self._poses.send(self._recording)
-        for channel in self._channels.values():
-            if channel is not None:
-                channel.send(self._recording)
+        if self._stage.grow():
+            self._set_stage()
         flush(self._recording, self._path)
 
     def _set_stage(self) -> None:
@@ -224,17 +233,3 @@ class RerunSink:
 
         declare_floor(self._recording, self._stage.low, self._stage.high)
         declare_map_eye(self._recording, self._stage.low, self._stage.high)
-
-    def _belief(self, namespace: str) -> Belief:
-        if namespace not in self._beliefs:
-            from twin.recording.belief import Belief
-
-            box = self._robots.get(self._frames.robot(namespace))
-            self._beliefs[namespace] = Belief(
-                self._context,
-                namespace,
-                period=self._period,
-                trail_step_m=self._config.trail_step_m,
-                radius=box.radius if box else _RING_RADIUS,
-            )
-        return self._beliefs[namespace]

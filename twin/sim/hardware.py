@@ -39,7 +39,7 @@ class HardwareConfig:
 
 
 class JointReading(NamedTuple):
-    """Measured joints in the order of `Hardware.joint_names`, each of shape (n,)."""
+    """Measured joints in the order of `Hardware.joint_names`, each of shape (n,) and read-only."""
 
     position: Array
     """[rad] or [m]"""
@@ -47,6 +47,12 @@ class JointReading(NamedTuple):
     """[rad/s] or [m/s]"""
     effort: Array
     """What the drives move each joint with; a drive moves those that mimic its joint as hard [Nm] or [N]."""
+
+
+def _reading(*measured: Array) -> JointReading:
+    for values in measured:
+        values.flags.writeable = False  # who asks twice at one time is given the same
+    return JointReading(*measured)
 
 
 class Hardware:
@@ -95,7 +101,7 @@ class Hardware:
             [self.config.position_noise_stddev, self.config.velocity_noise_stddev], n
         )
         at_start = np.rint(data.qpos[self._qpos] * scale / self._tick) * self._tick
-        self._reading = JointReading(at_start, np.zeros(n), np.zeros(n))
+        self._reading = _reading(at_start, np.zeros(n), np.zeros(n))
 
         prefix = f"{robot}/"
         self._actuators = np.array(
@@ -147,7 +153,7 @@ class Hardware:
             measured[i], measured[n + i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
             self._counts[i] = count
         effort = data.qfrc_actuator[self._drive_dof] * self._drive_share
-        self._step, self._reading = step, JointReading(measured[:n], measured[n:], effort)
+        self._step, self._reading = step, _reading(measured[:n], measured[n:], effort)
         return self._reading
 
     def command(self, joint: str, value: float) -> None:

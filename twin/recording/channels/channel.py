@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import rerun as rr
 
 from twin.geometry import Pose3
-from twin.recording.belief import Belief
-from twin.recording.columns import Columns
+from twin.periods import Period
 from twin.recording.frames import Frames
+from twin.recording.writer import Row, Rows
 
 if TYPE_CHECKING:
     from twin.bridge.topics import Sample
@@ -24,35 +24,33 @@ class Context:
 
     recording: rr.RecordingStream
     frames: Frames
-    belief: Callable[[str], Belief]
-    """Returns the belief of a namespace's robot."""
     true_pose: Callable[[str], Pose3]
     """Returns the pose of a body in `world`, now."""
     start_ns: int
     """Simulated time at which the recording begins [ns]."""
+    period: Period
+    """Trails and errors are sampled at its multiples [ns]."""
+    trail_step_m: float
+    """Length of a segment of a trail [m]."""
     max_particles: int
+    radii: Mapping[str, float]
+    """Of robots, on the floor [m]."""
     wheels: Mapping[str, Collection[str]]
     """By robot: joints that are not worth a plot, as they turn without end."""
 
 
-class Channel(ABC):
-    """One topic on its way into the recording."""
+class Channel(Rows[Row]):
+    """One topic on its way into the recording: `take` puts rows aside, `chunks` draws them."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
-        """Begin with no columns; a channel adds its own."""
+        super().__init__()
         self.context = context
+        self.recording = context.recording
         self.namespace = namespace
         """'' or a robot's name."""
         self.robot = context.frames.robot(namespace)
         self.topic = topic
-        self.columns: list[Columns[*tuple[Any, ...]]] = []
-        """What is sent with a block."""
 
     @abstractmethod
     def take(self, sample: Sample[Any]) -> None:
-        """Keep what is shown of a message."""
-
-    def send(self, recording: rr.RecordingStream) -> None:
-        """Send the block."""
-        for columns in self.columns:
-            columns.send(recording)
+        """Keep what is shown of a message, which itself is only lent."""

@@ -1,15 +1,17 @@
-"""Messages that are plotted or listed over time: velocities, joints, transforms, states, log."""
+"""Messages that are plotted or listed over time: velocities, joints, states, log."""
 
 from __future__ import annotations
 
-from itertools import takewhile
+from collections.abc import Iterator
+from itertools import groupby, takewhile
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import rerun as rr
 
+from twin.geometry import Array
 from twin.recording.channels.channel import Channel, Context
-from twin.recording.columns import Columns, log_lines, scalars, states
-from twin.recording.frames import BELIEF_FRAMES
+from twin.recording.columns import Chunk, Component, scalars, sim_time
 from twin.recording.palette import Palette
 from twin.recording.shapes import Rgba8
 
@@ -20,79 +22,70 @@ COMMANDED_COLOUR = (255, 150, 40, 255)
 MEASURED_COLOUR = (80, 160, 255, 255)
 LOG_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "CRITICAL"}
 """rcl_interfaces/msg/Log to Rerun."""
+_STATE = Component(rr.StateChange, "state")
+_TEXT, _LEVEL = (Component(rr.TextLog, name) for name in ("text", "level"))
 
 
-class VelocityChannel(Channel):
+class VelocityChannel(Channel[tuple[int, float, float]]):
     """Forward and turning velocity, commanded (geometry_msgs/Twist) or measured (nav_msgs/Odometry)."""
+
+    _entities: tuple[str, ...] = ()
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep linear.x [m/s] and angular.z [rad/s]."""
-        measured = sample.msgtype == "nav_msgs/msg/Odometry"
-        stamped = measured or sample.msgtype == "geometry_msgs/msg/TwistStamped"
-        twist = sample.message.twist if stamped else sample.message
-        twist = twist.twist if measured else twist
-        if not self.columns:
-            kind = "measured" if measured else "commanded"
-            look = rr.SeriesLines(names=[kind], colors=[MEASURED_COLOUR if measured else COMMANDED_COLOUR])
-            for axis in ("linear", "angular"):
-                column = Columns(f"/velocity/{self.robot}/{axis}/{kind}", scalars)
-                self.columns.append(column)
-                self.context.recording.log(column.entity, look, static=True)
-        linear, angular = self.columns
-        linear.append(sample.time_ns, twist.linear.x)
-        angular.append(sample.time_ns, twist.angular.z)
+        twist = sample.message
+        if sample.msgtype != "geometry_msgs/msg/Twist":
+            twist = twist.twist
+        if sample.msgtype == "nav_msgs/msg/Odometry":
+            twist = twist.twist
+        if not self._entities:
+            self._declare("measured" if sample.msgtype == "nav_msgs/msg/Odometry" else "commanded")
+        self.rows.append((sample.time_ns, twist.linear.x, twist.angular.z))
+
+    def _declare(self, kind: str) -> None:
+        colour = MEASURED_COLOUR if kind == "measured" else COMMANDED_COLOUR
+        self._entities = tuple(f"/velocity/{self.robot}/{axis}/{kind}" for axis in ("linear", "angular"))
+        for entity in self._entities:
+            self.recording.log(entity, rr.SeriesLines(names=[kind], colors=[colour]), static=True)
+
+    def chunks(self, rows: list[tuple[int, float, float]]) -> Iterator[Chunk]:
+        """Yield both series."""
+        times, *values = zip(*rows, strict=True)
+        yield from scalars(sim_time(times), dict(zip(self._entities, values, strict=True)))
 
 
-class JointChannel(Channel):
+class JointChannel(Channel[tuple[int, tuple[str, ...], Array]]):
     """sensor_msgs/JointState: positions of the joints that are worth a plot."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
         self._palette = Palette()
-        self._plans: dict[tuple[str, ...], list[tuple[int, Columns[float]]]] = {}
+        self._entities: dict[str, str] = {}
 
     def take(self, sample: Sample[Any]) -> None:
-        """Keep positions [m] or [rad], not of wheels."""
+        """Keep positions [m] or [rad], if there are any."""
         state = sample.message
-        names = tuple(state.name)
-        if names not in self._plans:
-            wheels = self.context.wheels.get(self.robot, ())
-            self._plans[names] = [(i, self._column(n)) for i, n in enumerate(names) if n not in wheels]
-        for i, column in self._plans[names]:
-            column.append(sample.time_ns, state.position[i])
+        if len(state.position) == len(state.name):
+            self.rows.append((sample.time_ns, tuple(state.name), np.array(state.position)))
 
-    def _column(self, name: str) -> Columns[float]:
-        entity = f"/joints/{self.robot}/{name}"
-        for known in self.columns:
-            if known.entity == entity:
-                return known
-        column = Columns(entity, scalars)
-        self.columns.append(column)
-        look = rr.SeriesLines(names=[name.removesuffix("_joint")], colors=[self._palette.colour(name)])
-        self.context.recording.log(entity, look, static=True)
-        return column
+    def chunks(self, rows: list[tuple[int, tuple[str, ...], Array]]) -> Iterator[Chunk]:
+        """Yield a series for each joint that is no wheel."""
+        wheels = self.context.wheels.get(self.robot, ())
+        for names, group in groupby(rows, lambda row: row[1]):
+            times, _, positions = zip(*group, strict=True)
+            columns = zip(names, np.transpose(positions), strict=True)
+            series = {self._entity(name): column for name, column in columns if name not in wheels}
+            yield from scalars(sim_time(times), series)
 
-
-class TransformChannel(Channel):
-    """tf2_msgs/TFMessage: where the robot believes to be. Its links are drawn where they truly are."""
-
-    def __init__(self, context: Context, namespace: str, topic: str) -> None:
-        super().__init__(context, namespace, topic)
-        self._belief = context.belief(namespace)
-
-    def take(self, sample: Sample[Any]) -> None:
-        """Keep transforms whose parent is `map` or `odom`."""
-        for stamped in sample.message.transforms:
-            parent = stamped.header.frame_id
-            if parent.rsplit("/", 1)[-1] in BELIEF_FRAMES:
-                self._belief.on_transform(sample.time_ns, parent, stamped.child_frame_id, stamped.transform)
-
-    def send(self, recording: rr.RecordingStream) -> None:
-        """Send the block."""
-        self._belief.send(recording)
+    def _entity(self, name: str) -> str:
+        if name not in self._entities:
+            self._entities[name] = f"/joints/{self.robot}/{name}"
+            look = rr.SeriesLines(names=[name.removesuffix("_joint")], colors=[self._palette.colour(name)])
+            self.recording.log(self._entities[name], look, static=True)
+        return self._entities[name]
 
 
-class StateChannel(Channel):
+class StateChannel(Channel[tuple[int, str]]):
     """std_msgs/String as a state on a time line; repeated states are left out.
 
     A state such as `tote_a: dock at rack_a` is labelled with what comes after the colon. What comes before is
@@ -101,41 +94,42 @@ class StateChannel(Channel):
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
-        self._states = Columns(topic, states)
-        self._tasks = Columns(f"{topic.rsplit('/', 1)[0]}/task", states)
-        self.columns += [self._states, self._tasks]
+        self._task_entity = f"{topic.rsplit('/', 1)[0]}/task"
         self._last: str | None = None
         self._task = ""
         self._palette = Palette()
         self._looks: dict[str, tuple[str, Rgba8]] = {}
         self._objects: dict[str, list[str]] = {}
-        self._sent = 0
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep a change of state."""
         state = sample.message.data
-        if state == self._last:
-            return
-        self._last = state
-        self._states.append(sample.time_ns, state)
-        task, _, label = state.rpartition(": ")
-        if state not in self._looks:
-            objects = self._objects.setdefault(_action(label), [])
-            if label not in objects:
-                objects.append(label)
-            self._looks[state] = (label, self._palette.colour(_action(label), objects.index(label)))
-        if task != self._task:
-            self._task = task
-            self._tasks.append(sample.time_ns, task)  # an empty one is a gap
+        if state != self._last:
+            self._last = state
+            self.rows.append((sample.time_ns, state))
 
-    def send(self, recording: rr.RecordingStream) -> None:
-        """Send the block, and how its new states look."""
-        if len(self._looks) > self._sent:
-            self._sent = len(self._looks)
+    def chunks(self, rows: list[tuple[int, str]]) -> Iterator[Chunk]:
+        """Yield the changes; log how new states look."""
+        known = len(self._looks)
+        tasks = []
+        for time_ns, state in rows:
+            task, _, label = state.rpartition(": ")
+            if state not in self._looks:
+                objects = self._objects.setdefault(_action(label), [])
+                if label not in objects:
+                    objects.append(label)
+                self._looks[state] = (label, self._palette.colour(_action(label), objects.index(label)))
+            if task != self._task:
+                self._task = task
+                tasks.append((time_ns, task))  # an empty one is a gap
+        if len(self._looks) > known:
             labels, colours = zip(*self._looks.values(), strict=True)
             look = rr.StateConfiguration(values=list(self._looks), labels=labels, colors=colours)
-            recording.log(self._states.entity, look, static=True)
-        super().send(recording)
+            self.recording.log(self.topic, look, static=True)
+        for entity, changes in ((self.topic, rows), (self._task_entity, tasks)):
+            if changes:
+                times, states = zip(*changes, strict=True)
+                yield entity, sim_time(times), [_STATE.column(states)]
 
 
 def _action(label: str) -> str:
@@ -148,15 +142,15 @@ def _action(label: str) -> str:
     return " ".join(words) or label
 
 
-class LogChannel(Channel):
+class LogChannel(Channel[tuple[int, str, str]]):
     """rcl_interfaces/Log as text with a level."""
-
-    def __init__(self, context: Context, namespace: str, topic: str) -> None:
-        super().__init__(context, namespace, topic)
-        self._lines = Columns("/log", log_lines)
-        self.columns.append(self._lines)
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep a line as `[node] text`."""
         log = sample.message
-        self._lines.append(sample.time_ns, f"[{log.name}] {log.msg}", LOG_LEVELS.get(log.level, "INFO"))
+        self.rows.append((sample.time_ns, f"[{log.name}] {log.msg}", LOG_LEVELS.get(log.level, "INFO")))
+
+    def chunks(self, rows: list[tuple[int, str, str]]) -> Iterator[Chunk]:
+        """Yield the lines."""
+        times, texts, levels = zip(*rows, strict=True)
+        yield "/log", sim_time(times), [_TEXT.column(texts), _LEVEL.column(levels)]

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 from numpy.typing import NDArray
 
-from twin.geometry import xyzw_from_wxyz
+from twin.geometry import Pose3
 from twin.recording.channels.channel import Channel, Context
-from twin.recording.columns import Columns, TransformColumns, arrows, points, strips
+from twin.recording.columns import STRIPS, Chunk, Component, sim_time, transforms
 from twin.recording.frames import WORLD
 from twin.recording.placing import Placed, set_time
 
@@ -26,69 +31,116 @@ LAYER_HEIGHTS = {"map": -0.02, "global_costmap/costmap": -0.015, "local_costmap/
 LAYER_OPACITIES = {"global_costmap/costmap": 0.3, "local_costmap/costmap": 0.8}
 PARTICLE_LENGTH = 0.12
 """Of the arrow of a particle [m]."""
+_POSITIONS = Component(rr.Points3D, "positions")
+_ORIGINS, _VECTORS = (Component(rr.Arrows3D, name) for name in ("origins", "vectors"))
+
+Floats = NDArray[np.float32]
+Shown = TypeVar("Shown")
 
 
-class _SpatialChannel(Channel):
-    """A topic whose messages have a place each."""
+class Placement(NamedTuple, Generic[Shown]):
+    """What is shown of a message, and where; None if it is what was shown before."""
+
+    time_ns: int
+    frame_id: str
+    body_pose: Pose3 | None
+    """Of the body that the frame is fixed to, in `world`; None for a frame of the robot's belief."""
+    shown: Shown | None
+
+
+class _SpatialChannel(Channel[Placement[Shown]]):
+    """A topic whose messages have a place each.
+
+    What is in the frame of a body, such as a scan, stays where that body truly was when it was published:
+    hung on the moving body, it would turn with the robot until the next message. The rest is in a frame of
+    the robot's belief.
+    """
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
         self.entity = f"/ros{topic}"
         self._placed = Placed(context.recording, self.entity, context.start_ns)
         self._origin = f"origin of {topic}"
-        self._transforms = TransformColumns(f"/tf_topics{topic}")
-        self.columns.append(self._transforms)
+        self._bodies: dict[str, str | None] = {}
 
-    def place(self, frame_id: str, time_ns: int) -> None:
-        """Put what is published now, in a frame, into its place.
+    @abstractmethod
+    def draw(self, rows: list[tuple[int, Shown]]) -> Iterable[Chunk]:
+        """Return times [ns] and what is shown then as columns; there is at least one row."""
 
-        What is in the frame of a body, such as a scan, stays where that body truly was when it was published:
-        hung on the moving body, it would turn with the robot until the next message. The rest is in a frame
-        of the robot's belief.
-        """
-        frames = self.context.frames
-        body = frames.body(self.namespace, frame_id)
-        if body is None:
-            self._placed.attach(frames.belief(self.namespace, frame_id), time_ns)
-            return
-        self._placed.attach(self._origin, time_ns)
-        pose = self.context.true_pose(body)
-        quat_xyzw = xyzw_from_wxyz(pose.quat_wxyz)
-        self._transforms.append(time_ns, WORLD, [self._origin], [pose.xyz], [quat_xyzw])
+    def put(self, sample: Sample[Any], shown: Shown | None) -> None:
+        """Keep what is shown of a message that has a header."""
+        frame_id = sample.message.header.frame_id
+        if frame_id not in self._bodies:
+            self._bodies[frame_id] = self.context.frames.body(self.namespace, frame_id)
+        body = self._bodies[frame_id]
+        pose = None if body is None else self.context.true_pose(body)
+        self.rows.append(Placement(sample.time_ns, frame_id, pose, shown))
+
+    def chunks(self, rows: list[Placement[Shown]]) -> Iterator[Chunk]:
+        """Yield the places, and what is shown there."""
+        for row in rows:
+            belief = self.context.frames.belief(self.namespace, row.frame_id)
+            self._placed.attach(belief if row.body_pose is None else self._origin, row.time_ns)
+        fixed = [(row.time_ns, *row.body_pose) for row in rows if row.body_pose is not None]
+        if fixed:
+            times, xyz, quat_wxyz = zip(*fixed, strict=True)
+            parents, children = (pa.repeat(name, len(fixed)) for name in (WORLD, self._origin))
+            quat_xyzw = np.array(quat_wxyz)[:, [1, 2, 3, 0]]
+            entity = f"/tf_topics{self.topic}"
+            yield transforms(entity, sim_time(times), parents, children, xyz, quat_xyzw)
+        drawn = [(row.time_ns, row.shown) for row in rows if row.shown is not None]
+        if drawn:
+            yield from self.draw(drawn)
 
     def declare(self, look: rr.AsComponents) -> None:
         """Log what all messages of the topic look like."""
-        self.context.recording.log(self.entity, look, static=True)
+        self.recording.log(self.entity, look, static=True)
 
 
-class ScanChannel(_SpatialChannel):
-    """sensor_msgs/LaserScan as points in the frame of the true lidar."""
+class Scan(NamedTuple):
+    """What is shown of a LaserScan."""
+
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Floats
+
+
+class ScanChannel(_SpatialChannel[Scan]):
+    """sensor_msgs/LaserScan as points in the frame of the true lidar: returns from range_min to range_max."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
-        self._points = Columns(self.entity, points)
-        self.columns.append(self._points)
-        self._key: tuple[float, float, int] | None = None
-        self._directions: NDArray[np.float32] = np.zeros((0, 3), dtype=np.float32)
         self.declare(rr.Points3D.from_fields(colors=[SCAN_COLOUR], radii=rr.Radius.ui_points(1.5)))
 
     def take(self, sample: Sample[Any]) -> None:
-        """Keep the returns between range_min and range_max."""
+        """Keep the ranges."""
         scan = sample.message
-        self.place(scan.header.frame_id, sample.time_ns)
-        ranges = np.asarray(scan.ranges, dtype=np.float32)
-        key = (scan.angle_min, scan.angle_increment, len(ranges))
-        if key != self._key:
-            angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
-            self._directions = np.stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)), axis=1)
-            self._directions = self._directions.astype(np.float32)
-            self._key = key
-        hit = (ranges >= scan.range_min) & (ranges <= scan.range_max)
-        self._points.append(sample.time_ns, self._directions[hit] * ranges[hit, None])
+        ranges = np.array(scan.ranges, dtype=np.float32)
+        limits = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
+        self.put(sample, Scan(*limits, ranges))
+
+    def draw(self, rows: list[tuple[int, Scan]]) -> Iterator[Chunk]:
+        """Yield the points of scans, those of equal form at once."""
+        for key, group in groupby(rows, lambda row: (*row[1][:4], len(row[1].ranges))):
+            times, scans = zip(*group, strict=True)
+            angle_min, angle_increment, range_min, range_max, beams = key
+            ranges = np.array([scan.ranges for scan in scans])
+            hit = (ranges >= range_min) & (ranges <= range_max)
+            directions = _directions(angle_min, angle_increment, beams)
+            points = directions[np.nonzero(hit)[1]] * ranges[hit][:, np.newaxis]
+            yield self.entity, sim_time(times), [_POSITIONS.column(points, np.count_nonzero(hit, axis=1))]
 
 
-class GridChannel(_SpatialChannel):
-    """nav_msgs/OccupancyGrid as a raster on the floor; sent at once if it changed: they are few and large."""
+@lru_cache(maxsize=8)
+def _directions(angle_min: float, angle_increment: float, beams: int) -> Floats:
+    angles = angle_min + angle_increment * np.arange(beams)
+    return np.stack((np.cos(angles), np.sin(angles), np.zeros(beams)), axis=1).astype(np.float32)
+
+
+class GridChannel(_SpatialChannel[rr.GridMap]):
+    """nav_msgs/OccupancyGrid as a raster on the floor; sent only when it changed."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
@@ -99,64 +151,65 @@ class GridChannel(_SpatialChannel):
         self._last: tuple[Any, ...] | None = None
 
     def take(self, sample: Sample[Any]) -> None:
-        """Log the raster: row 0 of the message is at its origin, row 0 of Rerun's image at the far side."""
+        """Keep the raster: row 0 of the message is at its origin, row 0 of Rerun's image at the far side."""
         grid = sample.message
         info = grid.info
         data = np.asarray(grid.data, dtype=np.int8)
         cells = data.reshape(info.height, info.width)[::-1].tobytes()
-        origin = info.origin.position
-        self.place(grid.header.frame_id, sample.time_ns)
-        key = (info.width, info.height, info.resolution, origin.x, origin.y, grid.header.frame_id, cells)
+        at, q = info.origin.position, info.origin.orientation
+        key = (info.width, info.height, info.resolution, at.x, at.y, grid.header.frame_id, cells)
         if key == self._last or not cells:
+            self.put(sample, None)
             return
         self._last = key
-        set_time(self.context.recording, sample.time_ns)
-        q = info.origin.orientation
-        self.context.recording.log(
-            self.entity,
-            rr.GridMap(
-                data=cells,
-                format=rr.components.ImageFormat(
-                    width=info.width, height=info.height, color_model="L", channel_datatype="U8"
-                ),
-                cell_size=info.resolution,
-                translation=[origin.x, origin.y, origin.z + self._height],
-                quaternion=rr.Quaternion(xyzw=[q.x, q.y, q.z, q.w]),
-                colormap="RvizMap" if self._is_map else "RvizCostmap",
-                opacity=self._opacity,
+        raster = rr.GridMap(
+            data=cells,
+            format=rr.components.ImageFormat(
+                width=info.width, height=info.height, color_model="L", channel_datatype="U8"
             ),
+            cell_size=info.resolution,
+            translation=[at.x, at.y, at.z + self._height],
+            quaternion=rr.Quaternion(xyzw=[q.x, q.y, q.z, q.w]),
+            colormap="RvizMap" if self._is_map else "RvizCostmap",
+            opacity=self._opacity,
         )
+        self.put(sample, raster)
+
+    def draw(self, rows: list[tuple[int, rr.GridMap]]) -> tuple[()]:
+        """Log the rasters: they are few and large."""
+        for time_ns, raster in rows:
+            set_time(self.recording, time_ns)
+            self.recording.log(self.entity, raster)
+        return ()
 
 
-class PathChannel(_SpatialChannel):
+class PathChannel(_SpatialChannel[Floats]):
     """nav_msgs/Path as a line; sent only when it changed."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
-        self._strips = Columns(self.entity, strips)
-        self.columns.append(self._strips)
-        self._last: NDArray[np.float32] | None = None
+        self._last: Floats | None = None
         self.declare(rr.LineStrips3D.from_fields(colors=[PLAN_COLOUR], radii=rr.Radius.ui_points(1.5)))
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep the positions."""
-        path = sample.message
-        positions = [pose.pose.position for pose in path.poses]
+        positions = [pose.pose.position for pose in sample.message.poses]
         points = np.array([(p.x, p.y, p.z + 0.02) for p in positions], dtype=np.float32).reshape(-1, 3)
-        self.place(path.header.frame_id, sample.time_ns)
-        if self._last is not None and np.array_equal(points, self._last):
-            return
+        changed = self._last is None or not np.array_equal(points, self._last)
         self._last = points
-        self._strips.append(sample.time_ns, points)
+        self.put(sample, points if changed else None)
+
+    def draw(self, rows: list[tuple[int, Floats]]) -> Iterator[Chunk]:
+        """Yield the lines."""
+        times, lines = zip(*rows, strict=True)
+        yield self.entity, sim_time(times), [STRIPS.column(lines)]
 
 
-class PoseArrayChannel(_SpatialChannel):
+class PoseArrayChannel(_SpatialChannel[NDArray[np.float64]]):
     """geometry_msgs/PoseArray, such as AMCL's particles, as short arrows."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
-        self._arrows = Columns(self.entity, arrows)
-        self.columns.append(self._arrows)
         self.declare(rr.Arrows3D.from_fields(colors=[PARTICLE_COLOUR], radii=[0.008]))
 
     def take(self, sample: Sample[Any]) -> None:
@@ -165,15 +218,19 @@ class PoseArrayChannel(_SpatialChannel):
         The poses are read from the payload, 50 times faster than from the message: CDR ends with them, seven
         little-endian doubles each (OMG DDS-XTypes 1.3, 7.4.3).
         """
-        cloud = sample.message
-        self.place(cloud.header.frame_id, sample.time_ns)
-        n = len(cloud.poses)
+        n = len(sample.message.poses)
         values = np.frombuffer(sample.payload, "<f8", 7 * n, len(sample.payload) - 56 * n).reshape(n, 7)
-        values = values[:: max(1, math.ceil(n / self.context.max_particles))]
-        xyz, (x, y, z, w) = values[:, :3], values[:, 3:].T
+        self.put(sample, values[:: max(1, math.ceil(n / self.context.max_particles))].copy())
+
+    def draw(self, rows: list[tuple[int, NDArray[np.float64]]]) -> Iterator[Chunk]:
+        """Yield the arrows."""
+        times, clouds = zip(*rows, strict=True)
+        poses = np.concatenate(clouds)
+        x, y, z, w = poses[:, 3:].T
         forward = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)), axis=1)
-        self._arrows.append(
-            sample.time_ns,
-            (xyz + np.array((0.0, 0.0, 0.01))).astype(np.float32),
-            (PARTICLE_LENGTH * forward).astype(np.float32),
-        )
+        lengths = [len(cloud) for cloud in clouds]
+        columns = [
+            _ORIGINS.column(poses[:, :3] + np.array((0.0, 0.0, 0.01)), lengths),
+            _VECTORS.column(PARTICLE_LENGTH * forward, lengths),
+        ]
+        yield self.entity, sim_time(times), columns

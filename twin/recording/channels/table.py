@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
-from twin.recording.channels.series import (
-    JointChannel,
-    LogChannel,
-    StateChannel,
-    TransformChannel,
-    VelocityChannel,
-)
+from twin.recording.channels.series import JointChannel, LogChannel, StateChannel, VelocityChannel
 from twin.recording.channels.spatial import GridChannel, PathChannel, PoseArrayChannel, ScanChannel
 
 _BY_TYPE: dict[str, type[Any]] = {
@@ -26,12 +21,15 @@ _BY_NAME: dict[tuple[str, str], type[Any]] = {
     ("cmd_vel", "geometry_msgs/msg/TwistStamped"): VelocityChannel,
     ("odom", "nav_msgs/msg/Odometry"): VelocityChannel,
     ("joint_states", "sensor_msgs/msg/JointState"): JointChannel,
-    ("tf", "tf2_msgs/msg/TFMessage"): TransformChannel,
+    ("tf", "tf2_msgs/msg/TFMessage"): BeliefChannel,
     ("mission/state", "std_msgs/msg/String"): StateChannel,
 }
 
+SHOWN_TYPES = frozenset(_BY_TYPE) | {msgtype for _, msgtype in _BY_NAME}
+"""Of a message of any other type, nothing is shown."""
 
-def open_channel(context: Context, topic: str, msgtype: str) -> Channel | None:
+
+def open_channel(context: Context, topic: str, msgtype: str) -> Channel[Any] | None:
     """Return how a topic is drawn, or None for a topic that a recording does not show."""
     namespace, name = context.frames.split(topic)
     kind = _BY_TYPE.get(msgtype) or _BY_NAME.get((name, msgtype))
