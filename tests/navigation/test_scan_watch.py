@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.geometry import Pose2
-from twin.navigation.scan_watch import ScanWatch
+from twin.geometry import Array, Pose2
+from twin.navigation.scan_watch import RepeatedScan, ScanWatch
 
 SCAN = np.linspace(1.0, 3.0, 90)
 NOTHING = np.full(90, np.inf)
@@ -53,3 +53,13 @@ def test_what_is_too_near_is_seen() -> None:
     watch = ScanWatch()
     assert watch.fault(SCAN, at(0.0)) == ""
     assert watch.fault(np.full(90, -np.inf), at(0.0)) == ""
+
+
+@pytest.mark.parametrize(
+    "other", [SCAN, SCAN + 0.001, SCAN[:-1], np.where(SCAN < 1.5, np.nan, SCAN), NOTHING]
+)
+def test_a_scan_is_the_same_if_numpy_says_so(other: Array) -> None:
+    for scan in (SCAN, other):
+        watch = RepeatedScan(1, 0.0)
+        assert not watch.is_frozen(scan, at(0.0))
+        assert watch.is_frozen(other.copy(), at(0.0)) == np.array_equal(scan, other, equal_nan=True)

@@ -9,6 +9,7 @@ import pytest
 
 from tests.sim.conftest import placed
 from twin.errors import SimulationError
+from twin.sim.noise import NoiseStream
 from twin.sim.scene import Scene
 from twin.sim.world import World
 
@@ -123,3 +124,38 @@ def test_effort_is_what_the_actuator_gives(world: World) -> None:
     world.step(2000)
     # The mast of 0.3 kg is held up by the position servo.
     assert hardware.read().effort[2] == pytest.approx(0.3 * 9.81, rel=0.01)
+
+
+def test_a_reading_is_what_sensors_measure_of_all_joints_at_once(world: World) -> None:
+    """To the last bit: counts of wheels, noise on the mast."""
+    hardware, data = world.robots["cart"].hardware, world.data
+    assert hardware.joint_names == ("left_wheel_joint", "right_wheel_joint", "mast_joint")
+    joints = [world.model.joint(f"cart/{name}") for name in hardware.joint_names]
+    qpos, dof = (np.array([getattr(joint, name)[0] for joint in joints]) for name in ("qposadr", "dofadr"))
+    noise, encoder = NoiseStream(5, "cart/joints"), np.array([True, True, False])
+    scale, lost = np.ones(3), np.zeros(3)
+    before = np.rint(data.qpos[qpos] * scale / TICK)
+    for tick in range(20):
+        hardware.command("left_wheel_joint", 3.0 - 0.3 * tick)
+        hardware.command("mast_joint", 0.01 * tick)
+        hardware.apply()
+        world.step(3 + tick % 2)
+        if tick == 8:
+            hardware.miscount("right_wheel_joint", 1.0)
+            lost[1] += round(1.0 / TICK)
+        if tick == 12:
+            hardware.misread("left_wheel_joint", -1.0)
+            lost += np.rint(data.qpos[qpos] * scale / TICK)
+            scale[0] = -1.0
+            lost -= np.rint(data.qpos[qpos] * scale / TICK)
+        counts = np.rint(data.qpos[qpos] * scale / TICK) + lost
+        drawn = noise.normal(world.step_count, 6)
+        position = np.where(encoder, counts * TICK, data.qpos[qpos] + 1e-4 * drawn[:3])
+        elapsed = (3 + tick % 2) * 0.002
+        speed = (counts - before) * (TICK / elapsed)
+        velocity = np.where(encoder, speed, data.qvel[dof] + 1e-3 * drawn[3:])
+        reading = hardware.read()
+        np.testing.assert_array_equal(reading.position, position)
+        np.testing.assert_array_equal(reading.velocity, velocity)
+        np.testing.assert_array_equal(reading.effort, data.qfrc_actuator[dof])
+        before = counts

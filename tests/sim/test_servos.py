@@ -7,6 +7,7 @@ import functools
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 
 from twin.convert import convert
@@ -201,3 +202,35 @@ def test_a_saved_world_has_the_same_drives(tmp_path: Path) -> None:
     saved = mujoco.MjModel.from_xml_path(str(bot.world.save_model(tmp_path)))
     for name in ("actuator_dyntype", "actuator_biasprm", "actuator_dynprm", "dof_armature"):
         assert getattr(saved, name) == pytest.approx(getattr(bot.world.model, name)), name
+
+
+def test_what_servos_are_told_is_told_to_every_joint_at_every_tick() -> None:
+    """The obvious way, all arrays written, is the same to the last bit, in motion and at rest."""
+    bot = Bot()
+    model, data = bot.world.model, bot.world.data
+    pid = np.flatnonzero(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_PID)
+    joints, act = model.actuator_trnid[pid, 0], model.actuator_actadr[pid]
+    qpos, dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    fastest = model.actuator_dynprm[pid, 1].copy()
+    ahead = fastest * model.actuator_biasprm[pid, 2] / model.actuator_biasprm[pid, 1]
+    commands = data.ctrl[pid].copy()
+    lift = [model.actuator(i).name for i in pid].index("r/lift_joint")
+    written, at_rest, before = fastest.copy(), 0, data.time
+    for tick in range(120):
+        if tick in (5, 40):
+            bot.hardware.command("lift_joint", 0.05 if tick == 5 else 0.02)
+            commands[lift] = 0.05 if tick == 5 else 0.02
+        here, elapsed = data.qpos[qpos], data.time - before
+        before = data.time
+        targets = np.minimum(np.maximum(data.act[act], here - ahead), here + ahead)
+        there = here + elapsed * np.minimum(np.maximum(data.qvel[dof], -fastest), fastest)
+        bounded = np.minimum(np.maximum(commands, there - ahead), there + ahead)
+        if elapsed:
+            at_rest += np.count_nonzero(targets == bounded)
+            written = np.minimum(abs(bounded - targets) / elapsed, fastest)
+        bot.hardware.apply()
+        np.testing.assert_array_equal(data.act[act], targets)
+        np.testing.assert_array_equal(data.ctrl[pid], bounded)
+        np.testing.assert_array_equal(model.actuator_dynprm[pid, 1], written)
+        bot.world.step(bot.steps)
+    assert at_rest > 100

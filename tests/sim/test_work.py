@@ -9,6 +9,7 @@ import pytest
 
 from tests.sim.conftest import placed
 from twin.sim.scene import Scene
+from twin.sim.work import WorkMeter
 from twin.sim.world import World
 
 MAST = 0.3 * 9.81
@@ -65,3 +66,25 @@ def test_measuring_changes_nothing(world: World) -> None:
         run(each, 0.4, lambda t: 0.1)
     assert world.state_digest() == other.state_digest()
     assert np.isclose(other.work("cart"), 0.0)
+
+
+def test_adding_up_later_is_adding_up_at_once(world: World) -> None:
+    """To the last bit, however many steps are between."""
+    data, rng = world.data, np.random.default_rng(1)
+    meter, joints = WorkMeter(world.model, data, ("cart",)), world.model.actuator_trnid[:, 0]
+    dofs, half_step, work = world.model.jnt_dofadr[joints], 0.5 * world.model.opt.timestep, np.zeros(3)
+    for i, steps in enumerate([10] * 40 + [3, 1, 200, 10, 7, 13] * 5):
+        meter.begin(steps)
+        forces, velocities = [], [data.qvel.copy()]
+        for _ in range(steps):
+            data.qfrc_actuator[:], data.qvel[:] = rng.normal(size=(2, world.model.nv))
+            meter.note()
+            forces.append(data.qfrc_actuator.copy())
+            velocities.append(data.qvel.copy())
+        meter.end()
+        speeds = np.array(velocities)[:, dofs]
+        powers = np.array(forces)[:, dofs] * (speeds[:-1] + speeds[1:])
+        work += half_step * np.maximum(powers, 0.0).sum(axis=0)
+        if i % 5 == 0:
+            assert meter.work("cart") == work.sum()
+    assert meter.work("cart") == work.sum() > 0.0

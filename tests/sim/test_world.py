@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -70,8 +72,6 @@ def test_a_robot_drives_as_its_wheels_turn(room: Scene) -> None:
 
 
 def test_two_robots_do_not_share_parts(room: Scene) -> None:
-    from dataclasses import replace
-
     first = placed(Pose2(0.0, 1.0, 0.0))
     second = replace(placed(Pose2(0.0, -1.0, 0.0)), name="other")
     world = World.compose(room, [first, second])
@@ -134,6 +134,40 @@ def test_contacts_name_what_a_robot_touches(room: Scene) -> None:
     assert (contact.body1, contact.body2) == ("cart/base_link", "wall_east")
     assert 1.0 < contact.force_N < 200.0
     assert contact.geoms[0] == ("cart/chassis", "wall_east#0")
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_no_contact_is_missed_while_contacts_come(
+    room: Scene, cone: Literal["elliptic", "pyramidal"]
+) -> None:
+    """Every contact of every tick, found one by one."""
+    scene = replace(room, goods=(tote("tote", (2.7, 0.0, 0.09)),))
+    world = World.compose(scene, [placed(Pose2(2.2, 0.0, 0.0))], Physics(cone=cone))
+    model, data, force = world.model, world.data, np.zeros(6)
+    seen = set()
+    for _ in range(90):
+        drive(world, 0.02, 5.0, 5.0)
+        pairs: dict[tuple[str, str], float] = {}
+        of_tote = []
+        for i, contact in enumerate(data.contact):
+            names = [model.body(model.geom_bodyid[geom]).name for geom in contact.geom]
+            others = [model.geom(geom).name.partition("#")[0] for geom in contact.geom]
+            mine = [name.startswith("cart/") for name in names]
+            if contact.efc_address < 0:
+                continue
+            mujoco.mj_contactForce(model, data, i, force)
+            if "tote" in names:
+                sign = -1.0 if names[0] == "tote" else 1.0
+                push = tuple((sign * force[0] * contact.frame[:3]).tolist())
+                named = [names[k] if mine[k] else others[k] for k in range(2)]
+                of_tote.append((named[1 - names.index("tote")], push))
+            if "floor" not in others and any(mine) and not all(mine):
+                key = names[mine.index(True)], others[mine.index(False)]
+                pairs[key] = pairs.get(key, 0.0) + float(force[0])
+        assert {(c.body1, c.body2): c.force_N for c in world.contacts()} == pairs
+        assert world.touches("tote") == of_tote
+        seen.add((len(pairs), len(of_tote) > 0))
+    assert seen >= {(0, True), (1, True)}
 
 
 def test_the_same_seed_is_the_same_run_whether_sampled_or_not(room: Scene) -> None:
@@ -201,8 +235,6 @@ def test_physics_options_reach_the_model() -> None:
 
 
 def test_adding_an_obstacle_is_composing_it(room: Scene) -> None:
-    from dataclasses import replace
-
     blocked = replace(room, statics=(*room.statics, box("crate", (1.0, 0.0, 0.25), (0.4, 0.4, 0.5))))
     world = World.compose(blocked, [placed()])
     drive(world, 4.0, 8.0, 8.0)

@@ -36,20 +36,19 @@ class SpeedLimiter:
 
     def limit(self, target: float, dt: float) -> float:
         """Return the velocity nearest to `target` that is reachable within `dt` [s]."""
-        target, step = self._clamped(target), self._step(target, dt)
+        target, step = self._bounds(target, dt)
         self.value += min(max(target - self.value, -step), step)
         return self.value
 
     def share(self, target: float, dt: float) -> float:
         """Return how much, 0 … 1, of the way to `target` can be gone within `dt` [s]."""
-        change = abs(self._clamped(target) - self.value)
-        return min(1.0, self._step(target, dt) / change) if change else 1.0
+        target, step = self._bounds(target, dt)
+        change = abs(target - self.value)
+        return min(1.0, step / change) if change else 1.0
 
-    def _clamped(self, target: float) -> float:
-        return min(max(target, -self.limits.max_velocity), self.limits.max_velocity)
-
-    def _step(self, target: float, dt: float) -> float:
-        """Return the largest change within `dt` [s]."""
-        limits, target = self.limits, self._clamped(target)
-        braking = abs(target) < abs(self.value) or target * self.value < 0.0
-        return (limits.braking if braking else limits.max_acceleration) * dt
+    def _bounds(self, target: float, dt: float) -> tuple[float, float]:
+        """Return `target` within the greatest velocity, and the largest change within `dt` [s]."""
+        limits, value = self.limits, self.value
+        target = min(max(target, -limits.max_velocity), limits.max_velocity)
+        braking = abs(target) < abs(value) or target * value < 0.0
+        return target, (limits.braking if braking else limits.max_acceleration) * dt

@@ -110,10 +110,10 @@ class Odometry:
         """
         place, turn = (grown / self._dt**2 for grown in self._grown)
         place, turn = place + _AT_REST, turn + _AT_REST
-        return np.array([[place, 0.0, 0.0], [0.0, place, 0.0], [0.0, 0.0, turn]])
+        return np.array((place, 0.0, 0.0, 0.0, place, 0.0, 0.0, 0.0, turn)).reshape(3, 3)
 
     @property
     def covariance(self) -> Array:
         """Of (x, y, yaw) in `odom`, shape (3, 3)."""
         xx, xy, yy, xt, yt, tt = self._variances
-        return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+        return np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)

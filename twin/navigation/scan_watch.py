@@ -25,7 +25,7 @@ class RepeatedScan:
 
     def is_frozen(self, ranges: Array, odom: Pose2) -> bool:
         """Take a scan, shape (n,) [m], and the base's pose in odom; return whether it is an old one."""
-        if self._ranges is None or not np.array_equal(ranges, self._ranges, equal_nan=True):
+        if self._ranges is None or not _same(ranges, self._ranges):
             self._ranges, self._count, self._since = ranges, 0, odom
             return False
         self._count += 1
@@ -33,6 +33,12 @@ class RepeatedScan:
         moved = self._since.distance(odom) >= self._distance
         turned = abs(wrap_angle(self._since.yaw - odom.yaw)) >= self._distance
         return self._count >= self._repeats and (moved or turned)
+
+
+def _same(one: Array, other: Array) -> bool:
+    """Whether two scans are equal, NaN equal to NaN; numpy's array_equal takes twice as long."""
+    equal = one.shape == other.shape and (one == other) | ((one != one) & (other != other))
+    return bool(np.all(equal))
 
 
 _REPEATS, _REPEATS_DISTANCE = 3, 0.1
@@ -60,9 +66,10 @@ class ScanWatch:
             odom: The base's pose in odom now; None: nobody knows.
         """
         values = np.asarray(ranges)
-        if np.isnan(values).all():
+        hitting = np.count_nonzero(values < np.inf)  # -inf is too near to be measured
+        if not hitting and np.isnan(values).all():
             return "every reading is NaN"
-        hits = float(np.count_nonzero(values < np.inf)) / len(values)  # -inf is too near to be measured
+        hits = float(hitting) / len(values)
         if hits == 0.0 and self._hits >= _SUDDEN_SHARE:
             return "suddenly no ray returns"
         self._hits = hits

@@ -138,7 +138,7 @@ _UNUSED_AXIS = 1e6
 def planar_covariance(covariance: Array) -> Array:
     """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose, read-only."""
     full = _UNUSED_AXES.copy()
-    full[_PLANAR] = covariance.ravel()
+    full.put(_PLANAR, covariance)
     full.flags.writeable = False
     return full
 

@@ -30,6 +30,8 @@ class Guard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End it; what ships is not guarded: its faults are bugs of ours."""
+        if error is None:
+            return
         told = is_told(error) or self._plugin.ships
         if isinstance(error, Exception | SystemExit) and not told:
             raise blame(self._plugin, error) from error

@@ -39,7 +39,9 @@ class Observer:
         self._payload = Payload(world, self._goods)
         self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
         self._start = world.body_poses()
-        self._moved: set[str] = set()
+        self._roots = [name.partition("/")[0] for name in world.body_names]
+        self._still = np.ones(len(self._roots), dtype=bool)
+        self._moved: frozenset[str] = frozenset()
         self._fingers = {
             f"{stack.name}/{link}": stack.name
             for stack in stacks
@@ -94,9 +96,11 @@ class Observer:
         xyz, quat_wxyz = self._world.body_poses()
         came = np.linalg.norm(xyz - self._start[0], axis=1) > _MOVED
         turned = np.abs((quat_wxyz * self._start[1]).sum(axis=1)) < math.cos(_TURNED / 2.0)
-        names = self._world.body_names
-        self._moved.update(names[i].partition("/")[0] for i in np.flatnonzero(came | turned))
-        return frozenset(self._moved)
+        new = (came | turned) & self._still
+        if new.any():
+            self._still &= ~new
+            self._moved |= {self._roots[i] for i in np.flatnonzero(new)}
+        return self._moved
 
     def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:
         """Return the goods that both fingers of a robot touch."""

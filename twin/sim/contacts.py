@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -56,50 +56,77 @@ class ContactReader:
         # By both geoms' robots; none and the floor, -1 and -2, are the last columns.
         self._matters = ~np.eye(self._robot.max(initial=0) + 3, dtype=bool)
         self._matters[_FLOOR, :] = self._matters[:, _FLOOR] = False
-        self._force = np.zeros(6)
-        self._harmless = b""
-        """Geoms of contacts that do not matter, as on most ticks: wheels on the floor."""
-        self._geoms_of: dict[str, NDArray[np.bool_]] = {}
+        self._elliptic = bool(model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+        self._touching = b""
+        """Geoms of all contacts; on most ticks those of the last one, such as wheels on the floor."""
+        self._pairs: list[tuple[int, tuple[str, str], tuple[str, str]]] = []
+        """Of these the contacts that matter: index, names of the bodies and of the geoms."""
+        self._of_body: dict[str, list[tuple[int, bool, str]]] = {}
+        """Of these the contacts of a body: index, whether it is the first of the two, name of the other."""
 
     def read(self, data: mujoco.MjData) -> list[Contact]:
         """Return what robots touch except for themselves and the floor, one entry for each pair of bodies."""
         if data.ncon == 0:
             return []
-        geoms = data.contact.geom
-        touching = geoms.tobytes()
-        if touching == self._harmless:
+        self._look(data)
+        if not self._pairs:
             return []
-        robots = self._robot[geoms]
-        kept = self._matters[robots[:, 0], robots[:, 1]]
-        if not kept.any():
-            self._harmless = touching
-            return []
-        kept &= data.contact.efc_address >= 0
-        pairs: dict[tuple[str, str], tuple[float, list[tuple[str, str]]]] = {}
-        for index in np.flatnonzero(kept):
-            a, b = (int(geom) for geom in geoms[index])
-            if self._robot[a] < 0:
-                a, b = b, a
-            mujoco.mj_contactForce(self._model, data, index, self._force)
-            key = self._owners[a], self._owners[b]
-            force, names = pairs.get(key, (0.0, []))
-            pairs[key] = force + float(self._force[0]), [*names, (self._names[a], self._names[b])]
-        return [Contact(*key, force, tuple(names)) for key, (force, names) in pairs.items()]
+        forces = self._normal_forces(data)
+        found: dict[tuple[str, str], tuple[float, list[tuple[str, str]]]] = {}
+        for index, bodies, names in self._pairs:
+            force = forces[index]
+            if force is not None:
+                before, others = found.get(bodies, (0.0, []))
+                found[bodies] = before + force, [*others, names]
+        return [Contact(*bodies, force, tuple(names)) for bodies, (force, names) in found.items()]
 
     def touches(self, data: mujoco.MjData, body: str) -> list[Touch]:
         """Return what touches a body, point by point, whatever it is."""
-        if body not in self._geoms_of:
-            self._geoms_of[body] = np.array([owner == body for owner in self._owners])
-        contact = data.contact
-        # Read once: each look makes arrays of all contacts.
-        geoms, normals = contact.geom, contact.frame[:, :3]
-        mine = self._geoms_of[body][geoms]
+        if data.ncon == 0:
+            return []
+        self._look(data)
+        if body not in self._of_body:
+            self._of_body[body] = list(self._contacts_of(body, data.contact.geom))
+        forces, normals = self._normal_forces(data), data.contact.frame
         touches = []
-        for index in np.flatnonzero((mine[:, 0] != mine[:, 1]) & (contact.efc_address >= 0)).tolist():
-            mujoco.mj_contactForce(self._model, data, index, self._force)
-            outwards = bool(mine[index, 0])  # normals point from the first geom to the second
-            other = self._owners[geoms[index, int(outwards)]]
-            force = float(-self._force[0] if outwards else self._force[0])
-            x, y, z = normals[index].tolist()
-            touches.append(Touch(other, (force * x, force * y, force * z)))
+        for index, is_first, other in self._of_body[body]:
+            size = forces[index]
+            if size is not None:
+                x, y, z, *_ = normals[index].tolist()
+                force = -size if is_first else size  # normals point from the first geom to the second
+                touches.append(Touch(other, (force * x, force * y, force * z)))
         return touches
+
+    def _look(self, data: mujoco.MjData) -> None:
+        """Find out which contacts matter, if other geoms touch than before."""
+        geoms = data.contact.geom
+        touching = geoms.tobytes()
+        if touching == self._touching:
+            return
+        self._touching, self._of_body, self._pairs = touching, {}, []
+        robots = self._robot[geoms]
+        for index in np.flatnonzero(self._matters[robots[:, 0], robots[:, 1]]).tolist():
+            a, b = geoms[index].tolist()
+            if self._robot[a] < 0:
+                a, b = b, a
+            bodies, names = (self._owners[a], self._owners[b]), (self._names[a], self._names[b])
+            self._pairs.append((index, bodies, names))
+
+    def _contacts_of(self, body: str, geoms: NDArray[np.int32]) -> Iterator[tuple[int, bool, str]]:
+        for index, pair in enumerate(geoms.tolist()):
+            first, second = (self._owners[geom] for geom in pair)
+            if (first == body) != (second == body):
+                yield index, first == body, second if first == body else first
+
+    def _normal_forces(self, data: mujoco.MjData) -> list[float | None]:
+        """Return the normal force of each contact [N]; None where it does not act."""
+        addresses = data.contact.efc_address.tolist()
+        if self._elliptic:
+            rows = data.efc_force.tolist()  # the first of a contact; asking MuJoCo one by one takes longer
+            return [rows[address] if address >= 0 else None for address in addresses]
+        force = np.zeros(6)
+        found: list[float | None] = []
+        for index, address in enumerate(addresses):
+            mujoco.mj_contactForce(self._model, data, index, force)
+            found.append(float(force[0]) if address >= 0 else None)
+        return found

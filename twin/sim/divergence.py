@@ -29,12 +29,15 @@ class DivergenceGuard:
         self._model = model
         self._data = data
         self._warnings = [data.warning[kind] for kind in _BAD]
+        self._zeros = np.zeros(model.nv)
+        self._size = mujoco.mj_stateSize(model, _STATE)
         self._states = deque[Array](maxlen=capacity)
         """The states kept, oldest first."""
 
     def remember(self) -> None:
         """Keep the present state."""
-        state = np.empty(mujoco.mj_stateSize(self._model, _STATE))
+        is_full = len(self._states) == self._states.maxlen
+        state = self._states.popleft() if is_full else np.empty(self._size)
         mujoco.mj_getState(self._model, self._data, state, _STATE)
         self._states.append(state)
 
@@ -47,7 +50,10 @@ class DivergenceGuard:
         Raises:
             SimulationError: Names the joint or body at fault, the time, and the file.
         """
-        if not any(warning.number for warning in self._warnings) and np.isfinite(self._data.qvel).all():
+        position, velocity, acceleration = self._warnings
+        warned = position.number or velocity.number or acceleration.number
+        # Nothing but a number that is not finite makes zeros times numbers other than zero.
+        if not warned and self._data.qvel.dot(self._zeros) == 0.0:
             return
         what, part = self._replay()
         time = self._data.time

@@ -81,19 +81,27 @@ class Hardware:
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
         self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
         kinds = [description.joints[name].type for name in self.joint_names]
-        self._encoder = np.array([kind == "continuous" for kind in kinds], dtype=bool)
+        self._encoders = {
+            i: int(joints[i].qposadr[0]) for i, kind in enumerate(kinds) if kind == "continuous"
+        }
+        """Joints with an encoder, and where each is in qpos."""
         self._tick = 2.0 * math.pi / self.config.encoder_ticks
         self._noise = NoiseStream(seed, f"{robot}/joints")
         scale = NoiseStream(seed, f"{robot}/wheels").normal(0, len(joints))
         wheels = {wheel.joint.name for wheel in commanded_wheels(description)}
-        self._scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
-        self._own_scale = self._scale.copy()
-        self._miscounted = np.zeros(len(joints))
-        self._counts = self._count()
+        scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
+        self._own_scale: list[float] = scale.tolist()
+        self._scale = self._own_scale.copy()
+        self._miscounted = [0.0] * len(joints)
+        self._counts = {i: self._count(i) for i in self._encoders}
         self._step = 0
         self._drive_dof, self._drive_share = self._drives(model, robot, description)
         n = len(self.joint_names)
-        self._reading = _reading(self._counts * self._tick, np.zeros(n), np.zeros(n))
+        self._noise_stddev = np.repeat(
+            [self.config.position_noise_stddev, self.config.velocity_noise_stddev], n
+        )
+        at_start = np.rint(data.qpos[self._qpos] * scale / self._tick) * self._tick
+        self._reading = _reading(at_start, np.zeros(n), np.zeros(n))
 
         prefix = f"{robot}/"
         self._actuators = np.array(
@@ -101,12 +109,13 @@ class Hardware:
         )
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
-        self._commands = data.ctrl[self._actuators].copy()
+        self._commands: list[float] = data.ctrl[self._actuators].tolist()
         self._latency_steps = round(command_latency / self._timestep)
-        self._under_way: deque[tuple[int, Array]] = deque()
+        self._under_way: deque[tuple[int, list[float]]] = deque()
         self._last_arrived = self._commands.copy()
-        turning = self._actuators[np.isin(names, list(wheels))]
-        self._wheels = _WheelServos(model, data, turning, self.config.wheel_integral_gain)
+        self._wheels = _WheelServos(
+            model, data, self._actuators, np.isin(names, list(wheels)), self.config.wheel_integral_gain
+        )
         self._positions = PositionServos(model, data, self._actuators)
         by_effort = [
             command
@@ -115,8 +124,8 @@ class Hardware:
         ]
         self._efforts = EffortServos(
             model,
-            data,
-            np.array([self._actuators[self._index[command.joint]] for command in by_effort], dtype=np.intp),
+            self._actuators,
+            [self._index[command.joint] for command in by_effort],
             [(command.lower, command.upper) for command in by_effort],
         )
         limited = model.actuator_forcelimited[self._actuators].astype(bool)
@@ -135,17 +144,16 @@ class Hardware:
         step = round(self._data.time / self._timestep)
         if step == self._step:
             return self._reading
-        counts = self._count()
+        data, tick, n = self._data, self._tick, len(self.joint_names)
         elapsed = (step - self._step) * self._timestep
-        n = len(self.joint_names)
-        noise = self._noise.normal(step, 2 * n)
-        position = self._data.qpos[self._qpos] + self.config.position_noise_stddev * noise[:n]
-        velocity = self._data.qvel[self._dof] + self.config.velocity_noise_stddev * noise[n:]
-        position = np.where(self._encoder, counts * self._tick, position)
-        velocity = np.where(self._encoder, (counts - self._counts) * (self._tick / elapsed), velocity)
-        self._counts, self._step = counts, step
-        effort = self._data.qfrc_actuator[self._drive_dof] * self._drive_share
-        self._reading = _reading(position, velocity, effort)
+        measured = self._noise_stddev * self._noise.normal(step, 2 * n)
+        measured += np.concatenate((data.qpos[self._qpos], data.qvel[self._dof]))
+        for i in self._encoders:  # one by one: for a few wheels arrays cost several times as much
+            count = self._count(i)
+            measured[i], measured[n + i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
+            self._counts[i] = count
+        effort = data.qfrc_actuator[self._drive_dof] * self._drive_share
+        self._step, self._reading = step, _reading(measured[:n], measured[n:], effort)
         return self._reading
 
     def command(self, joint: str, value: float) -> None:
@@ -161,7 +169,7 @@ class Hardware:
         """
         index = self._drive(joint)
         if math.isfinite(value):
-            self._commands[index] = value
+            self._commands[index] = float(value)
         else:
             self.refused += 1
 
@@ -183,10 +191,11 @@ class Hardware:
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
-        self._data.ctrl[self._actuators] = self._arrived() if self._latency_steps else self._commands
-        self._wheels.apply()
-        self._positions.apply()
-        self._efforts.apply()
+        commands = [*(self._arrived() if self._latency_steps else self._commands)]
+        self._wheels.apply(commands)
+        self._positions.apply(commands)
+        self._efforts.apply(commands)
+        self._data.ctrl[self._actuators] = commands
 
     def miscount(self, joint: str, angle: float) -> None:
         """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
@@ -210,14 +219,15 @@ class Hardware:
         Raises:
             SimulationError: No encoder measures this joint.
         """
-        index, before = self._index_of_encoder(joint), self._count()
+        index = self._index_of_encoder(joint)
+        before = self._count(index)
         self._scale[index] = factor * self._own_scale[index]
-        self._miscounted += before - self._count()
+        self._miscounted[index] += before - self._count(index)
 
     @property
     def encoders(self) -> tuple[str, ...]:
         """Joints that an encoder measures."""
-        return tuple(name for name, has in zip(self.joint_names, self._encoder, strict=True) if has)
+        return tuple(self.joint_names[i] for i in self._encoders)
 
     def _index_of_encoder(self, joint: str) -> int:
         if joint not in self.encoders:
@@ -239,7 +249,7 @@ class Hardware:
         shares = [np.sign(share) / drive_ratio(description, leader) for leader, share in found]
         return np.array(dofs, dtype=np.intp), np.array(shares)
 
-    def _arrived(self) -> Array:
+    def _arrived(self) -> list[float]:
         """Send the present commands on their way; return the newest ones that have arrived."""
         now = round(self._data.time / self._timestep)
         self._under_way.append((now + self._latency_steps, self._commands.copy()))
@@ -251,8 +261,9 @@ class Hardware:
         """Forget the past; to be called when the state of the physics was set from outside."""
         self._wheels.reset()
 
-    def _count(self) -> Array:
-        return np.rint(self._data.qpos[self._qpos] * self._scale / self._tick) + self._miscounted
+    def _count(self, joint: int) -> float:
+        angle = self._data.qpos.item(self._encoders[joint])
+        return round(angle * self._scale[joint] / self._tick) + self._miscounted[joint]
 
 
 class _WheelServos:
@@ -265,10 +276,17 @@ class _WheelServos:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp], gain: float
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        actuators: NDArray[np.intp],
+        turning: NDArray[np.bool_],
+        gain: float,
     ) -> None:
-        """Bind to the velocity actuators of the wheels; `gain` of the integral [1/s]."""
-        self._data, self._actuators, self._gain = data, actuators, gain
+        """Bind to those of a robot's actuators that turn wheels; `gain` of the integral [1/s]."""
+        self._data, self._gain = data, gain
+        self._which: list[int] = np.flatnonzero(turning).tolist()
+        actuators = actuators[turning]
         joints = model.actuator_trnid[actuators, 0]
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         torques = [_torque_limit(model, i) for i in actuators]
@@ -281,30 +299,30 @@ class _WheelServos:
 
     def reset(self) -> None:
         """Owe nothing; to be called when the state was set from outside."""
-        self._command = [0.0] * len(self._actuators)
-        self._owed = [0.0] * len(self._actuators)
+        self._command = [0.0] * len(self._which)
+        self._owed = [0.0] * len(self._which)
         self._position: list[float] = self._data.qpos[self._qpos].tolist()
         self._time = float(self._data.time)
 
-    def apply(self) -> None:
-        """Add the integral to the commands in `ctrl`."""
+    def apply(self, commands: list[float]) -> None:
+        """Add the integral to the commands of the wheels."""
         data = self._data
         now = float(data.time)
         elapsed = now - self._time
         position, speed = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
-        commands = data.ctrl[self._actuators].tolist()
         # Numbers one by one: for a few wheels arrays cost five times as much.
-        for i, (reach, fastest) in enumerate(zip(self._reach, self._fastest, strict=True)):
+        for i, (actuator, reach, fastest) in enumerate(
+            zip(self._which, self._reach, self._fastest, strict=True)
+        ):
             owed = self._owed[i] + self._command[i] * elapsed - (position[i] - self._position[i])
-            command = min(max(commands[i], -fastest), fastest)
+            command = min(max(commands[actuator], -fastest), fastest)
             low = max(speed[i] - reach, -fastest) - command
             high = min(speed[i] + reach, fastest) - command
             # Where the command alone is out of reach, nothing is owed.
             self._owed[i] = min(max(owed, min(low, 0.0) / self._gain), max(high, 0.0) / self._gain)
             self._command[i] = command
-            commands[i] = command + self._gain * self._owed[i]
+            commands[actuator] = command + self._gain * self._owed[i]
         self._position, self._time = position, now
-        data.ctrl[self._actuators] = commands
 
 
 def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:

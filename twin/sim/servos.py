@@ -69,37 +69,46 @@ class PositionServos:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp]) -> None:
         """Bind to those of `actuators` that `keep_velocity_limit` made; changes `slewmax` in `model`."""
-        self._model, self._data = model, data
-        kept = actuators[model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID]
+        self._data = data
+        is_kept = model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID
+        kept = actuators[is_kept]
         joints = model.actuator_trnid[kept, 0]
-        self._actuators, self._target = kept, model.actuator_actadr[kept]
+        self._which: list[int] = np.flatnonzero(is_kept).tolist()
+        self._kept, self._target = kept, model.actuator_actadr[kept]
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        fastest = model.actuator_dynprm[kept, _SLEWMAX]
+        self._slewmax = model.actuator_dynprm[:, _SLEWMAX]
+        fastest = self._slewmax[kept]
         ahead = fastest * model.actuator_biasprm[kept, 2] / model.actuator_biasprm[kept, 1]
         self._fastest: list[float] = fastest.tolist()
+        self._speeds = self._fastest
         self._ahead: list[float] = ahead.tolist()
         self._time = float(data.time)
 
-    def apply(self) -> None:
-        """Bound targets, and the commands in `ctrl`; called once a tick."""
-        data = self._data
-        elapsed, self._time = float(data.time) - self._time, float(data.time)
-        if not len(self._actuators):
+    def apply(self, commands: list[float]) -> None:
+        """Bound targets and the robot's commands; called once a tick."""
+        if not self._which:
             return
+        data = self._data
+        now = float(data.time)
+        elapsed, self._time = now - self._time, now
         position, velocity = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
-        targets, commands = data.act[self._target].tolist(), data.ctrl[self._actuators].tolist()
-        speeds = list(self._fastest)
+        before = data.act[self._target].tolist()
+        targets, speeds = before.copy(), self._speeds.copy()
         # Numbers one by one: for a few joints arrays cost several times as much.
-        for i, (here, fastest, ahead) in enumerate(zip(position, self._fastest, self._ahead, strict=True)):
+        for i, (which, here, fastest, ahead) in enumerate(
+            zip(self._which, position, self._fastest, self._ahead, strict=True)
+        ):
             targets[i] = min(max(targets[i], here - ahead), here + ahead)
             # where the joint will be at the end of the tick
             there = here + elapsed * min(max(velocity[i], -fastest), fastest)
-            commands[i] = min(max(commands[i], there - ahead), there + ahead)
+            commands[which] = min(max(commands[which], there - ahead), there + ahead)
             if elapsed > 0.0:
-                speeds[i] = min(abs(commands[i] - targets[i]) / elapsed, fastest)
-        data.act[self._target], data.ctrl[self._actuators] = targets, commands
-        if elapsed > 0.0:
-            self._model.actuator_dynprm[self._actuators, _SLEWMAX] = speeds
+                speeds[i] = min(abs(commands[which] - targets[i]) / elapsed, fastest)
+        # An arm is at rest most of the time: what is as it was is not written again.
+        if targets != before:
+            data.act[self._target] = targets
+        if speeds != self._speeds:
+            self._slewmax[self._kept], self._speeds = speeds, speeds
 
 
 class EffortServos:
@@ -108,32 +117,35 @@ class EffortServos:
     def __init__(
         self,
         model: mujoco.MjModel,
-        data: mujoco.MjData,
         actuators: NDArray[np.intp],
+        which: list[int],
         bounds: list[tuple[float | None, float | None]],
     ) -> None:
         """Bind to the effort-commanded ones of a robot's actuators.
 
         Args:
             model: Its force ranges are changed.
-            data: Of `model`.
-            actuators: What `keep_velocity_limit` left as a motor is left out.
+            actuators: The robot's.
+            which: Of them; what `keep_velocity_limit` left as a motor is left out.
             bounds: Least and largest command of each; None where there is no bound [N or Nm].
         """
-        self._model, self._data = model, data
-        made = model.actuator_biastype[actuators] != mujoco.mjtBias.mjBIAS_NONE
-        self._actuators = actuators[made]
+        chosen = np.array(which, dtype=np.intp)
+        made = model.actuator_biastype[actuators[chosen]] != mujoco.mjtBias.mjBIAS_NONE
+        self._which: list[int] = chosen[made].tolist()
+        self._limits = model.actuator_forcerange
+        self._actuators = actuators[self._which]
         self._velocity = model.actuator_ctrlrange[self._actuators, 1]
-        effort = model.actuator_forcerange[self._actuators, 1]
+        effort = self._limits[self._actuators, 1]
         given = np.array(bounds, dtype=np.float64).reshape(-1, 2)[made]  # None is NaN, which fmax passes over
         self._least: Array = np.fmax(given[:, 0], -effort)
         self._most: Array = np.fmin(given[:, 1], effort)
 
-    def apply(self) -> None:
-        """Turn the efforts in `ctrl` into velocities; called once a tick."""
-        if not len(self._actuators):
+    def apply(self, commands: list[float]) -> None:
+        """Turn efforts, of the robot's commands, into velocities; called once a tick."""
+        if not self._which:
             return
-        effort = np.clip(self._data.ctrl[self._actuators], self._least, self._most)
-        self._model.actuator_forcerange[self._actuators, 0] = -abs(effort)
-        self._model.actuator_forcerange[self._actuators, 1] = abs(effort)
-        self._data.ctrl[self._actuators] = np.copysign(self._velocity, effort)
+        effort = np.clip([commands[which] for which in self._which], self._least, self._most)
+        self._limits[self._actuators, 0] = -abs(effort)
+        self._limits[self._actuators, 1] = abs(effort)
+        for which, velocity in zip(self._which, np.copysign(self._velocity, effort).tolist(), strict=True):
+            commands[which] = velocity

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from twin.geometry import Array
+_ROWS = 128
+"""States that are noted before they are added up."""
 
 
 class WorkMeter:
@@ -27,24 +28,42 @@ class WorkMeter:
         self._dofs = model.jnt_dofadr[joints]
         self._of = {robot: np.array([owner == robot for owner in owners], dtype=bool) for robot in robots}
         self._work = np.zeros(len(joints))
-        self._forces: list[Array] = []
-        self._velocities: list[Array] = []
+        # A row for the state before physics steps, then one for each; row, first row of these steps.
+        self._forces, self._velocities = np.zeros((_ROWS, model.nv)), np.zeros((_ROWS, model.nv))
+        self._row = self._first = 0
+        self._noted: list[tuple[int, int]] = []
 
-    def begin(self) -> None:
-        """Note the state before physics steps."""
-        self._forces, self._velocities = [], [self._velocity.copy()]
+    def begin(self, steps: int) -> None:
+        """Note the state before so many physics steps."""
+        if self._row + steps >= len(self._forces):
+            self._add_up()
+        if steps >= len(self._forces):
+            self._forces, self._velocities = (np.zeros((steps + 1, len(self._force))) for _ in range(2))
+        self._first = self._row
+        self._velocities[self._row] = self._velocity
 
     def note(self) -> None:
         """Note a physics step."""
-        self._forces.append(self._force.copy())
-        self._velocities.append(self._velocity.copy())
+        self._row += 1
+        self._forces[self._row] = self._force
+        self._velocities[self._row] = self._velocity
 
     def end(self) -> None:
-        """Add up what was noted since `begin`."""
-        velocities = np.array(self._velocities)[:, self._dofs]
-        powers = np.array(self._forces)[:, self._dofs] * (velocities[:-1] + velocities[1:])
-        self._work += self._half_step * np.maximum(powers, 0.0).sum(axis=0)
+        """Note that these were all."""
+        self._noted.append((self._first, self._row))
+        self._row += 1
+
+    def _add_up(self) -> None:
+        """Add up what was noted; that of several calls together costs little more than that of one."""
+        velocities = self._velocities[: self._row, self._dofs]
+        powers = self._forces[1 : self._row, self._dofs] * (velocities[:-1] + velocities[1:])
+        np.maximum(powers, 0.0, out=powers)
+        for first, last in self._noted:
+            self._work += self._half_step * powers[first:last].sum(axis=0)
+        self._row = 0
+        self._noted.clear()
 
     def work(self, robot: str) -> float:
         """Return the work of a robot's actuators since the start [J]."""
+        self._add_up()
         return float(self._work[self._of[robot]].sum())

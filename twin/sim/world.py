@@ -110,7 +110,7 @@ class World:
         if self._work_meter is None:
             mujoco.mj_step(self.model, self.data, n)
         else:
-            self._work_meter.begin()
+            self._work_meter.begin(n)
             for _ in range(n):
                 mujoco.mj_step(self.model, self.data)
                 self._work_meter.note()

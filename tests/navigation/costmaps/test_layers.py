@@ -24,7 +24,7 @@ from twin.navigation.costmaps.footprint import padded, rectangle
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
-from twin.navigation.costmaps.window import Window
+from twin.navigation.costmaps.window import NOTHING, Window, differing
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
 
@@ -363,3 +363,19 @@ def test_of_a_map_with_other_cells_nothing_is_taken() -> None:
     layered = LayeredCostmap(config=config, static_map=floor(40, 40, -2.0, -2.0, 0.1))
     layered.adopt(old)
     assert not layered.costmap.costs.any()
+
+
+@pytest.mark.parametrize("changes", [0, 1, 2, 5])
+def test_what_differs_is_within_the_smallest_window(changes: int) -> None:
+    rng = np.random.default_rng(changes)
+    for _ in range(20):
+        before = rng.integers(0, 255, size=(9, 13), dtype=np.uint8)
+        after = before.copy()
+        cells = np.column_stack([rng.integers(0, 9, size=changes), rng.integers(0, 13, size=changes)])
+        after[cells[:, 0], cells[:, 1]] += 1
+        found = differing(before, after, Window(3, 4, 16, 13))
+        if not changes:
+            assert found == NOTHING
+        else:
+            (y0, x0), (y1, x1) = cells.min(axis=0), cells.max(axis=0) + 1
+            assert found == (3 + x0, 4 + y0, 3 + x1, 4 + y1)

@@ -324,3 +324,14 @@ def test_a_charger_a_beam_too_narrow_is_another_thing() -> None:
         for aside in np.linspace(-0.01, 0.01, 9):
             dock.take_scan(cast([(2.0, aside - width / 2, 2.0, aside + width / 2)]), ORIGIN)
         assert dock.seen == is_it, width
+
+
+@pytest.mark.parametrize("sights", [1, 2, 3, 8, 9])
+def test_the_face_is_the_median_of_its_sights(sights: int) -> None:
+    rng = np.random.default_rng(sights)
+    estimate = DockEstimate(Pose2(2.0, 0.0, 0.0), DockEstimateConfig(), wants_box=False)
+    offsets = rng.normal(scale=0.01, size=sights).tolist()
+    for offset in offsets:
+        wall = np.column_stack([np.full(60, 2.0 + offset), np.linspace(-0.6, 0.6, 60)])
+        assert estimate.take_scan(wall, Pose2(0.0, 0.0, 0.0))
+    assert estimate.face.x == pytest.approx(2.0 + np.median(offsets), abs=1e-12)

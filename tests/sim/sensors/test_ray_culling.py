@@ -82,3 +82,17 @@ def test_many_rays_hit_what_single_rays_hit(tilt: float) -> None:
         assert np.isfinite(truth).mean() > 0.5
         np.testing.assert_array_equal(world.model.geom_group, groups)
         np.testing.assert_array_equal(world.model.bvh_aabb, volumes)
+
+
+def test_a_robot_that_drives_over_bumps_sees_what_single_rays_hit() -> None:
+    """What its lidar's plane misses is found anew when the plane has moved, however slowly."""
+    spec, rng = replace(LIDAR, samples=61, range_min=0.0), np.random.default_rng(4)
+    world = World.compose(_yard(), [placed(Pose3.from_xyz_rpy(), "kinematic", sensors=(spec,))])
+    cart, place, turn = world.robots["cart"], np.array([0.0, 0.0, 0.05]), np.zeros(3)
+    for _ in range(150):
+        place += rng.normal(scale=0.002, size=3)
+        turn += rng.normal(scale=0.0005, size=3)
+        cart.set_kinematic_pose(Pose3.from_xyz_rpy(place, turn))
+        world.step()
+        truth = _one_by_one(world, "cart/laser", np.linspace(spec.angle_min, spec.angle_max, spec.samples))
+        np.testing.assert_allclose(cart.sensors[0].sample(world.time_ns).ranges, truth, atol=1e-9)

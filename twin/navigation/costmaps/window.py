@@ -56,11 +56,14 @@ def everything(shape: tuple[int, ...]) -> Window:
 
 def differing(before: NDArray[np.uint8], after: NDArray[np.uint8], window: Window) -> Window:
     """Return the smallest window, of the grid that `window` was cut out of, in which two cuts differ."""
-    ys, xs = np.nonzero(before != after)
+    differs = before != after
+    ys = np.flatnonzero(differs.any(axis=1))
     if not ys.size:
         return NOTHING
-    x0, y0 = window.x0 + int(xs.min()), window.y0 + int(ys[0])
-    return Window(x0, y0, window.x0 + int(xs.max()) + 1, window.y0 + int(ys[-1]) + 1)
+    y0, y1 = int(ys[0]), int(ys[-1]) + 1
+    xs = np.flatnonzero(differs[y0:y1].any(axis=0))
+    x0, x1 = int(xs[0]), int(xs[-1]) + 1
+    return Window(window.x0 + x0, window.y0 + y0, window.x0 + x1, window.y0 + y1)
 
 
 def raised(costs: Cells, layer: Cells) -> Cells:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -58,14 +58,14 @@ class DockEstimate:
         if not self._middles:
             return self._expected @ edge
         # The box stands behind the edge: its foot on the face is what the robot lines up with.
-        x, y = np.median(self._middles, axis=0).tolist()
+        x, y = _medians(self._middles)
         return self._expected @ edge @ Pose2(0.0, (edge.inverse() @ Pose2(x, y, 0.0)).y, 0.0)
 
     def _edge(self) -> Pose2:
         """Return the point of the face on the expected dock's x axis, in the expected dock's frame."""
         if not self._walls:
             return Pose2(0.0, 0.0, 0.0)
-        x, yaw = np.median(self._walls, axis=0).tolist()
+        x, yaw = _medians(self._walls)
         return Pose2(x, 0.0, yaw)
 
     def take_scan(self, points: Array, T_odom_base: Pose2) -> bool:
@@ -112,3 +112,10 @@ class DockEstimate:
         nearest = min(there, key=lambda box: abs(box.y))
         self._middles.append((nearest.x, nearest.y))
         return True
+
+
+def _medians(pairs: Iterable[tuple[float, float]]) -> Iterator[float]:
+    """Yield the median of each column; for a few numbers numpy takes several times as long."""
+    for column in zip(*pairs, strict=True):
+        values, middle = sorted(column), len(column) // 2
+        yield values[middle] if len(values) % 2 else (values[middle - 1] + values[middle]) / 2.0

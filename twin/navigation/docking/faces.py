@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +81,7 @@ def fit_wall(
 def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, float] | None:
     """Return unit normal and offset [m] of the line through two points that most lie on; see `fit_wall`."""
     some = points[np.linspace(0, len(points) - 1, min(HYPOTHESIS_POINTS, len(points))).astype(np.int64)]
-    i, j = np.triu_indices(len(some), k=1)
+    i, j = _pairs(len(some))
     along = some[j] - some[i]
     length = np.hypot(along[:, 0], along[:, 1])
     apart = length > 2.0 * _ON_LINE
@@ -97,6 +98,12 @@ def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, flo
     squared = (normals @ some.T - offsets[:, None]) ** 2
     best = int(np.argmin(np.minimum(squared, _ON_LINE**2).sum(axis=1)))
     return normals[best], float(offsets[best])
+
+
+@lru_cache
+def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the indices of every pair of so many things."""
+    return np.triu_indices(count, k=1)
 
 
 def find_box_faces(points: ArrayLike, width: float, *, width_tolerance: float = 0.03) -> list[BoxFace]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,8 @@ from twin.geometry import Array
 
 _FLAT = 1e-12
 """Out of their plane, rays of unit length reach no farther than that."""
-_MARGIN_M = 1e-6
+_SLACK_M = 0.005
+"""A shape so near to the plane of a fan is seen: so the plane of a robot that drives is looked at seldom."""
 _HIDDEN = mujoco.mjNGROUP - 1
 """A group that no ray sees."""
 
@@ -69,15 +72,22 @@ class FanSlice:
         bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
         self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & is_flat)
         self._centre, self._half = _boxes(model, self._geoms)
+        self._radius = float(np.linalg.norm(np.abs(self._centre) + self._half, axis=1).max(initial=0.0))
         self._shown = self._groups[self._geoms]
         self._now = self._shown
+        self._plane: tuple[Array, float] = np.zeros(3), math.inf
+        """Normal and height [m] when it was looked at last, in the world."""
 
     def look(self, data: mujoco.MjData, body: int) -> None:
         """Find what the plane of the fan, whose link is `body`, meets at present."""
         normal = data.xmat[body].reshape(3, 3) @ self._normal
-        height = self._centre @ normal - data.xpos[body] @ normal
-        reach = self._half @ np.abs(normal) + _MARGIN_M
-        self._now = np.where(np.abs(height) > reach, _HIDDEN, self._shown)
+        height = float(data.xpos[body] @ normal)
+        turned = math.dist(normal, self._plane[0])
+        if self._radius * turned + abs(height - self._plane[1]) < _SLACK_M / 2.0:
+            return
+        self._plane = normal, height
+        reach = self._half @ np.abs(normal) + _SLACK_M
+        self._now = np.where(np.abs(self._centre @ normal - height) > reach, _HIDDEN, self._shown)
 
     def __enter__(self) -> None:
         self._groups[self._geoms] = self._now

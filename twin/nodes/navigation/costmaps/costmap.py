@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -44,11 +44,17 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
         inf_is_valid: Whether they do; if not they are NaN, as those below the least range are.
     """
     ranges = message.ranges.astype(np.float64)
-    angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
-    silent = ranges > message.range_max
-    ranges[silent] = no_return if inf_is_valid else np.nan
+    ranges[ranges > message.range_max] = no_return if inf_is_valid else np.nan
     ranges[ranges < message.range_min] = np.nan
-    return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
+    points: Array = ranges[:, None] * _directions(message.angle_min, message.angle_increment, len(ranges))
+    return points
+
+
+@lru_cache(maxsize=64)
+def _directions(first: float, step: float, count: int) -> Array:
+    """Return unit vectors of a lidar's rays in its frame, shape (count, 2), from their angles [rad]."""
+    angles = first + step * np.arange(count)
+    return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 class _ScanSource:

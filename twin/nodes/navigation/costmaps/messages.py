@@ -26,7 +26,7 @@ _OCCUPANCY[[FREE_SPACE, INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, NO_INFORMA
 
 def occupancy_grid(grid: Costmap, frame: str, time_ns: int) -> OccupancyGrid:
     """Return a costmap as `costmap` shows it: 0 free ... 98, 99 inscribed, 100 lethal, -1 unknown."""
-    return grid_msg(_OCCUPANCY[grid.costs], grid.resolution, Pose2(*grid.origin, 0.0), frame, time_ns)
+    return grid_msg(_OCCUPANCY.take(grid.costs), grid.resolution, Pose2(*grid.origin, 0.0), frame, time_ns)
 
 
 def costmap_msg(grid: Costmap, frame: str, time_ns: int) -> Any:

@@ -100,7 +100,8 @@ class CollisionMonitorNode:
                 points = scan_points(message, np.nan)
             else:
                 return  # a lidar that broke or froze is as good as silent
-            self._readings[topic] = _Reading(message.header, points[np.isfinite(points).all(axis=1)])
+            there = np.isfinite(points[:, 0])  # x and y are a range times a direction
+            self._readings[topic] = _Reading(message.header, points.compress(there, axis=0))
 
         return on_message
 
