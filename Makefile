@@ -29,7 +29,8 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a run to physics and rays alone, a conversion to MuJoCo's compilation, messages to a put
+bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to physics and rays alone, a conversion to MuJoCo's compilation, messages to a put
+	$(BIN)/python -m benchmarks.measures.start_cost
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
 	$(BIN)/python -m benchmarks.measures.cdr_cost

@@ -1,12 +1,14 @@
 """Writes the tables of docs/scenarios.md, arenas.md, navigation.md and api.md: `python docs/reference.py`.
 
-Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. With `--check`
-nothing is written; the exit code is 1 if a page is not up to date.
+Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The table of the
+hashes of message types is written, too. With `--check` nothing is written; the exit code is 1 if something is
+not up to date.
 """
 
 from __future__ import annotations
 
 import gc
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -15,10 +17,13 @@ from typing import Any, NamedTuple, get_args
 
 from api_reference import api
 
+from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.node import Node
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
+from twin.bridge.types.known_hashes import TABLE as HASHES
+from twin.bridge.types.type_hash import rihs01_of
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
@@ -325,7 +330,15 @@ def pages() -> dict[Path, str]:
         arenas: updated(
             arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)
         ),
+        HASHES: json.dumps({"note": "written by docs/reference.py", "hashes": hashes()}, indent=0) + "\n",
     }
+
+
+def hashes() -> dict[str, str]:
+    """Return the hash of every type that an endpoint may have: also of the parts of actions that travel."""
+    parts = ("", "_SendGoal", "_GetResult", "_FeedbackMessage")
+    travelling = [name + part for name in types.names() for part in (parts if "/action/" in name else ("",))]
+    return {name: rihs01_of(name, types.definitions(name)) for name in travelling}
 
 
 def main() -> int:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -11,6 +14,10 @@ from hypothesis import settings
 from tests.processes import free_endpoint
 
 os.environ["PYTHONPATH"] = str(Path(__file__).parents[1])
+
+if "TWIN_CACHE" not in os.environ:  # the processes that tests start, and pytest-xdist's, have the same one
+    os.environ["TWIN_CACHE"] = tempfile.mkdtemp(prefix="twin-cache-")
+    atexit.register(shutil.rmtree, os.environ["TWIN_CACHE"], ignore_errors=True)
 
 settings.register_profile("twin", deadline=None)  # a busy machine is no fault of an example
 settings.load_profile("twin")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import re
 import shutil
@@ -11,9 +12,11 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 from xml.etree import ElementTree
 
 import pytest
@@ -198,14 +201,9 @@ def test_commands_that_are_not_run_could_be(page: str) -> None:
 
 
 def help_of(command: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "twin.cli", *command.split(), "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "COLUMNS": "200"},
-    )
-    return done.stdout
+    with patch.dict(os.environ, {"COLUMNS": "200"}), redirect_stdout(io.StringIO()) as shown:
+        COMMAND_LINE.main([*command.split(), "--help"], standalone_mode=False)
+    return shown.getvalue()
 
 
 def all_commands(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -219,7 +217,8 @@ def all_commands(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{name}", command
 
 
-COMMANDS: dict[str, Any] = dict(all_commands(get_command(app_module.app)))
+COMMAND_LINE = get_command(app_module.app)
+COMMANDS: dict[str, Any] = dict(all_commands(COMMAND_LINE))
 
 
 @pytest.mark.parametrize("command", sorted(COMMANDS))

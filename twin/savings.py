@@ -9,5 +9,12 @@ from dataclasses import dataclass
 class Savings:
     """Each can be switched off; a run without them is slower, and the oracle of the one with them."""
 
+    due: bool = True
+    """Nodes run only when something has come, or is due; otherwise all of them in every spin."""
+    services_in_process: bool = True
+    """Requests and responses go through Zenoh only if another process may have a part in it."""
+    by_reference: bool = True
+    """Within a process a message that nobody changes any more is handed over as it is, not as bytes."""
+
 
 ALL = Savings()

@@ -41,6 +41,8 @@ def test_spin_order_is_inbox_then_timers_then_executions_node_by_node(bus: Bus, 
     log: list[str] = []
 
     class Execution:
+        due_ns = 0
+
         def step(self) -> None:
             log.append("execution")
 

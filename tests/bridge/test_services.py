@@ -1,15 +1,26 @@
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
+import zenoh
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.services import Respond
 from twin.bridge.srvs import AddTwoInts, Trigger
+from twin.bridge.wire.session import SessionConfig
 from twin.errors import BridgeError
+from twin.savings import ALL
+
+
+@pytest.fixture(params=[True, False], ids=["in process", "through Zenoh"])
+def bus(request: pytest.FixtureRequest, clock: Clock) -> Iterator[Bus]:
+    savings = replace(ALL, services_in_process=request.param)
+    with Bus.of(SessionConfig(name="twin"), clock, savings=savings) as opened:
+        yield opened
 
 
 def test_a_request_is_answered_in_the_servers_spin(bus: Bus) -> None:
@@ -155,3 +166,31 @@ def test_a_task_waits_for_a_service_and_its_answer(bus: Bus, clock: Clock) -> No
         bus.spin()
     assert task.done
     assert task.result == (False, True, 3)
+
+
+def test_services_of_one_name_are_all_asked_and_the_first_answer_counts(bus: Bus) -> None:
+    asked: list[Any] = []
+    for name in ("mute", "talking"):
+        bus.create_node(name).create_deferred_service(Trigger, "go", lambda _, respond: asked.append(respond))
+    client = bus.create_node("client").create_client(Trigger, "go")
+    futures = [client.call_async(Trigger.Request()) for _ in range(2)]
+    bus.spin()
+    assert len(asked) == 4
+    asked[2](Trigger.Response(True, ""))
+    bus.nodes[0].destroy()
+    bus.spin()
+    assert [future.done for future in futures] == [True, False]  # the other may still answer
+    bus.nodes[0].destroy()
+    bus.spin()
+    with pytest.raises(BridgeError, match="nobody answered"):
+        _ = futures[1].result
+
+
+def test_who_takes_the_session_hears_requests(bus: Bus) -> None:
+    keys: list[str] = []
+    client = bus.create_node("client").create_client(Trigger, "go")
+    handler = zenoh.handlers.Callback(lambda query: keys.append(str(query.key_expr)), indirect=False)
+    with bus.session.declare_queryable("**", handler, complete=True):
+        assert client.service_is_ready
+        client.call_async(Trigger.Request())
+    assert keys == [client.key]

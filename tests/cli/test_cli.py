@@ -22,6 +22,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from twin.cli import app as app_module
+from twin.cli.own_commands import TABLE
 from twin.cli.play import find_recording
 from twin.cli.run import batch, repeat
 from twin.cli.run.child import run_in_child
@@ -133,13 +134,18 @@ def test_help_loads_nothing_heavy() -> None:
     assert "Run a scenario to its verdict" in done.stdout
 
 
-@pytest.mark.parametrize("command", [name for name, *_ in app_module._COMMANDS])
+@pytest.mark.parametrize("command", [name for name, own in TABLE.items() if own.example])
 def test_help_of_every_command_has_an_example_that_parses(command: str) -> None:
     result = CliRunner().invoke(app_module.app, [command, "--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     example = re.search(r"Example: (twin .*?)\s*$", result.output, re.MULTILINE)
     assert example is not None
     assert example[1].split()[1] == command
+
+
+def test_the_list_of_commands_says_of_each_what_its_own_help_begins_with() -> None:
+    for name, command in get_command(app_module.app).commands.items():  # type: ignore[attr-defined]
+        assert TABLE[name].summary == command.help.partition("\n\n")[0].replace("\n", " ")
 
 
 def test_no_help_text_is_taken_for_markup() -> None:

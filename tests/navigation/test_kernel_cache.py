@@ -77,8 +77,8 @@ def test_what_did_not_change_is_loaded_and_not_compiled(kernels: Path) -> None:
     assert imported().total(1) == 258
     again = imported().total
     assert again(1) == 258
-    assert sum(again.stats.cache_hits.values()) == 1
-    assert not again.stats.cache_misses
+    assert sum(again.dispatcher.stats.cache_hits.values()) == 1
+    assert not again.dispatcher.stats.cache_misses
 
 
 @pytest.mark.parametrize(
@@ -106,4 +106,4 @@ def test_what_is_compiled_with_other_options_is_compiled_anew(kernels: Path) -> 
     edit(kernels / "inner.py", "import jit", "import fast_jit as jit")
     other = imported().total
     assert other(1) == 258
-    assert not other.stats.cache_hits
+    assert not other.dispatcher.stats.cache_hits

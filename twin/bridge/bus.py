@@ -63,6 +63,7 @@ class Bus:
         """Of nodes that are created without options: the program's command line."""
         self._nodes: list[Node] = []
         self._ids = 0
+        self._spun_ns = 0
         self._thread = threading.get_ident()
         self._closed = False
         self._starting: Any = None
@@ -197,11 +198,15 @@ class Bus:
         return len(arrivals)
 
     def spin(self) -> None:
-        """Run every node once, in the order of creation."""
+        """Run every node that has something to do once, in the order of creation."""
         if guard.pending:
             guard.deliver()
+        now_ns = self.clock.now_ns
+        everyone = now_ns < self._spun_ns or not self.savings.due  # set back, all timers look again
+        self._spun_ns = now_ns
         for node in self.nodes:
-            node.spin()
+            if node.inbox or node.due_ns <= now_ns or everyone:
+                node.spin()
 
     def tap(self, callback: Tap) -> None:
         """Call back for every sample that this process publishes, while it publishes it."""

@@ -48,6 +48,11 @@ def transform_from_pose3(pose: Pose3) -> Transform:
     return Transform(Vector3(*pose.xyz.tolist()), Quaternion(x, y, z, w))
 
 
+def transform_from_pose2(pose: Pose2) -> Transform:
+    """Return a planar T_a_b as the transform message whose header says a and whose child is b."""
+    return Transform(Vector3(float(pose.x), float(pose.y), 0.0), quaternion_from_yaw(pose.yaw))
+
+
 def pose3_from_transform(transform: Transform) -> Pose3:
     """Return a transform message as T_parent_child."""
     t, q = transform.translation, transform.rotation

@@ -1,18 +1,24 @@
-"""Commands that other distributions add to `twin`: entry points of the group `twin.commands`.
+"""All commands of `twin`: its own, and those that other distributions add by entry points of `twin.commands`.
 
-Each names a `typer.Typer`. It is loaded when its command is called, never to list or complete what there is.
+An entry point names a `typer.Typer`. Every command is loaded when it is called, never to list what there is.
 """
 
 from __future__ import annotations
 
-from importlib import metadata
-from typing import Any
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_group
 
+from twin.cli.own_commands import TABLE, OwnCommands
 from twin.errors import TwinError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "twin.commands"
 PANEL = "Of other distributions"
@@ -24,14 +30,25 @@ _BESIDE_TWIN = {"bench": ("twin-benchmarks", "benchmarks")}
 class Commands(TyperGroup):
     """The commands of twin, then those of other distributions; twin's own go first."""
 
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self.commands = OwnCommands()
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the list of commands."""
+        _import_help()
+        super().format_help(ctx, formatter)
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
-        return [*super().list_commands(ctx), *(name for name in _others() if name not in self.commands)]
+        return [*self.commands, *(name for name in _others() if name not in self.commands)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return what a list shows of a command."""
-        if cmd_name in self.commands or cmd_name not in (others := _others()):
-            return super().get_command(ctx, cmd_name)
+        if own := TABLE.get(cmd_name):
+            return TyperCommand(cmd_name, help=own.summary, rich_help_panel=own.panel)
+        if cmd_name not in (others := _others()):
+            return None
         return TyperCommand(cmd_name, help=_summary(others[cmd_name][0]), rich_help_panel=PANEL)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -41,27 +58,44 @@ class Commands(TyperGroup):
             TwinError: the distribution that has the command is missing, or cannot be used.
         """
         name = args[0]
-        if name not in self.commands:
-            if points := _others().get(name):
-                return name, _load(name, points), args[1:]
-            if name in _BESIDE_TWIN and not ctx.resilient_parsing:
-                distribution, folder = _BESIDE_TWIN[name]
-                raise TwinError(
-                    f"twin {name} comes with the distribution {distribution}, which is not installed; "
-                    f"in twin's repository: pip install ./{folder}"
-                )
+        if name in self.commands:
+            return name, self.commands[name], args[1:]
+        if points := _others().get(name):
+            return name, _load(name, points), args[1:]
+        if name in _BESIDE_TWIN and not ctx.resilient_parsing:
+            distribution, folder = _BESIDE_TWIN[name]
+            raise TwinError(
+                f"twin {name} comes with the distribution {distribution}, which is not installed; "
+                f"in twin's repository: pip install ./{folder}"
+            )
         return super().resolve_command(ctx, args)
 
 
-def _others() -> dict[str, list[metadata.EntryPoint]]:
+def _import_help() -> None:
+    """Import what typer writes help with, but for what of rich takes longest and is not used for this."""
+    unused = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
+    absent = {name: cls for name, cls in unused.items() if name not in sys.modules}
+    for name, cls in absent.items():
+        sys.modules[name] = ModuleType(name)
+        setattr(sys.modules[name], cls, None)
+    try:
+        import_module("typer.rich_utils")
+    finally:
+        for name in absent:
+            del sys.modules[name]
+
+
+def _others() -> dict[str, list[EntryPoint]]:
     """Return the entry points by name; one that is found twice, as in a checkout, counts once."""
-    found: dict[str, dict[str, metadata.EntryPoint]] = {}
+    from importlib import metadata  # takes as long as typer does, and few calls come here
+
+    found: dict[str, dict[str, EntryPoint]] = {}
     for point in metadata.entry_points(group=GROUP):
         found.setdefault(point.name, {}).setdefault(point.value, point)
     return {name: list(points.values()) for name, points in sorted(found.items())}
 
 
-def _load(name: str, points: list[metadata.EntryPoint]) -> TyperGroup:
+def _load(name: str, points: list[EntryPoint]) -> TyperGroup:
     if len(points) > 1:
         raise TwinError(f"several distributions have twin {name}: {', '.join(map(_origin, points))}")
     origin = _origin(points[0])
@@ -74,9 +108,9 @@ def _load(name: str, points: list[metadata.EntryPoint]) -> TyperGroup:
     return get_group(app)
 
 
-def _origin(point: metadata.EntryPoint) -> str:
+def _origin(point: EntryPoint) -> str:
     return f"{point.value} of {point.dist.name}" if point.dist is not None else point.value
 
 
-def _summary(point: metadata.EntryPoint) -> str:
+def _summary(point: EntryPoint) -> str:
     return (point.dist.metadata["Summary"] if point.dist is not None else None) or point.value

@@ -5,30 +5,43 @@ Copy an array by a loop: to assign one to a slice compiles numba's message about
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import Any, TypeVar
-
-import numba
-
-from twin.navigation._kernel_cache import KernelCache
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_REORDER = {"reassoc", "contract", "nsz", "arcp"}
+_REORDER = frozenset({"reassoc", "contract", "nsz", "arcp"})
 """What may change in the last bit; that NaN and infinity are none of its business is not among it."""
+
+
+class Kernel:
+    """A function that is compiled, or loaded from the disk, at its first call; so is numba."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        functools.update_wrapper(self, function)
+        self._function, self._options = function, options
+
+    def __call__(self, *args: Any) -> Any:
+        return self.dispatcher(*args)
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of the function, with a cache that sees what other files give to it."""
+        import numba
+
+        from twin.navigation._kernel_cache import KernelCache
+
+        dispatcher: Any = numba.njit(**self._options)(self._function)
+        dispatcher._cache = KernelCache(dispatcher)
+        return dispatcher
 
 
 def jit(function: F) -> F:
     """Return `function` compiled at its first call; the machine code is cached beside the source."""
-    return _cached(numba.njit(function))
+    return cast(F, Kernel(function))
 
 
 def fast_jit(function: F) -> F:
     """As `jit`, for loops over many numbers: sums may be taken in another order, and so eight at a time."""
-    return _cached(numba.njit(error_model="numpy", fastmath=_REORDER)(function))
-
-
-def _cached(dispatcher: Any) -> Any:
-    """Do as `numba.njit(cache=True)` does, with a cache that sees what other files give to the function."""
-    dispatcher._cache = KernelCache(dispatcher)
-    return dispatcher
+    return cast(F, Kernel(function, error_model="numpy", fastmath=set(_REORDER)))

@@ -17,6 +17,10 @@ import llvmlite
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime.nrt import rtsys
+from numba.extending import typeof_impl
+
+from twin.navigation._jit import Kernel
 
 
 class KernelCache(FunctionCache):
@@ -26,9 +30,24 @@ class KernelCache(FunctionCache):
         super().__init__(kernel.py_func)  # type: ignore[no-untyped-call]
         self._kernel = kernel
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what lies on disk, or None.
+
+        Machine code needs numba's runtime; of all else that a compilation needs it is loaded without.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+
     def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
         key = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
         return (*key, content_hash(self._kernel))
+
+
+@typeof_impl.register(Kernel)
+def _typeof(kernel: Kernel, context: Any) -> Any:
+    """Let kernels call each other."""
+    return typeof_impl(kernel.dispatcher, context)
 
 
 @cache
@@ -80,8 +99,8 @@ def _value_parts(value: object, names: tuple[str, ...], package: str, seen: set[
         package: The kernel's; modules of others change with their version only.
         seen: The kernels that were asked already.
     """
-    if isinstance(value, Dispatcher):
-        yield from _kernel_parts(value, seen)
+    if isinstance(value, Kernel):
+        yield from _kernel_parts(value.dispatcher, seen)
     elif isinstance(value, ModuleType):
         yield value.__name__
         if _package(value.__name__) == package:

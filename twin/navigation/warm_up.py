@@ -2,35 +2,24 @@
 
 Each node calls its own function when it is built: a robot that does not explore waits for no explorer. A
 function calls what is compiled with the types that it is called with later, in a room of 2 x 2 m, once per
-process.
+process; it imports that itself, for it is imported by nodes that need but one of them.
 """
 
 from __future__ import annotations
 
 import contextlib
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twin.geometry import Pose2
-from twin.navigation.control.collision_monitor import time_to_collision
-from twin.navigation.control.controller import Controller
-from twin.navigation.control.maneuver import Maneuver
-from twin.navigation.costmaps.costmap import footprint_cost
-from twin.navigation.costmaps.filters import KeepoutFilter
-from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
-from twin.navigation.exploration.explorer import Explorer
 from twin.navigation.failures import ControlFailure
-from twin.navigation.localisation.evidence import same_surface
-from twin.navigation.localisation.laser_scan import chosen_beams
-from twin.navigation.localisation.likelihood_field import LikelihoodField
-from twin.navigation.localisation.particles import clusters, regularised, tempered_weights
-from twin.navigation.localisation.surface_distance import SurfaceDistance
 from twin.navigation.maps.occupancy_map import OccupancyMap
-from twin.navigation.odometry_watch import OdometryWatch
-from twin.navigation.planning.planner import ThetaStar
-from twin.navigation.planning.smoother import SimpleSmoother
-from twin.navigation.recovery import DriveOnHeading
+
+if TYPE_CHECKING:
+    from twin.navigation.control.controller import Controller
+    from twin.navigation.costmaps.layered_costmap import LayeredCostmap
 
 _START, _GOAL = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
 
@@ -44,6 +33,8 @@ def warm_up_costmap() -> None:
 @cache
 def warm_up_odometry_watch() -> None:
     """Let scans of a corner contradict odometry, so that their motion is looked for."""
+    from twin.navigation.odometry_watch import OdometryWatch
+
     along = np.linspace(0.0, 1.0, 30)
     corner = np.column_stack([np.minimum(2.0 * along, 1.0), np.minimum(2.0 - 2.0 * along, 1.0)])
     watch = OdometryWatch()
@@ -60,12 +51,17 @@ def warm_up_ranges() -> None:
 @cache
 def warm_up_keepout() -> None:
     """Lay a mask over a costmap."""
+    from twin.navigation.costmaps.filters import KeepoutFilter
+
     _costmap().set_keepout(KeepoutFilter(mask=_room()))
 
 
 @cache
 def warm_up_planning() -> None:
     """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
+    from twin.navigation.planning.planner import ThetaStar
+    from twin.navigation.planning.smoother import SimpleSmoother
+
     costmap = _costmap().costmap
     SimpleSmoother().smooth(ThetaStar().create_plan(costmap, _START, _GOAL), costmap)
 
@@ -73,6 +69,8 @@ def warm_up_planning() -> None:
 @cache
 def warm_up_maneuver() -> None:
     """Look for a way on to a path, and begin to drive it."""
+    from twin.navigation.control.maneuver import Maneuver
+
     layered, at, path = _costmap(), Pose2(1.0, 1.0, 0.0), np.array([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
     maneuver = Maneuver(footprint=layered.config.polygon)
     maneuver.begin(layered.costmap, at, path)
@@ -82,6 +80,9 @@ def warm_up_maneuver() -> None:
 @cache
 def warm_up_behaviors() -> None:
     """Look whether a command collides."""
+    from twin.navigation.costmaps.costmap import footprint_cost
+    from twin.navigation.recovery import DriveOnHeading
+
     layered = _costmap()
     footprint_cost(layered.costmap, layered.config.polygon, _START)
     DriveOnHeading().update(_START, 0.1, layered.costmap)
@@ -90,18 +91,28 @@ def warm_up_behaviors() -> None:
 @cache
 def warm_up_collision_monitor() -> None:
     """Look when two points are hit."""
+    from twin.navigation.control.collision_monitor import time_to_collision
+
     time_to_collision(np.ones((2, 2)), _costmap().config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
 
 
 @cache
 def warm_up_exploration() -> None:
     """Look for what there is to explore."""
+    from twin.navigation.exploration.explorer import Explorer
+
     Explorer().update(_room(), _START, 0.0)
 
 
 @cache
 def warm_up_localisation() -> None:
     """Weigh two particles by a scan. The beam model compiles when it is first used."""
+    from twin.navigation.localisation.evidence import same_surface
+    from twin.navigation.localisation.laser_scan import chosen_beams
+    from twin.navigation.localisation.likelihood_field import LikelihoodField
+    from twin.navigation.localisation.particles import clusters, regularised, tempered_weights
+    from twin.navigation.localisation.surface_distance import SurfaceDistance
+
     beams = chosen_beams([0.5, 0.6], [0.0, 1.0], Pose2(0.0, 0.0, 0.0), most=2, min_range=0.0, max_range=9.0)
     field = LikelihoodField(SurfaceDistance(_room(), max_dist=2.0), z_hit=0.5, z_rand=0.5)
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
@@ -112,6 +123,8 @@ def warm_up_localisation() -> None:
 
 def warm_up_controller(controller: Controller) -> None:
     """Let a controller drive a few commands along a path that bends and ends, and forget them."""
+    from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+
     data = np.zeros((80, 80), dtype=np.int8)
     data[30, 40] = 100
     room = OccupancyMap(data=data, resolution=0.05, origin=Pose2(0.0, 0.0, 0.0))
@@ -130,4 +143,6 @@ def _room() -> OccupancyMap:
 
 
 def _costmap() -> LayeredCostmap:
+    from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+
     return LayeredCostmap(config=CostmapConfig(robot_radius=0.1), static_map=_room())

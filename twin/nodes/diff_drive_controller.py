@@ -17,7 +17,7 @@ from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
-from twin.geometry import Array, Pose2, Pose3
+from twin.geometry import Array, Pose2
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Flat, Le, PeriodNs, Positive
@@ -70,11 +70,11 @@ class DiffDriveControllerNode:
         self._right = [index[name] for name in config.right_joints]
         self._publisher = self.node.create_publisher(OdometryMsg, "odom", 10)
         self._tf = TransformBroadcaster(self.node)
-        self.node.create_subscription(Twist, "cmd_vel", self._on_cmd_vel, 10)
+        self.node.create_subscription(Twist, "cmd_vel", self._on_cmd_vel, 10, frozen=True)
         self._gyro: list[float] = []
         """Yaw rates since the last update, that of the update before first [rad/s]."""
         if config.use_imu:
-            self.node.create_subscription(Imu, config.imu_topic, self._on_imu, SENSOR_DATA)
+            self.node.create_subscription(Imu, config.imu_topic, self._on_imu, SENSOR_DATA, frozen=True)
         self.node.create_timer(config.period_ns, self._update)
 
     def _on_cmd_vel(self, message: Twist) -> None:
@@ -123,12 +123,12 @@ class DiffDriveControllerNode:
                     twist=twist_from_planar(*odometry.velocity),
                     covariance=planar_covariance(odometry.velocity_covariance),
                 ),
-            )
+            ),
+            frozen=True,
         )
         if self.config.enable_odom_tf:
-            self._tf.send_transform(
-                transform_stamped(self.config.odom_frame, self.config.base_frame, now, Pose3.from_pose2(pose))
-            )
+            moved = transform_stamped(self.config.odom_frame, self.config.base_frame, now, pose)
+            self._tf.send_transform(moved, frozen=True)
 
 
 _UNUSED_AXIS = 1e6
@@ -136,9 +136,10 @@ _UNUSED_AXIS = 1e6
 
 
 def planar_covariance(covariance: Array) -> Array:
-    """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose."""
+    """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose, read-only."""
     full = _UNUSED_AXES.copy()
     full[_PLANAR] = covariance.ravel()
+    full.flags.writeable = False
     return full
 
 

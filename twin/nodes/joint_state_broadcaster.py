@@ -27,5 +27,6 @@ class JointStateBroadcasterNode:
                 position=reading.position,
                 velocity=reading.velocity,
                 effort=reading.effort,
-            )
+            ),
+            frozen=True,
         )

@@ -32,7 +32,8 @@ def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = 
         [
             (name, one.told(config), descriptor_of(one.declaration, read_only=replace is None))
             for name, one in found.items()
-        ]
+        ],
+        lambda name: found[name].declaration.text,
     )
     if replace is None:
         return
@@ -57,12 +58,13 @@ def declare_config(node: Node, config: C, replace: Callable[[C], None] | None = 
 
 
 def descriptor_of(declaration: Declaration, *, read_only: bool = False) -> ParameterDescriptor:
-    """Return what `ros2 param describe` tells; words say more than ranges, whose edges are always valid."""
+    """Return what `ros2 param describe` tells, but for the text; words say more than ranges, whose edges are
+    always valid.
+    """
     domain = declaration.domain
     assert domain is not None
     descriptor = new(
         ParameterDescriptor,
-        description=declaration.text,
         additional_constraints=domain.said,
         read_only=read_only or ReadOnly in declaration.markers,
     )

@@ -107,7 +107,7 @@ class RobotStatePublisherNode:
         self._configure()
         self._publish_description()
         self._publish_fixed()
-        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1, frozen=True)
         node.add_on_set_parameters_callback(self._on_set)
         node.add_post_set_parameters_callback(self._on_changed)
 
@@ -179,13 +179,14 @@ class RobotStatePublisherNode:
             if mimic.joint in positions:
                 positions.setdefault(name, positions[mimic.joint] * mimic.multiplier + mimic.offset)
         prefix, stamp = self._prefix, message.header.stamp
-        self._tf.send_transform(
+        moved = [
             TransformStamped(
                 Header(stamp, prefix + frame.parent), prefix + frame.child, frame.at(positions[name])
             )
             for name, frame in joints.moving.items()
             if name in positions
-        )
+        ]
+        self._tf.send_transform(moved, frozen=True)
 
     def _is_due(self, positions: Mapping[str, float], time_ns: int) -> bool:
         """Return whether a joint is in its first state of a period.

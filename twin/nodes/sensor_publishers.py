@@ -45,6 +45,7 @@ class SensorPublisher:
                 return
             message = self._to_message(spec, Header(stamp=stamp(time_ns), frame_id=spec.link), reading)
             if type(message) is self._message:
-                self._publisher.publish(message)
+                # A user's may say the same object again, with other values.
+                self._publisher.publish(message, frozen=self._plugin.ships)
                 return
         raise self._plugin.error(f"makes a {type(message).__name__}, not a {self._message.__name__}")

@@ -36,7 +36,7 @@ class ToteDetectorNode:
         self.enabled = False
         """Whether scans are looked at; only docking and grasping need it, and it costs more than the scan."""
         self.node.create_service(SetBool, "tote_detector/enable", self._on_enable)
-        self.node.create_subscription(LaserScan, "palm_scan", self._on_scan, SENSOR_DATA)
+        self.node.create_subscription(LaserScan, "palm_scan", self._on_scan, SENSOR_DATA, frozen=True)
 
     def _on_enable(self, request: Any) -> Any:
         self.enabled = bool(request.data)

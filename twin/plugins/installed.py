@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 from types import MappingProxyType
 
 
@@ -32,9 +32,16 @@ def _packages(_path: tuple[str, ...]) -> Mapping[str, list[str]]:
 
 
 @lru_cache
+def _points(_path: tuple[str, ...]) -> EntryPoints:
+    """Return all that are installed: one look through the packages does for every group."""
+    found: EntryPoints = metadata.entry_points()  # type: ignore[assignment]
+    return found
+
+
+@lru_cache
 def _by_name(group: str, _path: tuple[str, ...]) -> Mapping[str, tuple[EntryPoint, ...]]:
     found: dict[str, dict[tuple[str, str], EntryPoint]] = {}
-    for point in metadata.entry_points(group=group):
+    for point in _points(_path).select(group=group):
         package = owner_of(point).partition(" ")[0]
         # A package that is on the path twice is one package: the first one counts, as for imports.
         found.setdefault(point.name, {}).setdefault((package, point.value), point)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
@@ -22,7 +22,6 @@ from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.sensors import SENSORS
 from twin.models.shapes import Box
-from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.missions.mission_node import MissionNode
 from twin.runtime.defaults.drives import with_drive
 from twin.runtime.events.obstacles import hidden_pose, standing_pose
@@ -44,10 +43,11 @@ from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.world import World
-from twin.warehouse import arena as arenas
-from twin.warehouse.arena import Arena
-from twin.warehouse.map_files import map_of_arena, named_map
-from twin.warehouse.shelf import Zone as ArenaZone
+
+if TYPE_CHECKING:
+    from twin.navigation.maps.occupancy_map import OccupancyMap
+    from twin.warehouse.arena import Arena
+    from twin.warehouse.shelf import Zone as ArenaZone
 
 INPROC = SessionConfig()
 """No network: nobody else takes part."""
@@ -94,7 +94,11 @@ def build(
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
     """
-    arena = arenas.load(scenario.world.arena) if scenario.world.arena is not None else None
+    arena = None
+    if scenario.world.arena is not None:
+        from twin.warehouse import arena as arenas
+
+        arena = arenas.load(scenario.world.arena)
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
     reading = ReadOptions(sensors=tuple(map(SENSORS.find, scenario.sensors)), execute=True)
@@ -214,6 +218,9 @@ def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
     """
     if not isinstance(robot.localisation, AmclLocalisation):
         return None
+    from twin.navigation.maps.occupancy_map import OccupancyMap
+    from twin.warehouse.map_files import map_of_arena, named_map
+
     if robot.localisation.map is None:
         assert arena is not None  # as the scenario's checks say
         return map_of_arena(arena)

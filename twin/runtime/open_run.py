@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from twin.bridge.bags.tap import BagTap
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
@@ -49,6 +48,9 @@ class Progress:
 class OpenRun:
     """A run that is under way. Whatever happens, it has to be closed; `finish` does it, too."""
 
+    _have_ended = False
+    """Whether runs of this process have, since it was last rid of them."""
+
     def __init__(
         self,
         scenario: Scenario,
@@ -85,13 +87,19 @@ class OpenRun:
         Raises:
             TwinError: The run cannot be made.
         """
-        gc.collect()  # a run that has ended is of the oldest generation, which is hardly ever looked at
+        if OpenRun._have_ended:
+            gc.collect()  # such a run is of the oldest generation, which is hardly ever looked at
+            OpenRun._have_ended = False
         self._digest = RunDigest()
         self._out = out
         self._outside = outside
         self._sink = _recording(scenario, out) if record else None
         self._wall_s = self._cpu_s = 0.0
-        bag_tap = None if bag is None else BagTap(bag, hidden=bag_hidden_topics)
+        bag_tap = None
+        if bag is not None:
+            from twin.bridge.bags.tap import BagTap
+
+            bag_tap = BagTap(bag, hidden=bag_hidden_topics)
         taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
         with execution() as self._executed, ExitStack() as ending:
             parts = build(
@@ -119,6 +127,7 @@ class OpenRun:
                 self._sink.declare(parts.world, wheels)
             self._pace = None if pace is None else Pace(pace)
             self._ending = ending.pop_all()
+            OpenRun._have_ended = True  # sooner or later
 
     def advance(
         self,

@@ -10,7 +10,6 @@ from twin.runtime.build import Parts
 from twin.runtime.events.faults import FaultSchedule
 from twin.runtime.events.obstacles import ObstacleSchedule
 from twin.runtime.observe import Observer
-from twin.runtime.outside import Lockstep
 from twin.runtime.sensing import SensorSchedule
 from twin.scenario.checks import Check
 from twin.scenario.outside import ALONE, Outside
@@ -18,6 +17,7 @@ from twin.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
+    from twin.runtime.outside import Lockstep
 
 _OBSERVED_TICKS = 5
 """Checks see one observation in so many control ticks; the contacts of the others are in it."""
@@ -49,7 +49,11 @@ class Run:
         self._substeps = parts.control_period_ns // self.world.timestep_ns
         self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.bus.started()
-        self.lockstep = Lockstep(self.bus, outside) if outside.wait_for else None
+        self.lockstep: Lockstep | None = None
+        if outside.wait_for:
+            from twin.runtime.outside import Lockstep
+
+            self.lockstep = Lockstep(self.bus, outside)
         self._obstacles = ObstacleSchedule(
             self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
         )
@@ -108,7 +112,7 @@ class Run:
 
     def clock(self) -> None:
         """6. `/clock`."""
-        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)))
+        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)), frozen=True)
 
     def _check(self) -> None:
         observation = self._observer.observe()

@@ -90,7 +90,7 @@ class EkfOdometry(StrictModel):
     """`ekf`"""
     params_file: FileBeside | None = None
     """A parameter file of robot_localization; absent: that of `navigation`, if it has a filter."""
-    parameters: EkfParameters = EkfParameters()
+    parameters: EkfParameters = EkfParameters.model_construct()
     """Overrides of the filter's parameters, and of the file's."""
 
 
@@ -111,7 +111,7 @@ class OdometryLocalisation(StrictModel):
     """`odometry`"""
     use_imu: bool = False
     """Whether odometry takes its heading from the robot's gyroscope instead of from its wheels."""
-    initial_pose_error: InitialPoseError = InitialPoseError()
+    initial_pose_error: InitialPoseError = InitialPoseError.model_construct()
     """How wrong the first guess is."""
 
 
@@ -125,9 +125,9 @@ class AmclLocalisation(StrictModel):
     initial_pose: Literal["start", "global"] = "start"
     """`start`: a guess is given, the start within `initial_pose_error`; `global`: the robot has no idea and
     looks for itself on the whole map (nav2_amcl's `set_initial_pose: false`)."""
-    initial_pose_error: InitialPoseError = InitialPoseError()
+    initial_pose_error: InitialPoseError = InitialPoseError.model_construct()
     """How wrong the first guess is."""
-    parameters: AmclParameters = AmclParameters()
+    parameters: AmclParameters = AmclParameters.model_construct()
     """Overrides of the filter's parameters."""
 
 
@@ -144,9 +144,9 @@ class SlamLocalisation(StrictModel):
     """A pose graph that `serialize_map` or an earlier run has written; absent: nothing is known."""
     map_start_pose: PoseConfig | None = None
     """The robot's pose in `map` at the start; absent: that in the world, so that both frames are one."""
-    initial_pose_error: InitialPoseError = InitialPoseError()
+    initial_pose_error: InitialPoseError = InitialPoseError.model_construct()
     """How wrong that is."""
-    parameters: SlamParameters = SlamParameters()
+    parameters: SlamParameters = SlamParameters.model_construct()
     """Overrides of the node's parameters, and of the file's."""
 
     @model_validator(mode="after")

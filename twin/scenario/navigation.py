@@ -65,23 +65,23 @@ class NavigationConfig(StrictModel):
     """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; all other keys here go before its values."""
-    navigator: NavigatorParameters = NavigatorParameters()
+    navigator: NavigatorParameters = NavigatorParameters.model_construct()
     """Overrides of the navigator."""
     keepout_mask: NameOrPath | None = None
     """Mask of the zones that no path may cross: a YAML file of map_server."""
     speed_mask: NameOrPath | None = None
     """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
-    planner: PlannerParameters = PlannerParameters()
+    planner: PlannerParameters = PlannerParameters.model_construct()
     """Overrides of the global planner."""
-    smoother: SmootherParameters = SmootherParameters()
+    smoother: SmootherParameters = SmootherParameters.model_construct()
     """Overrides of the path smoother."""
-    controller: ControllerParameters = ControllerParameters()
+    controller: ControllerParameters = ControllerParameters.model_construct()
     """Overrides of the path follower."""
     controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)
     """More of them, for goals and behaviour trees that name a controller or a goal checker."""
-    global_costmap: CostmapParameters = CostmapParameters()
+    global_costmap: CostmapParameters = CostmapParameters.model_construct()
     """Overrides of the costmap that plans are made on."""
-    local_costmap: CostmapParameters = CostmapParameters()
+    local_costmap: CostmapParameters = CostmapParameters.model_construct()
     """Overrides of the rolling costmap around the robot."""
-    docking: DockingParameters = DockingParameters()
+    docking: DockingParameters = DockingParameters.model_construct()
     """Docks, and overrides of the docking server."""

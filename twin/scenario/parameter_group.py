@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import ChainMap
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
-from pydantic import Field, create_model
+from pydantic import create_model
 
 from twin.errors import ScenarioError
 from twin.parameters import Derived
@@ -25,6 +27,15 @@ class ParameterGroup(StrictModel):
 
     configs: ClassVar[tuple[type, ...]] = ()
     """Whose fields are keys of this group."""
+    declared: ClassVar[Mapping[str, Declaration]] = MappingProxyType({})
+    """What those keys are that it has of them, by name."""
+
+    @classmethod
+    def descriptions(cls) -> Mapping[str, str]:
+        """Return what is told of the keys."""
+        groups = [base for base in cls.__mro__ if issubclass(base, ParameterGroup)]
+        declared = ChainMap(*(dict(group.declared) for group in groups))
+        return {name: one.text for name, one in declared.items()} | dict(super().descriptions())
 
     if TYPE_CHECKING:
 
@@ -61,17 +72,19 @@ def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]
     """
 
     def decorate(group: type[G]) -> type[G]:
-        keys: dict[str, Any] = {}
+        keys, declared = dict[str, Any](), dict[str, Declaration]()
         for config in configs:
             for declaration in _keyed(config):
                 key = _key(declaration, whole=whole)
                 if key is not None and declaration.name not in group.model_fields:
                     keys[declaration.name] = key
+                    declared[declaration.name] = declaration
         made = create_model(
             group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
         )
         made.__qualname__ = group.__qualname__
         made.configs = (*group.configs, *configs)
+        made.declared = MappingProxyType(declared)
         return made
 
     return decorate
@@ -95,16 +108,14 @@ def _keyed(config: type) -> Iterator[Declaration]:
 
 
 def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | None:
-    """Return the type of a key, and what a schema says of it."""
+    """Return the type of a key, and its default."""
     if declaration.config is not None:
         inner = group_of(declaration.config)
-        return (inner, Field(default=inner(), description=declaration.text)) if inner.model_fields else None
+        return (inner, inner.model_construct()) if inner.model_fields else None
     domain = declaration.domain
     if domain is None:
         return None
     kind: Any = NameOrPath if IsNameOrPath in declaration.markers else Annotated[domain.annotation, domain]
-    if whole and declaration.is_required:
-        return kind, Field(description=declaration.text)
     if whole:
-        return kind, Field(default=declaration.tell(declaration.default), description=declaration.text)
-    return kind | None, Field(default=None, description=declaration.text)
+        return kind, ... if declaration.is_required else declaration.tell(declaration.default)
+    return kind | None, None

@@ -37,6 +37,16 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
         """Return the keys of the server."""
         return set(PlannerServerParameters.model_fields)
 
+    @classmethod
+    def descriptions(cls) -> Mapping[str, str]:
+        """Return what is told of the keys, and which plugins have them."""
+        told = dict(super().descriptions())
+        for name in told:
+            owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if name in own]
+            if 0 < len(owners) < len(_KEYS):
+                told[name] = f"{' and '.join(owners)}: {told[name]}"
+        return told
+
     @model_validator(mode="after")
     def _belongs_to_the_plugin(self) -> PlannerParameters:
         if self.users is not None:
@@ -48,13 +58,6 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
                 f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
             )
         return self
-
-
-for _name, _field in PlannerParameters.model_fields.items():
-    _owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if _name in own]
-    if 0 < len(_owners) < len(_KEYS):
-        _field.description = f"{' and '.join(_owners)}: {_field.description}"
-PlannerParameters.model_rebuild(force=True)
 
 
 @keys_of(*configs_of(SMOOTHERS).values())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from pydantic import (
@@ -11,7 +12,6 @@ from pydantic import (
     ModelWrapValidatorHandler,
     PrivateAttr,
     ValidationInfo,
-    WithJsonSchema,
     model_validator,
 )
 from pydantic_core import CoreSchema
@@ -136,7 +136,7 @@ def config_of_use(kind: Kind[Any], used: PluginUse) -> Any:
 
 def plugin_name(kind: Kind[Any], *without: str) -> Any:
     """Return the type of a key that names a plugin, but for some that ship and are asked for otherwise."""
-    return Annotated[str, WithJsonSchema(_names(kind, *without))]
+    return Annotated[str, _Names(kind, without)]
 
 
 def plugin_choice(kind: Kind[Any]) -> Any:
@@ -155,10 +155,17 @@ def plugin_choice(kind: Kind[Any]) -> Any:
         return name
 
     mapping = {"type": "object", "required": ["plugin"], "properties": {"plugin": {"type": "string"}}}
-    schema = WithJsonSchema({"anyOf": [*_names(kind)["anyOf"], mapping]})
-    return Annotated[str | PluginUse, BeforeValidator(read), schema]
+    return Annotated[str | PluginUse, BeforeValidator(read), _Names(kind, further=(mapping,))]
 
 
-def _names(kind: Kind[Any], *without: str) -> dict[str, list[dict[str, Any]]]:
-    known = [name for name in kind.names() if name not in without]
-    return {"anyOf": [{"enum": known}, {"type": "string", "pattern": ":"}]}
+@dataclass(frozen=True, eq=False)
+class _Names:
+    """What a schema says of a plugin's name; installed packages are looked through when it is asked for."""
+
+    kind: Kind[Any]
+    without: tuple[str, ...] = ()
+    further: tuple[dict[str, Any], ...] = ()
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        known = [name for name in self.kind.names() if name not in self.without]
+        return {"anyOf": [{"enum": known}, {"type": "string", "pattern": ":"}, *self.further]}

@@ -120,14 +120,21 @@ def _schema(config: type) -> type[StrictModel]:
     for field in dataclasses.fields(config):
         if field.init:
             default = field.default if field.default_factory is dataclasses.MISSING else None
-            fields[field.name] = (
-                hints[field.name],
-                Field(
-                    default=... if default is dataclasses.MISSING else default,
-                    description=texts_of(config).get(field.name),
-                ),
-            )
-    return create_model(config.__name__, __base__=StrictModel, __doc__=config.__doc__, **fields)
+            fields[field.name] = (hints[field.name], ... if default is dataclasses.MISSING else default)
+    made = create_model(config.__name__, __base__=_OfDataclass, __doc__=config.__doc__, **fields)
+    made.config = config
+    return made
+
+
+class _OfDataclass(StrictModel):
+    """The schema of a frozen dataclass."""
+
+    config: ClassVar[type]
+
+    @classmethod
+    def descriptions(cls) -> Mapping[str, str]:
+        """Return what is told of the keys, below the dataclass's fields."""
+        return texts_of(cls.config)
 
 
 class OneOfKind(OneOf):
@@ -138,7 +145,7 @@ class OneOfKind(OneOf):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        reference = handler(core)
+        reference = super().__get_pydantic_json_schema__(core, handler)
         schema = handler.resolve_ref_schema(reference)
         params = {"type": ["object", "null"]}
         for name in cls.of.names():
@@ -155,7 +162,7 @@ class OneOfKind(OneOf):
         found: dict[str, Any] = {}
         for key, value in data.items():
             found[key] = value
-            if ":" not in key and key not in cls.of.names():
+            if ":" not in key and key not in cls.of.shipped and key not in cls.of.names():
                 faults.append(Fault((key,), "", cls.of.names()))
             elif key not in cls.model_fields:
                 try:

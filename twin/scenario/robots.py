@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from twin.models.catalogue import catalogue
 from twin.parameters import NotNegative, Seconds
 from twin.scenario.detectors import DetectorEntry
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, faultless, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
-from twin.scenario.navigation import NavigationConfig
 from twin.strict_yaml import Fault, StrictModel
+from twin.strict_yaml.later import later
+
+if TYPE_CHECKING:
+    from twin.scenario.navigation import NavigationConfig
+else:  # most robots of small scenarios have none, and it is as much as all the rest
+    NavigationConfig = later("twin.scenario.navigation:NavigationConfig")
 
 
 class RobotConfig(StrictModel):

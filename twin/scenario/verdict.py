@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 from twin.files.writing import write_whole
 from twin.scenario.checks import CheckResult
-from twin.scenario.junit import junit_xml
 
 VERDICT = "verdict.json"
 """The file of a run's folder that says how it ended; the last that is written."""
@@ -73,6 +72,8 @@ class Verdict:
 
 def write_junit(file: Path, verdicts: Sequence[Verdict]) -> None:
     """Write one JUnit file over several runs, for CI."""
+    from twin.scenario.junit import junit_xml
+
     write_whole(file, junit_xml([verdict.to_dict() for verdict in verdicts]))
 
 

@@ -25,6 +25,7 @@ from twin.sim.sensors import Mount
 
 _BODY = mujoco.mjtObj.mjOBJ_XBODY
 _NO_ORIENTATION = np.array([-1.0] + [0.0] * 8)
+_NO_ORIENTATION.flags.writeable = False
 """REP-145: this sensor gives no orientation."""
 
 
@@ -154,5 +155,7 @@ def _noise(axes: str, classic: str, name: str) -> tuple[str, str]:
 
 @lru_cache
 def _isotropic(stddev: float) -> Array:
-    """Return the covariance of three axes of equal noise, row by row, shape (9,)."""
-    return (np.eye(3) * stddev**2).ravel()
+    """Return the covariance of three axes of equal noise, row by row, shape (9,), read-only."""
+    covariance = (np.eye(3) * stddev**2).ravel()
+    covariance.flags.writeable = False
+    return covariance

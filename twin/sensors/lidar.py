@@ -21,6 +21,9 @@ from twin.sensors.sensor import Sensor
 from twin.sim.sensors import Mount
 from twin.sim.sensors.rays import RayCaster
 
+_NO_INTENSITIES = np.zeros(0, np.float32)
+_NO_INTENSITIES.flags.writeable = False
+
 MAX_SAMPLES = 100_000
 """Rays of a lidar; every one of them is cast for every scan."""
 
@@ -123,18 +126,26 @@ class Lidar(Sensor):
 
     @classmethod
     def to_message(cls, spec: LidarSpec, header: Header, reading: LidarReading) -> LaserScan:
-        """Return a scan."""
+        """Return a scan, read-only, with every number as precise as it will be on the wire."""
+        increment = (spec.angle_max - spec.angle_min) / max(1, spec.samples - 1)
+        numbers = np.array(
+            [spec.angle_min, spec.angle_max, increment, 1.0 / spec.rate_hz, spec.range_min, spec.range_max],
+            np.float32,
+        )
+        low, high, increment, period, nearest, farthest = numbers.tolist()
+        ranges = reading.ranges.astype(np.float32)
+        ranges.flags.writeable = False
         return LaserScan(
             header=header,
-            angle_min=spec.angle_min,
-            angle_max=spec.angle_max,
-            angle_increment=(spec.angle_max - spec.angle_min) / max(1, spec.samples - 1),
+            angle_min=low,
+            angle_max=high,
+            angle_increment=increment,
             time_increment=0.0,
-            scan_time=1.0 / spec.rate_hz,
-            range_min=spec.range_min,
-            range_max=spec.range_max,
-            ranges=reading.ranges.astype(np.float32),
-            intensities=np.zeros(0, np.float32),
+            scan_time=period,
+            range_min=nearest,
+            range_max=farthest,
+            ranges=ranges,
+            intensities=_NO_INTENSITIES,
         )
 
     @classmethod

@@ -39,7 +39,7 @@ class HardwareConfig:
 
 
 class JointReading(NamedTuple):
-    """Measured joints in the order of `Hardware.joint_names`, each of shape (n,)."""
+    """Measured joints in the order of `Hardware.joint_names`, each of shape (n,) and read-only."""
 
     position: Array
     """[rad] or [m]"""
@@ -47,6 +47,12 @@ class JointReading(NamedTuple):
     """[rad/s] or [m/s]"""
     effort: Array
     """What the drives move each joint with; a drive moves those that mimic its joint as hard [Nm] or [N]."""
+
+
+def _reading(*measured: Array) -> JointReading:
+    for values in measured:
+        values.flags.writeable = False  # who asks twice at one time is given the same
+    return JointReading(*measured)
 
 
 class Hardware:
@@ -87,7 +93,7 @@ class Hardware:
         self._step = 0
         self._drive_dof, self._drive_share = self._drives(model, robot, description)
         n = len(self.joint_names)
-        self._reading = JointReading(self._counts * self._tick, np.zeros(n), np.zeros(n))
+        self._reading = _reading(self._counts * self._tick, np.zeros(n), np.zeros(n))
 
         prefix = f"{robot}/"
         self._actuators = np.array(
@@ -139,7 +145,7 @@ class Hardware:
         velocity = np.where(self._encoder, (counts - self._counts) * (self._tick / elapsed), velocity)
         self._counts, self._step = counts, step
         effort = self._data.qfrc_actuator[self._drive_dof] * self._drive_share
-        self._reading = JointReading(position, velocity, effort)
+        self._reading = _reading(position, velocity, effort)
         return self._reading
 
     def command(self, joint: str, value: float) -> None:

@@ -11,9 +11,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
 from twin.errors import TwinError
+from twin.parameters.texts import texts_of
 from twin.strict_yaml.document import Loc as Loc
 from twin.strict_yaml.document import apply_override, read
 from twin.strict_yaml.explain import Fault as Fault
@@ -28,8 +30,22 @@ class StrictModel(BaseModel):
     """Base of every file schema: unknown keys are errors, values are frozen, docstrings describe."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True, str_min_length=1
+        extra="forbid", frozen=True, allow_inf_nan=False, str_min_length=1, defer_build=True
     )
+
+    @classmethod
+    def descriptions(cls) -> Mapping[str, str]:
+        """Return what is told of the keys. It is read from the source, so only when somebody asks."""
+        return texts_of(cls)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        reference = handler(core)
+        properties = handler.resolve_ref_schema(reference).get("properties", {})
+        for name, text in cls.descriptions().items():
+            if name in properties:
+                properties[name].setdefault("description", text)
+        return reference
 
 
 def load(

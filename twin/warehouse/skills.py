@@ -108,7 +108,7 @@ class MobileManipulationNode(MissionNode):
         self._trajectory = ActionClient(node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory")
         self._gripper = ActionClient(node, GripperCommand, "gripper_controller/gripper_cmd")
         self._detector = node.create_client(SetBool, "tote_detector/enable")
-        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1)
+        node.create_subscription(JointState, "joint_states", self._on_joint_states, 1, frozen=True)
         node.create_subscription(PoseArray, "tote_poses", self._on_tote_poses, self.skills.samples)
 
     def _on_joint_states(self, message: JointState) -> None:

@@ -203,6 +203,28 @@ def test_a_new_descriptor_must_fit(bus: Bus) -> None:
     assert node.describe_parameter("x").integer_range == [IntegerRange(0, 3, 0)]
 
 
+def test_what_is_declared_together_is_described_when_somebody_asks(bus: Bus) -> None:
+    node = bus.create_node("n", options=NodeOptions(allow_undeclared_parameters=True))
+    asked: list[str] = []
+
+    def describe(name: str) -> str:
+        asked.append(name)
+        return f"What {name} is."
+
+    descriptor = new(ParameterDescriptor, additional_constraints="must be small")
+    node.declare_together([(name, 1, descriptor) for name in "xyz"], describe)
+    assert asked == []
+    told = node.describe_parameter("x")
+    assert (told.name, told.description, told.additional_constraints) == ("x", "What x is.", "must be small")
+    node.set_descriptor("y", new(ParameterDescriptor, type=2, description="Another."))
+    node.undeclare_parameter("z")
+    node.declare_parameter("z", 1, new(ParameterDescriptor, description="New."))
+    node.set_parameter("x", 2)
+    told_later = [one.description for one in node.describe_parameters("xyz")]
+    assert told_later == ["What x is.", "Another.", "New."]
+    assert set(asked) == {"x"}
+
+
 def test_parameter_events_tell_what_is_new_changed_and_gone(bus: Bus, clock: Clock) -> None:
     seen = events_of(bus)
     node = bus.create_node("n", "r", options=NodeOptions(allow_undeclared_parameters=True))

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from twin.bridge import types
-from twin.bridge.cdr.codec import general_codec
+from twin.bridge.cdr.codec import codec
 from twin.bridge.types.default_values import new
 from twin.bridge.types.description import TypeDescription, describe, learn, sources
 from twin.errors import BridgeError
@@ -35,8 +35,8 @@ float32 part
 )
 def test_a_known_type_survives_its_description(name: str) -> None:
     description = describe(name)
-    codec = general_codec(TypeDescription)
-    received = codec.decode(codec.encode(description))
+    travels = codec(TypeDescription)
+    received = travels.decode(travels.encode(description))
     assert received.type_description.type_name == name
     assert learn(received, types.rihs01(name)) == name
 

@@ -89,7 +89,7 @@ class ActionClient:
             node.add_endpoint(
                 Subscription(
                     node,
-                    action_type.FeedbackMessage,
+                    f"{action_type.name}_FeedbackMessage",
                     feedback,
                     self._on_feedback,
                     as_qos(10),

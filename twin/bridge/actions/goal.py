@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from twin.bridge.actions.states import ACTIVE, GoalEvent
 from twin.bridge.msgs import UUID, GoalInfo, GoalStatus, stamp
+from twin.bridge.node.tasks import Steps
 
 if TYPE_CHECKING:
     from twin.bridge.actions.server import ActionServer
 
-Execute = Callable[["GoalHandle"], Generator[None, None, Any]]
-"""Executes a goal: each yield waits for the next spin, the return value is the result message."""
+Execute = Callable[["GoalHandle"], Steps]
+"""Executes a goal; the return value is the result message."""
 
 
 class _Answer:
@@ -64,7 +66,7 @@ class GoalHandle:
         """Whether a client wants the goal to end; answer with `canceled()` and return."""
         return self.status == GoalStatus.STATUS_CANCELING
 
-    @property
+    @cached_property  # every status message lists the last goals
     def info(self) -> GoalInfo:
         """Id and time of acceptance."""
         return GoalInfo(uuid_msg(self.goal_id), stamp(self.accepted_ns))

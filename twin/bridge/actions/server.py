@@ -1,18 +1,20 @@
-"""Action servers: goals executed by generators that each spin advances."""
+"""Action servers: goals executed by generators that spins advance."""
 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
 from twin.bridge.actions.states import GoalEvent, is_cancelable, transition
 from twin.bridge.msgs import GoalStatus, GoalStatusArray, ns, stamp
 from twin.bridge.node import tasks
-from twin.bridge.qos import LATCHED
+from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.services import Respond
 from twin.bridge.srvs import CancelGoal
+from twin.bridge.topics import Publisher
 from twin.bridge.types import ActionType
 from twin.bridge.types.default_values import new
 from twin.errors import BridgeError
@@ -24,7 +26,6 @@ Policy = Literal["preempt", "parallel", "queue", "reject"]
 
 _KEPT_GOALS = 16
 """rcl keeps all until they expire; every status message would list them."""
-_MAX_NS = 2**63 - 1
 
 
 class _Ended(NamedTuple):
@@ -35,11 +36,13 @@ class _Ended(NamedTuple):
     time_ns: int
 
 
-class _Run(NamedTuple):
+@dataclass(eq=False)
+class _Run:
     """A goal being executed."""
 
     handle: GoalHandle
-    generator: Generator[None, None, Any]
+    generator: tasks.Steps
+    due_ns: int = 0
 
 
 class ActionServer:
@@ -93,7 +96,10 @@ class ActionServer:
         self._waiting: dict[bytes, list[Respond]] = {}
         self._closed = False
         base = f"{self.name}/_action"
-        self._feedback = node.create_publisher(action_type.FeedbackMessage, f"{base}/feedback")
+        feedback = f"{action_type.name}_FeedbackMessage"
+        self._feedback: Publisher[Any] = node.add_endpoint(
+            Publisher(node, feedback, node.resolve_name(f"{base}/feedback"), as_qos(10))
+        )
         self._status = node.create_publisher(GoalStatusArray, f"{base}/status", LATCHED)
         self._services = (
             node.create_deferred_service(action_type.SendGoal, f"{base}/send_goal", self._on_goal),
@@ -115,6 +121,15 @@ class ActionServer:
     @property
     def _is_closed(self) -> bool:
         return self._closed or self._node.is_destroyed
+
+    @property
+    def due_ns(self) -> int:
+        """When `step` has something to do, if nothing arrives before [ns]."""
+        if self._running:
+            return min(run.due_ns for run in self._running)
+        for ended in self._ended.values():
+            return ended.time_ns + self._result_timeout_ns + 1
+        return tasks.NEVER_NS
 
     def step(self) -> bool:
         """Advance every execution to its next yield; an exception in one is a bug and propagates.
@@ -138,7 +153,7 @@ class ActionServer:
             if run not in self._running:
                 continue
             try:
-                next(run.generator)
+                run.due_ns = next(run.generator) or 0
             except StopIteration as end:
                 self._return(run, end.value)
             if run not in self._running:  # it ended itself, by destroying its node
@@ -158,6 +173,7 @@ class ActionServer:
 
     def execute_goal(self, handle: GoalHandle, execute: Execute | None) -> None:
         """Execute an accepted goal, or queue it; see `GoalHandle.execute`."""
+        self._node.wake()
         if self._policy == "queue" and (self._running or self._queue):
             self._queue.append((handle, execute or self._execute))
         else:
@@ -263,7 +279,7 @@ class ActionServer:
             if not is_cancelable(handle.status):
                 return codes.ERROR_GOAL_TERMINATED, []
             return codes.ERROR_NONE, [handle]
-        until_ns = until_ns or _MAX_NS
+        until_ns = until_ns or tasks.NEVER_NS
         return codes.ERROR_NONE, [
             handle
             for handle in self._handles.values()
@@ -283,6 +299,7 @@ class ActionServer:
     def _end(self, handle: GoalHandle, result: Any) -> None:
         result = new(self._type.Result) if result is None else result
         self._ended[handle.goal_id] = _Ended(handle.status, result, self._node.now_ns)
+        self._node.wake()
         for respond in self._waiting.pop(handle.goal_id, ()):
             respond(self._type.GetResult.Response(handle.status, result))
         if len(self._ended) > _KEPT_GOALS:

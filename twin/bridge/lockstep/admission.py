@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import zenoh
-
 from twin.bridge.bus import Bus
+from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.wire.external import Arrival
 
 READING = frozenset(
@@ -30,12 +29,10 @@ def admit_questions(bus: Bus, answered: Collection[str]) -> None:
             bus.external.refuse(
                 "lock-step", arrival.receiver.name, "such a run listens only to those for whom it waits"
             )
-        query = arrival.data[0] if isinstance(arrival.data, tuple) else None
-        if isinstance(query, zenoh.Query) and not _reads(arrival):
-            query.drop()  # type: ignore[no-untyped-call]
+        if isinstance(arrival.data, ZenohQuestion) and not _reads(arrival):
+            arrival.data.drop()
 
 
 def _reads(arrival: Arrival) -> bool:
-    if not (isinstance(arrival.data, tuple) and isinstance(arrival.data[0], zenoh.Query)):
-        return False
-    return str(arrival.data[0].key_expr).split("/")[-2] in READING
+    question = arrival.data
+    return isinstance(question, ZenohQuestion) and str(question.query.key_expr).split("/")[-2] in READING

@@ -18,9 +18,10 @@ from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.graph import EndpointInfo, NodeInfo, alive, parse_token
 from twin.bridge.lockstep.protocol import Entry, Questions, ask, carried, entry
 from twin.bridge.qos import QoS
+from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
 from twin.bridge.wire.external import Arrival
-from twin.bridge.wire.keys import Attachment, NodeToken, gid, parse_attachment, topic_key
+from twin.bridge.wire.keys import NodeToken, gid, parse_attachment, topic_key
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
@@ -90,9 +91,9 @@ class _MirroredService:
         self.key = key
         self._mirror = mirror
 
-    def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
+    def enqueue(self, data: ZenohQuestion, external: bool) -> None:
         """Pass a request on with the next step."""
-        self._mirror.request(self.key, data[0])
+        self._mirror.request(self.key, data.query)
 
 
 class Mirror:
@@ -208,9 +209,9 @@ class Mirror:
         if source is None or source.gid in self._gids:
             query.drop()  # type: ignore[no-untyped-call]
         elif self._bus.in_own_thread():
-            service.enqueue((query, source), False)
+            service.enqueue(ZenohQuestion(query, source), False)
         else:
-            self._bus.external.push(Arrival(source, service, (query, source)))
+            self._bus.external.push(Arrival(source, service, ZenohQuestion(query, source)))
 
     def _on_service(self, sample: zenoh.Sample) -> None:
         if not self._bus.in_own_thread():

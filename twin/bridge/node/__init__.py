@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from twin.bridge import names
@@ -12,7 +12,7 @@ from twin.bridge.msgs import ParameterEvent
 from twin.bridge.node.graph import NodeGraph
 from twin.bridge.node.logger import Logger, Rosout, logger_name
 from twin.bridge.node.options import NodeOptions
-from twin.bridge.node.tasks import Execution, Task
+from twin.bridge.node.tasks import NEVER_NS, Execution, Steps, Task
 from twin.bridge.node.timers import Rate, Timer
 from twin.bridge.parameters.node_parameters import NodeParameters
 from twin.bridge.qos import PARAMETER_EVENTS, QoS, as_qos
@@ -59,6 +59,8 @@ class Node(NodeParameters, NodeGraph):
         """'/' or '/robot'."""
         self.inbox: deque[list[Any]] = deque()
         """[endpoint or None, data, from outside]: filled by endpoints, emptied by `spin`."""
+        self.due_ns = 0
+        """When `spin` has something to do, whether or not something arrives [ns]; 0: the next time."""
         self.is_destroyed = self._closing = False
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
@@ -118,16 +120,29 @@ class Node(NodeParameters, NodeGraph):
         return self.add_endpoint(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
 
     def create_subscription(
-        self, msg_type: type[M], topic: str, callback: Callable[[M], Any], qos: QoS | int = 10
+        self,
+        msg_type: type[M],
+        topic: str,
+        callback: Callable[[M], Any],
+        qos: QoS | int = 10,
+        *,
+        frozen: bool = False,
     ) -> Subscription[M]:
         """Call back for every message on a topic, in this node's spin.
+
+        Args:
+            msg_type: Class of the messages.
+            topic: Name, which is resolved and remapped.
+            callback: Takes a message.
+            qos: What is asked for; a number is the depth of a reliable, volatile one.
+            frozen: Whether the callback, and whoever it passes them to, leaves messages as they are: then it
+                can be given the object that others hear too. Without it every message is its own.
 
         Raises:
             BridgeError: an invalid name.
         """
-        return self.add_endpoint(
-            Subscription(self, msg_type, self.resolve_name(topic), callback, as_qos(qos))
-        )
+        name = self.resolve_name(topic)
+        return self.add_endpoint(Subscription(self, msg_type, name, callback, as_qos(qos), frozen=frozen))
 
     def create_timer(
         self, period_ns: Period, callback: Callable[[], Any], *, autostart: bool = True
@@ -142,7 +157,7 @@ class Node(NodeParameters, NodeGraph):
         Raises:
             BridgeError: a period that is not positive.
         """
-        timer = Timer(period_ns, callback, self.bus.clock, autostart=autostart)
+        timer = Timer(period_ns, callback, self.bus.clock, self.wake, autostart=autostart)
         self._timers.append(timer)
         return timer
 
@@ -156,10 +171,10 @@ class Node(NodeParameters, NodeGraph):
             raise BridgeError(f"a rate of {frequency} Hz; valid is more than zero")
         return Rate(period_of(frequency), self.bus.clock)
 
-    def create_task(self, generator: Generator[None, None, Any]) -> Task:
+    def create_task(self, generator: Steps) -> Task:
         """Run a generator: each spin of the node advances it to its next yield, first the next spin."""
         task = Task(generator)
-        self._executions.append(task)
+        self.add_execution(task)
         return task
 
     def create_service(self, srv_type: ServiceType, name: str, callback: Callable[[Any], Any]) -> Service:
@@ -212,8 +227,9 @@ class Node(NodeParameters, NodeGraph):
         return _remove(self._timers, timer)
 
     def add_execution(self, execution: Execution) -> None:
-        """Advance something once in every spin, after inbox and timers."""
+        """Advance something when it is due, and whenever the node spins, after inbox and timers."""
         self._executions.append(execution)
+        self.wake()
 
     def remove_execution(self, execution: Execution) -> None:
         """Advance something no more."""
@@ -239,13 +255,22 @@ class Node(NodeParameters, NodeGraph):
             endpoint, data, external = inbox.popleft()
             if endpoint is not None:
                 endpoint.handle(data, external)
-        if self._timers:
-            now_ns = self.bus.clock.now_ns
-            for timer in tuple(self._timers):
-                timer.run(now_ns)
+        if not self._timers and not self._executions:
+            self.due_ns = NEVER_NS
+            return
+        now_ns = self.bus.clock.now_ns
+        for timer in tuple(self._timers):
+            timer.run(now_ns)
         for execution in tuple(self._executions):
             if execution.step():
                 self.remove_execution(execution)
+        due = [timer.due_ns for timer in self._timers]
+        due += [execution.due_ns for execution in self._executions]
+        self.due_ns = min(due, default=NEVER_NS)
+
+    def wake(self) -> None:
+        """Spin the next time: what is due has changed."""
+        self.due_ns = 0
 
     def destroy(self) -> None:
         """Leave the bus; executions end as if cancelled. Harmless when repeated."""
@@ -271,9 +296,11 @@ class Node(NodeParameters, NodeGraph):
         """Time until `spin` has something to do if nothing arrives [ns]; None if nothing is due."""
         if self.inbox:
             return 0
-        due = [timer.next_ns - self.now_ns for timer in self._timers if not timer.is_canceled]
-        due += [_EXECUTION_NS] * bool(self._executions)
-        return max(0, min(due)) if due else None
+        now_ns = self.now_ns
+        due = [timer.due_ns for timer in self._timers]
+        due += [execution.due_ns or now_ns + _EXECUTION_NS for execution in self._executions]
+        first_ns = min(due, default=NEVER_NS)
+        return None if first_ns == NEVER_NS else max(0, first_ns - now_ns)
 
     def add_endpoint(self, endpoint: E) -> E:
         """Own an endpoint: it leaves the graph with the node."""

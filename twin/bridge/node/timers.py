@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from twin.bridge.clock import Clock
+from twin.bridge.node.tasks import NEVER_NS
 from twin.errors import BridgeError
 from twin.periods import Period, next_due
 
@@ -14,7 +15,13 @@ class Timer:
     """Calls back at multiples of a period of simulated time; several missed ones are one call."""
 
     def __init__(
-        self, period_ns: Period, callback: Callable[[], Any], clock: Clock, *, autostart: bool = True
+        self,
+        period_ns: Period,
+        callback: Callable[[], Any],
+        clock: Clock,
+        rescheduled: Callable[[], None],
+        *,
+        autostart: bool = True,
     ) -> None:
         if period_ns <= 0:
             raise BridgeError(f"a timer period of {period_ns} ns; valid is more than zero")
@@ -23,6 +30,7 @@ class Timer:
         """When it called back last [ns]."""
         self._callback = callback
         self._clock = clock
+        self._rescheduled = rescheduled
         self.reset()
         self.is_canceled = not autostart
         """Whether it fires no more, until reset."""
@@ -31,10 +39,16 @@ class Timer:
         """Fire next at the first multiple of the period after now; also after `cancel`."""
         self._schedule(self._clock.now_ns)
         self.is_canceled = False
+        self._rescheduled()
 
     def cancel(self) -> None:
         """Fire no more, until reset."""
         self.is_canceled = True
+
+    @property
+    def due_ns(self) -> int:
+        """When it fires next [ns]."""
+        return NEVER_NS if self.is_canceled else self.next_ns
 
     @property
     def is_ready(self) -> bool:
@@ -68,9 +82,9 @@ class Rate:
         self.period_ns = period_ns
         self._clock = clock
 
-    def sleep(self) -> Generator[None, None, None]:
+    def sleep(self) -> Generator[Any, None, None]:
         """Wait until the clock reaches the next multiple of the period."""
         start_ns = self._clock.now_ns
         until_ns = next_due(self.period_ns, start_ns)
         while start_ns <= self._clock.now_ns < until_ns:
-            yield
+            yield until_ns

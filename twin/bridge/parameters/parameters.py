@@ -50,6 +50,8 @@ class Parameters(ABC):
         """Called for every change."""
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
+        self._texts: dict[str, Callable[[str], str]] = {}
+        """Who tells a parameter's description, if the descriptor has none."""
 
     @property
     @abstractmethod
@@ -94,8 +96,14 @@ class Parameters(ABC):
         self._raise_refusal(result, name, value, Type(descriptor.type))
         return self._parameters[name]
 
-    def declare_together(self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]]) -> None:
+    def declare_together(
+        self, parameters: Sequence[tuple[str, Any, ParameterDescriptor]], text_of: Callable[[str], str]
+    ) -> None:
         """Declare many parameters, and tell of them in one event.
+
+        Args:
+            parameters: Names, values and descriptors, which need no description.
+            text_of: Returns a parameter's description by its name; called when somebody asks for it.
 
         Raises:
             BridgeError: as `declare_parameter`.
@@ -105,6 +113,7 @@ class Parameters(ABC):
         try:
             for each in parameters:
                 self.declare_parameter(*each)
+                self._texts[each[0]] = text_of
         finally:
             self._tell = tell
         tell(together)
@@ -122,6 +131,7 @@ class Parameters(ABC):
         if self._known(name).read_only:
             raise errors.ParameterImmutableException(self.fully_qualified_name, name)
         del self._parameters[name], self._descriptors[name]
+        self._texts.pop(name, None)
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a parameter; one without a value if undeclared ones are allowed.
@@ -166,7 +176,12 @@ class Parameters(ABC):
         Raises:
             BridgeError: not declared.
         """
-        return new(ParameterDescriptor) if self._undeclared_is_fine(name) else replace(self._known(name))
+        if self._undeclared_is_fine(name):
+            return new(ParameterDescriptor)
+        known = self._known(name)
+        if not known.description and name in self._texts:
+            return replace(known, description=self._texts[name](name))
+        return replace(known)
 
     def list_parameters(self, prefixes: Sequence[str] = (), depth: int = 0) -> ListParametersResult:
         """Return names below the prefixes, at most `depth` levels deep; 0 is as deep as there are names."""
@@ -197,6 +212,7 @@ class Parameters(ABC):
         if descriptor.dynamic_typing:
             descriptor.type = parameter.kind.value
         self._parameters[name], self._descriptors[name] = parameter, descriptor
+        self._texts.pop(name, None)
         return parameter
 
     def set_parameters_atomically(self, parameters: Sequence[Parameter]) -> SetParametersResult:
@@ -259,6 +275,7 @@ class Parameters(ABC):
             event.deleted_parameters.append(parameter.to_parameter_msg())
             self._parameters.pop(name, None)
             self._descriptors.pop(name, None)
+            self._texts.pop(name, None)
             return
         kept = declared_as or self._descriptors.get(name) or new(ParameterDescriptor, dynamic_typing=True)
         self._descriptors[name] = kept

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from twin.bridge.conversions import transform_from_pose3
+from twin.bridge.conversions import transform_from_pose2, transform_from_pose3
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
 from twin.bridge.qos import LATCHED, QoS
 from twin.bridge.tf.buffer import TransformBuffer
 from twin.bridge.tf.cache import UNKNOWN_AUTHORITY
 from twin.bridge.tf.wait import TransformFuture
-from twin.geometry import Pose3
+from twin.geometry import Pose2, Pose3
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -25,9 +25,12 @@ _EXPIRY_NS = 10_000_000
 """How often waits are looked at that may have to be given up [ns]."""
 
 
-def transform_stamped(parent: str, child: str, time_ns: int, T_parent_child: Pose3) -> TransformStamped:
-    """Return a transform as a message."""
-    return TransformStamped(header(time_ns, parent), child, transform_from_pose3(T_parent_child))
+def transform_stamped(
+    parent: str, child: str, time_ns: int, T_parent_child: Pose3 | Pose2
+) -> TransformStamped:
+    """Return a transform, in space or in the plane, as a message."""
+    convert: Any = transform_from_pose2 if isinstance(T_parent_child, Pose2) else transform_from_pose3
+    return TransformStamped(header(time_ns, parent), child, convert(T_parent_child))
 
 
 class TransformBroadcaster:
@@ -36,9 +39,11 @@ class TransformBroadcaster:
     def __init__(self, node: Node) -> None:
         self._publisher = node.create_publisher(TFMessage, "/tf", _DYNAMIC)
 
-    def send_transform(self, transforms: TransformStamped | Iterable[TransformStamped]) -> None:
-        """Publish one or more transforms in one message."""
-        self._publisher.publish(TFMessage(_as_list(transforms)))
+    def send_transform(
+        self, transforms: TransformStamped | Iterable[TransformStamped], *, frozen: bool = False
+    ) -> None:
+        """Publish one or more transforms in one message; see `Publisher.publish` for `frozen`."""
+        self._publisher.publish(TFMessage(_as_list(transforms)), frozen=frozen)
 
 
 class StaticTransformBroadcaster:
@@ -65,7 +70,7 @@ class TransformListener:
         self._broadcasters: dict[bytes, Broadcaster] = {}
         self._expires = False
         self.on_message: list[Callable[[TFMessage, object], None]] = []
-        """Called with every message and its broadcaster, whose `str` is its name."""
+        """Called with every message, which is left as it is, and its broadcaster, whose `str` is its name."""
         for topic, qos, static in (("/tf", _DYNAMIC, False), ("/tf_static", _STATIC_LISTENER, True)):
             self._subscribe(topic, qos, static)
 
@@ -97,7 +102,7 @@ class TransformListener:
             source = subscription.source
             self._on_message(message, static, None if source is None else source.gid)
 
-        subscription = self._node.create_subscription(TFMessage, topic, on_message, qos)
+        subscription = self._node.create_subscription(TFMessage, topic, on_message, qos, frozen=True)
 
     def _expire(self) -> None:
         self.buffer.waiting.expire(self._node.now_ns)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import zenoh
 import zenoh.ext
 
 from twin.bridge import types
-from twin.bridge.cdr.codec import codec
+from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
@@ -24,35 +25,12 @@ if TYPE_CHECKING:
 
 M = TypeVar("M")
 
+_Heard = Union["Sample[M]", tuple[bytes, zenoh.Sample | Attachment]]
+"""A message of this process, or what came through Zenoh and whence."""
+
 _HEARTBEAT_S = 0.5  # rmw_zenoh's period
 _KEEP_ALL = 100_000
 """What keep_all keeps at most: no unbounded memory."""
-
-
-class Sample(Generic[M]):
-    """A message as published; `payload` is valid during the tap's call and encoded when first read."""
-
-    __slots__ = ("_payload", "message", "msgtype", "publisher", "sequence", "time_ns", "topic")
-
-    def __init__(self, publisher: Publisher[M], sequence: int, time_ns: int, message: M) -> None:
-        self.publisher = publisher
-        self.sequence = sequence
-        """The publisher's count, from 1."""
-        self.topic: str = publisher.name
-        """Absolute name."""
-        self.msgtype = publisher.codec.msgtype
-        self.time_ns = time_ns
-        """Simulated time of publishing [ns]."""
-        self.message = message
-        """The publisher's own object: not to be changed or kept."""
-        self._payload: bytes | None = None
-
-    @property
-    def payload(self) -> bytes:
-        """The message as CDR."""
-        if self._payload is None:
-            self._payload = self.publisher.codec.encode(self.message)
-        return self._payload
 
 
 class Endpoint:
@@ -99,10 +77,11 @@ class Endpoint:
 class Publisher(Endpoint, Generic[M]):
     """Publishes messages of one type on a topic."""
 
-    def __init__(self, node: Node, cls: type[M], name: str, qos: QoS) -> None:
-        self.codec = codec(cls)
+    def __init__(self, node: Node, msg_type: type[M] | str, name: str, qos: QoS) -> None:
+        self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
+        self._by_reference = node.bus.savings.by_reference
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
@@ -118,8 +97,13 @@ class Publisher(Endpoint, Generic[M]):
             return bool(self._listeners.receivers)
         return self._latched or self._zenoh.matching_status.matching
 
-    def publish(self, message: M) -> None:
+    def publish(self, message: M, *, frozen: bool = False) -> None:
         """Publish at the clock's time.
+
+        Args:
+            message: What to say.
+            frozen: Whether nobody changes the message, or an array in it, from now on: then those who hear
+                it within the process may be given the object itself.
 
         Raises:
             TypeError: a message of another type.
@@ -130,24 +114,20 @@ class Publisher(Endpoint, Generic[M]):
         if not self._declared:
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
-        time_ns = self._bus.clock.now_ns
-        sample = None
-        if self._bus.taps:
-            sample = Sample(self, self._sequence, time_ns, message)
-            for tap in self._bus.taps:
+        bus, listeners = self._bus, self._listeners
+        sample = Sample(self, self._sequence, bus.clock.now_ns, message)
+        if bus.taps:
+            sample.settle(frozen and self._by_reference)
+            for tap in bus.taps:
                 tap(sample)
-        listeners = self._listeners
-        if listeners is not None and listeners.is_direct and self._bus.in_own_thread():
+        if listeners is not None and listeners.is_direct and bus.in_own_thread():
             if listeners.receivers:
-                payload = self.codec.encode(message) if sample is None else sample.payload
-                data = payload, Attachment(self._sequence, time_ns, self.gid)
+                sample.settle(frozen and self._by_reference)
                 for receiver in listeners.receivers:
-                    receiver.enqueue(data, False)
-            return
+                    receiver.enqueue(sample, False)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
-        if sample is not None or self.has_subscribers:
-            payload = self.codec.encode(message) if sample is None else sample.payload
-            self._zenoh.put(payload, attachment=pack_attachment(self._sequence, time_ns, self.gid))
+        elif bus.taps or self.has_subscribers:
+            self._zenoh.put(sample.payload, attachment=pack_attachment(*sample.source))
 
 
 class Subscription(Endpoint, Generic[M]):
@@ -156,20 +136,33 @@ class Subscription(Endpoint, Generic[M]):
     def __init__(
         self,
         node: Node,
-        cls: type[M],
+        msg_type: type[M] | str,
         name: str,
         callback: Callable[[M], Any],
         qos: QoS,
         *,
+        frozen: bool = False,
         wanted: Callable[[bytes], bool] | None = None,
     ) -> None:
-        """Hear a topic; a payload for which `wanted` returns False is not decoded."""
-        self.codec = codec(cls)
+        """Hear a topic.
+
+        Args:
+            node: Whose inbox it fills.
+            msg_type: Type of the messages, or its name.
+            name: Absolute name.
+            callback: Takes a message.
+            qos: What is asked for.
+            frozen: Whether the callback leaves messages as they are, so that it can be given the object that
+                others hear too.
+            wanted: A payload for which it returns False is not decoded.
+        """
+        self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MS", name, self.codec.msgtype, qos)
         self.dropped = 0
         """Messages that gave way to newer ones because the depth was reached, or outlived their lifespan."""
-        self._origin: zenoh.Sample | Attachment | None = None
+        self._origin: zenoh.Sample | Sample[M] | Attachment | None = None
         self._callback = callback
+        self._shares = frozen and node.bus.savings.by_reference
         self._wanted = wanted
         self._pending: deque[list[Any]] = deque()
         self._inbox = node.inbox
@@ -195,12 +188,14 @@ class Subscription(Endpoint, Generic[M]):
     @property
     def source(self) -> Attachment | None:
         """Count, time and gid of the publisher whose message the callback is given; None outside of it."""
+        if isinstance(self._origin, Sample):
+            return self._origin.source
         if not isinstance(self._origin, zenoh.Sample):
             return self._origin
         return parse_attachment(attachment_of(self._origin))  # read only if asked for: few want to know
 
-    def enqueue(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
-        """Put a payload into the node's inbox; the oldest one gives way when `depth` wait already."""
+    def enqueue(self, data: _Heard[M], external: bool) -> None:
+        """Put a message into the node's inbox; the oldest one gives way when `depth` wait already."""
         if len(self._pending) >= self._most:
             self._pending.popleft()[0] = None
             self.dropped += 1
@@ -212,21 +207,27 @@ class Subscription(Endpoint, Generic[M]):
         if self._lifespan_ns is not None:
             self._received_ns.append(self.node.now_ns)
 
-    def handle(self, data: tuple[bytes, zenoh.Sample | Attachment], external: bool) -> None:
-        """Decode and call back."""
+    def handle(self, data: _Heard[M], external: bool) -> None:
+        """Decode, unless that is done, and call back."""
         self._pending.popleft()
         if self._lifespan_ns is not None:
             age_ns = self.node.now_ns - self._received_ns.popleft()
             if age_ns > self._lifespan_ns:
                 self.dropped += 1
                 return
-        payload, origin = data
-        if self._wanted is not None and not self._wanted(payload):
-            return
-        message = read(self.node.bus.external, self.name, self.codec, payload)
-        if message is None:
-            return
-        self._origin = origin
+        if isinstance(data, Sample):
+            if self._wanted is not None and not self._wanted(data.payload):
+                return
+            message = data.shared if self._shares else self.codec.decode(data.payload)
+            self._origin = data
+        else:
+            payload, origin = data
+            if self._wanted is not None and not self._wanted(payload):
+                return
+            received = read(self.node.bus.external, self.name, self.codec, payload)
+            if received is None:
+                return
+            message, self._origin = received, origin
         self._callback(message)
         self._origin = None
 

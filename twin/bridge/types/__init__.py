@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from twin.bridge.types import type_store
+from twin.bridge.types.known_hashes import known_hashes
 from twin.bridge.types.literals import Value
 from twin.bridge.types.type_hash import rihs01_of
 from twin.bridge.types.type_names import dds_name as dds_name
@@ -39,7 +40,7 @@ def get(typename: str) -> type[Any]:
         BridgeError: an unknown type; the message lists the package's types.
     """
     name = _loaded(typename)
-    if name not in store.types:
+    if name not in store.fielddefs:
         raise BridgeError(f"{name} is no message; its parts are, such as {name}_Request or {name}_Goal")
     return store.types[name]
 
@@ -50,7 +51,8 @@ def rihs01(typename: str) -> str:
     Raises:
         BridgeError: an unknown type.
     """
-    return _rihs01(_loaded(typename))
+    name = full_name(typename)
+    return known_hashes().get(name) or _computed_rihs01(name)
 
 
 def definitions(typename: str) -> Mapping[str, Any]:
@@ -136,5 +138,5 @@ def _loaded(typename: str) -> str:
 
 
 @cache
-def _rihs01(name: str) -> str:
-    return rihs01_of(name, type_store.definitions)
+def _computed_rihs01(name: str) -> str:
+    return rihs01_of(_loaded(name), type_store.definitions)

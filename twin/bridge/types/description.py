@@ -101,7 +101,7 @@ def read(description: Any, type_hash: str | None = None) -> tuple[str, FieldDefs
 
 def _individual(plain: dict[str, Any]) -> Any:
     name, defaults = plain["type_name"], {}
-    if name in types.store.types:
+    if name in types.store.fielddefs:
         defaults = types.defaults(name)
     fields = [
         _Field(field["name"], _FieldType(**field["type"]), _default_text(defaults.get(field["name"])))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from operator import attrgetter
 from typing import Any
 
-import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
-from twin.bridge.types.bounds import STRINGS, Many
+from twin.bridge.types.bounds import Many
 from twin.bridge.types.text import PADDING
 
 
@@ -54,23 +51,6 @@ def fields_of(typename: str) -> tuple[Field, ...]:
     name: str = types.get(typename).__msgtype__
     definition = types.store.fielddefs[name][1]
     return tuple(_field(field, description) for field, description in definition if field != PADDING)
-
-
-@cache
-def array_types(typename: str) -> tuple[tuple[Callable[[Any], Any], np.dtype[Any]], ...]:
-    """Return how to read each array of numbers of a message, and its type.
-
-    Not those inside of sequences, and not those of bytes, which may be signed or not.
-    """
-    return tuple((attrgetter(path), types.dtype_of(field.base)) for path, field in _arrays(typename))
-
-
-def _arrays(typename: str) -> Iterator[tuple[str, Field]]:
-    for field in fields_of(typename):
-        if field.message and not field.many:
-            yield from ((f"{field.attribute}.{path}", inner) for path, inner in _arrays(field.message))
-        elif field.many and not field.message and field.base not in (*STRINGS, "byte"):
-            yield field.attribute, field
 
 
 def _field(name: str, description: Any) -> Field:

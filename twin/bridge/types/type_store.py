@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, TypesysError, get_typestore
+from rosbags.typesys.base import normalize_fieldname
+from rosbags.typesys.stores import ros2_jazzy
 
 from twin.bridge.types.bounds import BASE_TYPES
 from twin.bridge.types.folders import find_definitions
+from twin.bridge.types.lazy_store import LazyTypestore
 from twin.bridge.types.literals import Value
 from twin.bridge.types.parser import Definition, Reference, Structure
 from twin.bridge.types.text import PADDING, definition_text
@@ -22,7 +24,7 @@ from twin.bridge.types.type_names import full_name, whole
 from twin.bridge.types.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
-store = get_typestore(Stores.ROS2_JAZZY)
+store = LazyTypestore(ros2_jazzy)
 """Every message type known so far; grows as types are used."""
 derived: FieldDefs = {}
 """Types that exist only in hashes: a service and an action as structures."""
@@ -40,7 +42,7 @@ the Jazzy branches of common_interfaces and rcl_interfaces."""
 _PADDING: Any = (PADDING, (Nodetype.BASE, ("uint8", 0)))
 _own: dict[str, Definition] = {}
 _loading: list[str] = []
-_in_library = frozenset(store.types)
+_in_library = frozenset(store.fielddefs)
 _SHIPPED = resources.files("twin.bridge") / "interfaces"
 """The definitions that come with this package, for types that rosbags lacks."""
 
@@ -77,7 +79,7 @@ def add_folders(paths: Iterable[Path | str]) -> list[str]:
 
 
 def load(name: str) -> None:
-    """Make the classes of a type, of all parts beside it and of all that it uses.
+    """Make a type known, all parts beside it and all that it uses.
 
     Raises:
         BridgeError: an unknown type, or a fault in a text.
@@ -150,7 +152,7 @@ def text_of(typename: str) -> str | None:
 
 def names() -> list[str]:
     """Return every message, service and action that has a name here, sorted."""
-    messages = (name for name in store.types if "/msg/" in name)
+    messages = (name for name in store.fielddefs if "/msg/" in name)
     interfaces = (name for name in derived if name == whole(name))
     return sorted({*messages, *interfaces, *_own, *_shipped_names()})
 
@@ -254,10 +256,12 @@ def _register_all(owner: str, sections: tuple[Structure, ...]) -> None:
 
 
 def _register(name: str, constants: list[Any], fields: list[Any]) -> None:
-    try:
-        store.register({name: (constants, fields)})
-    except TypesysError as error:  # such as fields `from` and `from_`, which Python cannot tell apart
-        raise BridgeError(f"{name} cannot be used: {error}") from error
+    attributes: dict[str, str] = {}
+    for written in (field[0] for field in (*fields, *constants)):
+        other = attributes.setdefault(normalize_fieldname(written), written)
+        if other != written:
+            raise BridgeError(f"{name} cannot be used: Python cannot tell {other!r} and {written!r} apart")
+    store.register({name: (constants, fields)})
 
 
 def _is_interface(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Expanding xacro in a guarded child process."""
+"""Expanding xacro in a guarded child process, unless it is known what becomes of it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from twin.errors import ModelError, Problem
+from twin.models.expansion.kept_answers import keep_answer, kept_answer
 from twin.models.expansion.sandbox import CPU_SECONDS
 from twin.models.options import DEFAULTS, ReadOptions
 from twin.models.urdf.line_table import LineTable
@@ -56,7 +57,10 @@ def expand(source: Path, options: ReadOptions = DEFAULTS, *, time_limit_s: float
         "environment": {name: os.environ[name] for name in options.allow_env if name in os.environ},
         "packages": PackagePath.of(source, options),
     }
-    answer = _run_worker(request, source, time_limit_s)
+    answer = kept_answer(request)
+    if answer is None:
+        answer = _run_worker(request, source, time_limit_s)
+        keep_answer(request, answer)
     if "error" in answer:
         file = source if answer["file"] is None else _as_given(answer["file"], source)
         raise ModelError(Problem(f"xacro: {answer['error']}", file, answer["line"], code=answer["code"]))

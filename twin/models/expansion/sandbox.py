@@ -8,6 +8,7 @@ import resource
 import sys
 from typing import Any
 
+from twin.files.kept import hash_of
 from twin.files.reading import refusal
 from twin.models.urdf.packages import MANIFEST, Packages
 
@@ -64,8 +65,34 @@ def refuse_outside(name: str, packages: Packages) -> None:
         )
 
 
-def close_the_door(packages: Packages) -> None:
-    """Let this process read only what `packages` allows, write nothing and start nothing, for good."""
+class Reading:
+    """What a model file had this process read."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, str | None] = {}
+        """Hashes by path; None: there was no such file."""
+        self.by_pattern = False
+        """Whether files were looked for by a pattern."""
+
+    def take(self, name: str) -> None:
+        """Take note of a file before it is opened."""
+        if name not in self.files:
+            self.files[name] = None  # to take its hash opens it, too
+            self.files[name] = hash_of(name)
+
+    def is_repeatable(self) -> bool:
+        """Whether the same files would be read again, which no one has changed meanwhile."""
+        same = all(hash_of(name) == was and os.path.isabs(name) for name, was in self.files.items())
+        return same and not self.by_pattern
+
+
+def close_the_door(packages: Packages) -> Reading:
+    """Let this process read only what `packages` allows, write nothing and start nothing, for good.
+
+    Returns:
+        What is read from then on.
+    """
+    reading = Reading()
     interpreter = tuple(
         os.path.realpath(folder) + os.sep for folder in (sys.prefix, sys.base_prefix, *sys.path) if folder
     )
@@ -83,12 +110,18 @@ def close_the_door(packages: Packages) -> None:
             name = os.fsdecode(path)
             if isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
                 raise Refused(f"the file writes '{name}', which a model file may not do")
-            if not is_of_interpreter(os.path.realpath(name)):
+            is_ours = is_of_interpreter(os.path.realpath(name))
+            if not is_ours:
                 refuse_outside(name, packages)
             why = None if os.path.isdir(name) else refusal(name)
             if why is not None:
                 raise Refused(f"the file opens '{name}': {why}")
+            if not is_ours:
+                reading.take(name)
+        elif event == "glob.glob":
+            reading.by_pattern = True
         elif event.startswith(FORBIDDEN_EVENTS) and event not in HARMLESS_EVENTS:
             raise Refused(f"the file tries '{event}', which a model file may not do")
 
     sys.addaudithook(guard)
+    return reading

@@ -60,8 +60,10 @@ def main() -> None:
 def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     packages = Packages(request["packages"])
     sys.setrecursionlimit(FRAMES)
-    _guard(Sources(), Expressions(xacro.NameSpace, xacro.YamlDictWrapper), packages, request["environment"])
-    close_the_door(packages)
+    found: dict[str, str] = {}
+    expressions = Expressions(xacro.NameSpace, xacro.YamlDictWrapper)
+    _guard(Sources(), expressions, packages, found, request["environment"])
+    reading = close_the_door(packages)
     try:
         document = xacro.process_file(request["file"], mappings=request["args"])
         # Without xacro's banner: it holds the file's path, and the text is published and part of digests.
@@ -69,7 +71,8 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
         if len(text) > MAX_BYTES:
             message = f"the file expands to {len(text)} bytes; at most {MAX_BYTES} are read"
             raise Refused(message, code="too-large")
-        return {"urdf": text, **_table(document.documentElement)}
+        read = reading.files if reading.is_repeatable() else None
+        return {"urdf": text, **_table(document.documentElement), "read": read, "found": found}
     except RecursionError:
         return _fault("it is nested too deeply; a macro or property may call itself without end")
     except MemoryError:
@@ -86,7 +89,11 @@ def _table(top: Element) -> dict[str, Any]:
 
 
 def _guard(
-    sources: Sources, expressions: Expressions, packages: Packages, environment: Mapping[str, str]
+    sources: Sources,
+    expressions: Expressions,
+    packages: Packages,
+    found: dict[str, str],
+    environment: Mapping[str, str],
 ) -> None:
     """Put our own functions in the place of those of xacro that read, evaluate or recurse."""
     _guard_reading(sources, expressions, packages)
@@ -102,7 +109,8 @@ def _guard(
 
     def find(package: str) -> str:
         if package in packages:
-            return str(packages[package])
+            found[package] = str(packages[package])
+            return found[package]
         raise Refused(f"$(find {package}): package not found; {unknown_package(package, packages)}")
 
     def env(name: str) -> str:

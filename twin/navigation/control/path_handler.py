@@ -128,7 +128,7 @@ class PathHandler:
             self._advance(pose, last)
         first = self._nearest
         reach = self._along[first] + self._prune_distance
-        end = min(last, int(np.searchsorted(self._along, reach, side="right")))
+        end = min(last, int(self._along.searchsorted(reach, side="right")))
         poses = self._poses[first : end + 1]
         return LocalPath(
             poses=poses,
@@ -139,9 +139,9 @@ class PathHandler:
 
     def _advance(self, pose: Pose2, last: int) -> None:
         reach = self._along[self._nearest] + self.config.max_robot_pose_search_dist
-        end = min(last, int(np.searchsorted(self._along, reach, side="right")))
+        end = min(last, int(self._along.searchsorted(reach, side="right")))
         near = self._poses[self._nearest : end + 1]
-        self._nearest += int(np.argmin((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2))
+        self._nearest += int(((near[:, 0] - pose.x) ** 2 + (near[:, 1] - pose.y) ** 2).argmin())
 
     def _reached(self, pose: Pose2, index: int, reversing: bool) -> bool:
         """Whether the robot is at a cusp: near to it, and turned as the path is there, or past it."""

@@ -55,7 +55,7 @@ class RandomGoalsNode(MissionNode):
         """Goals so far that the navigator gave up."""
         self._navigate = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
         self.node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
-        self.node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        self.node.create_subscription(Odometry, "odom", self._on_odom, 1, frozen=True)
         self.node.create_timer(PERIOD_NS, self._tick)
 
     def _on_map(self, message: OccupancyGrid) -> None:

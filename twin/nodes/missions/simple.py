@@ -89,11 +89,11 @@ class VelocityProfileNode(MissionNode):
             return
         self._due_ns, self._step = next_due(PERIOD_NS, now), step
         if step == len(self._ends):
-            self._commands.publish(twist_from_planar(0.0, 0.0))
+            self._commands.publish(twist_from_planar(0.0, 0.0), frozen=True)
             if elapsed >= self._ends[-1][0] + _SETTLE_NS:
                 self.finish(succeeded=True)
             return
         _, linear, angular = self._ends[step]
         if begins:
             self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
-        self._commands.publish(twist_from_planar(linear, angular))
+        self._commands.publish(twist_from_planar(linear, angular), frozen=True)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from twin.bridge.action_types import AssistedTeleop, BackUp, DriveOnHeading, Spin, Wait
-from twin.bridge.actions import ActionServer, GoalHandle
+from twin.bridge.actions import ActionServer, Execute, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Empty, Twist, duration, new, ns
+from twin.bridge.node.tasks import Steps
 from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.navigation import recovery
 from twin.navigation.warm_up import warm_up_behaviors
-from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.robot_pose import RobotPose
+
+if TYPE_CHECKING:
+    from twin.nodes.navigation.costmaps.costmap import CostmapNode
 
 Behavior = recovery.Spin | recovery.DriveOnHeading | recovery.Wait | recovery.AssistedTeleop
 B = TypeVar("B", bound=Behavior)
@@ -65,7 +68,8 @@ class BehaviorServerNode:
         namespace: str = "",
     ) -> None:
         self.node = bus.create_node("behavior_server", namespace)
-        warm_up_behaviors()
+        if costmap is not None:
+            warm_up_behaviors()
         self.config = config
         self._robot_pose = robot_pose
         self._costmap = costmap
@@ -142,8 +146,8 @@ class BehaviorServerNode:
             raise _Failed(step.failed_reason)
         return step
 
-    def _execution(self, name: str, served: _Served) -> Callable[[GoalHandle], Generator[None, None, Any]]:
-        def execute(handle: GoalHandle) -> Generator[None, None, Any]:
+    def _execution(self, name: str, served: _Served) -> Execute:
+        def execute(handle: GoalHandle) -> Steps:
             if not served.is_valid(handle.request):
                 return _aborted(handle, name, served, _Failed(_INVALID_INPUT))
             behavior = served.make(handle.request)
@@ -154,26 +158,26 @@ class BehaviorServerNode:
                         handle.canceled()
                         return new(served.action.Result, error_msg="canceled")
                     if self.node.now_ns < due:
-                        yield
+                        yield due
                         continue
                     pose = self._robot_pose.in_odom()
                     if pose is None and self.node.now_ns - due > _POSE_TIMEOUT_NS:
                         raise _Failed(_TF_ERROR)
                     if pose is None:
-                        yield
+                        yield None
                         continue
                     due = max(due, self.node.now_ns - self._period_ns) + self._period_ns
                     step = self._step(served, behavior, pose)
                     if step.done:
                         elapsed = duration(self.node.now_ns - started)
                         return new(served.action.Result, total_elapsed_time=elapsed)
-                    self._publisher.publish(twist_from_planar(step.v, step.w))
+                    self._publisher.publish(twist_from_planar(step.v, step.w), frozen=True)
                     handle.publish_feedback(_feedback(served, behavior.progress))
-                    yield
+                    yield due
             except _Failed as failure:
                 return _aborted(handle, name, served, failure)
             finally:
-                self._publisher.publish(twist_from_planar(0.0, 0.0))
+                self._publisher.publish(twist_from_planar(0.0, 0.0), frozen=True)
 
         return execute
 

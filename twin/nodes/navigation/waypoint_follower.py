@@ -12,6 +12,7 @@ from twin.bridge.action_types import FollowWaypoints, NavigateToPose
 from twin.bridge.actions import ActionClient, ActionServer, ClientGoal, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import header, new
+from twin.bridge.node.tasks import Steps
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Interval
 
@@ -58,7 +59,7 @@ class WaypointFollowerNode:
     def _reconfigure(self, config: WaypointFollowerConfig) -> None:
         self.config = config
 
-    def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
+    def _execute(self, handle: GoalHandle) -> Steps:
         goal = handle.request
         first, loops = int(goal.goal_index), int(goal.number_of_loops)
         if first >= len(goal.poses):
@@ -92,7 +93,7 @@ class WaypointFollowerNode:
                 )
         return new(FollowWaypoints.Result, missed_waypoints=missed)
 
-    def _visit(self, handle: GoalHandle, pose: Any, index: int) -> Generator[None, None, ClientGoal | None]:
+    def _visit(self, handle: GoalHandle, pose: Any, index: int) -> Generator[int, None, ClientGoal | None]:
         """Go to a waypoint and stay there for the pause; None if the follower is to stop."""
         frame = pose.header.frame_id
         stamped = replace(pose, header=header(self.node.now_ns, frame))
@@ -105,7 +106,7 @@ class WaypointFollowerNode:
                 if self.node.now_ns >= due:
                     due += round(1e9 / self.config.loop_rate)
                     handle.publish_feedback(new(FollowWaypoints.Feedback, current_waypoint=index))
-                yield
+                yield due
         finally:
             if not sent.done:
                 sent.cancel()
@@ -115,5 +116,5 @@ class WaypointFollowerNode:
             while self.node.now_ns < end:
                 if handle.is_cancel_requested:
                     return None
-                yield
+                yield end
         return sent

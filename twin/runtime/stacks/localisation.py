@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.geometry import Pose2
-from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
-from twin.nodes.navigation.localisation.static import StaticLocalisationNode
 from twin.nodes.navigation.mapping.config import SlamNodeConfig
-from twin.nodes.navigation.mapping.map_saver import MapSaverNode
-from twin.nodes.navigation.mapping.map_server import MapServerNode
-from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 from twin.nodes.navigation.robot_pose import RobotPose
-from twin.runtime.parameter_files.nav2.parameters import amcl_with_file
-from twin.runtime.parameter_files.slam import slam_with_file
 from twin.runtime.stacks.context import StackContext
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.sim.noise import NoiseStream
+
+if TYPE_CHECKING:
+    from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 
 _MAP_UPDATE_INTERVAL_NS = 2_000_000_000
 """Time between two maps that a robot plans on while it makes them; slam_toolbox's own is 5 s."""
@@ -33,8 +29,13 @@ def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNod
         return _slam(context, config, pose)
     guess = _initial_guess(context.start, config.initial_pose_error, context.seed, context.handle.name)
     if config.type == "odometry":
+        from twin.nodes.navigation.localisation.static import StaticLocalisationNode
+
         StaticLocalisationNode(context.bus, pose.frames, guess, namespace=context.namespace)
         return None
+    from twin.nodes.navigation.mapping.map_saver import MapSaverNode
+    from twin.nodes.navigation.mapping.map_server import MapServerNode
+
     assert context.map is not None
     MapServerNode(context.bus, context.map, namespace=context.namespace)
     MapSaverNode(context.bus, namespace=context.namespace)
@@ -43,6 +44,9 @@ def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNod
 
 
 def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, guess: Pose2) -> None:
+    from twin.nodes.navigation.localisation.amcl import AmclNode, InitialPose
+    from twin.runtime.parameter_files.nav2.parameters import amcl_with_file
+
     navigation = context.config.navigation
     file = navigation.params_file if navigation is not None else None
     error = (config.initial_pose_error.xy, config.initial_pose_error.yaw)
@@ -62,6 +66,9 @@ def _amcl(context: StackContext, config: AmclLocalisation, pose: RobotPose, gues
 
 def _slam(context: StackContext, config: SlamLocalisation, pose: RobotPose) -> SlamToolboxNode:
     """Create `/slam_toolbox`; its map's frame is the world's, unless the scenario gives another start."""
+    from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
+    from twin.runtime.parameter_files.slam import slam_with_file
+
     node_config = SlamNodeConfig(
         mode=config.mode,
         map_file_name=config.pose_graph or "",

@@ -1,11 +1,11 @@
-"""The mission of a scenario as nodes on the bus."""
+"""The mission of a scenario as nodes on the bus; what one mission alone needs is imported with it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.action_types import (
     BackUp,
@@ -21,17 +21,9 @@ from twin.bridge.msgs import Point, duration, new
 from twin.bridge.types import ActionType
 from twin.errors import ScenarioError
 from twin.geometry import Pose2
-from twin.navigation.costmaps import footprint as footprints
-from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
 from twin.nodes.messages import pose_stamped
-from twin.nodes.missions.explore import ExploreMissionNode
 from twin.nodes.missions.mission_node import MissionNode
-from twin.nodes.missions.random_goals import RandomGoalsNode
-from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.missions.simple import ActionSequenceNode, ActionStep, VelocityProfileNode
-from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
-from twin.nodes.navigation.exploration.explorer import ExplorerNode
-from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.parameters.declaration import fields_of
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario import missions
@@ -49,8 +41,9 @@ from twin.scenario.missions import (
     VelocityProfile,
 )
 from twin.strict_yaml import StrictModel
-from twin.warehouse.arena import Arena
-from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+
+if TYPE_CHECKING:
+    from twin.warehouse.arena import Arena
 
 
 class IdleMission:
@@ -108,6 +101,9 @@ def behaviors(context: MissionContext, mission: Behaviors) -> MissionNode:
 
 def random_goals(context: MissionContext, mission: RandomGoals) -> MissionNode:
     """Return a drive to random places."""
+    from twin.nodes.missions.random_goals import RandomGoalsNode
+    from twin.nodes.missions.random_goals_config import RandomGoalsConfig
+
     goals = RandomGoalsConfig(**{name: getattr(mission, name) for name in fields_of(RandomGoalsConfig)})
     pose = context.robot.robot_pose
     return RandomGoalsNode(context.bus, pose, goals, seed=context.seed, namespace=context.namespace)
@@ -125,6 +121,8 @@ def velocity_profile(context: MissionContext, mission: VelocityProfile) -> Missi
 
 def r2d2_state_publisher(context: MissionContext, mission: R2D2StatePublisher) -> MissionNode:
     """Return the tutorial's circle."""
+    from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+
     stack = context.robot
     return R2D2StatePublisherNode(
         context.bus,
@@ -177,6 +175,12 @@ def _goal(step: StrictModel, stack: RobotStack) -> tuple[ActionType, str, Any]:
 
 def explore(context: MissionContext, mission: Explore) -> MissionNode:
     """Return an explorer and who watches it."""
+    from twin.navigation.costmaps import footprint as footprints
+    from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
+    from twin.nodes.missions.explore import ExploreMissionNode
+    from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
+    from twin.nodes.navigation.exploration.explorer import ExplorerNode
+
     bus, stack, namespace = context.bus, context.robot, context.namespace
     inner, outer = footprints.radii(stack.footprint)
     frontiers = FrontierConfig(robot_radius=outer, inscribed_radius=inner)
@@ -187,6 +191,8 @@ def explore(context: MissionContext, mission: Explore) -> MissionNode:
 
 def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNode:
     """Return the drive from tote to tote."""
+    from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+
     stack, arena = context.robot, context.arena
     assert arena is not None  # as the scenario's checks say
     if stack.manipulator is None or stack.navigator is None:

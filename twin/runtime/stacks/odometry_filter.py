@@ -16,18 +16,15 @@ from twin.scenario.localisation import EkfParameters
 from twin.sensors.imu import ImuSpec
 
 
-def odometry_filter(context: StackContext, frames: Frames) -> tuple[EkfNodeConfig | None, list[str]]:
+def odometry_filter(context: StackContext, frames: Frames) -> tuple[EkfNodeConfig, list[str]]:
     """Return the filter that the scenario asks for, and what of its parameter file was not understood.
-
-    The filter is None if the wheels alone tell odometry.
 
     Raises:
         ScenarioError: the robot has no drive, or no IMU where no parameter file names other sources.
         NavigationError: the parameter file is wrong.
     """
     odometry = context.config.odometry
-    if odometry.type == "wheels":
-        return None, []
+    assert odometry.type == "ekf"
     description = context.handle.description
     imus = _imus(context)
     imu = (imus[0].topic, imus[0].gyro_bias_stddev) if imus else ("imu", 1e-3)

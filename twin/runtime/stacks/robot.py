@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from twin.controllers.drive_config import drive_config, odometry_noise
@@ -9,27 +11,22 @@ from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
-from twin.nodes.gripper_controller import GripperControllerNode
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
-from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
-from twin.nodes.navigation.behavior_server import BehaviorServerNode
-from twin.nodes.navigation.bt_navigator import BtNavigatorNode
-from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
-from twin.nodes.position_controller import PositionControllerNode
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
 from twin.nodes.sensor_publishers import SensorPublisher
-from twin.nodes.tote_detector import ToteDetectorNode
 from twin.nodes.transforms import TransformListenerNode
 from twin.runtime.defaults import from_description as derive
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.localisation import build_localisation
-from twin.runtime.stacks.navigation import build_navigation
-from twin.runtime.stacks.odometry_filter import odometry_filter, warn_of_unpublished_sources
+
+if TYPE_CHECKING:
+    from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+    from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
 
 
 class RobotStack:
-    """Builds and holds the nodes of one robot; what a robot lacks (drive, lidar, arm) is left out."""
+    """Builds and holds the nodes of one robot; what a robot lacks is not even imported."""
 
     def __init__(self, context: StackContext) -> None:
         bus, handle, namespace = context.bus, context.handle, context.namespace
@@ -44,10 +41,16 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
-        fusion, told = odometry_filter(context, self.frames)
+        fusion: EkfNodeConfig | None = None
+        if context.config.odometry.type != "wheels":
+            from twin.nodes.navigation.localisation.ekf import EkfNode
+            from twin.runtime.stacks.odometry_filter import odometry_filter, warn_of_unpublished_sources
+
+            fusion, told = odometry_filter(context, self.frames)
         self.drive = self._build_drive(description, enable_odom_tf=fusion is None or not fusion.publish_tf)
-        fused = None if fusion is None else EkfNode(bus, fusion, namespace=namespace)
-        if fused is not None:
+        fused = None
+        if fusion is not None:
+            fused = EkfNode(bus, fusion, namespace=namespace)
             for sentence in told:
                 fused.node.get_logger().warn(sentence)
         RobotStatePublisherNode(bus, description, namespace=namespace)
@@ -58,10 +61,14 @@ class RobotStack:
         self.navigator: BtNavigatorNode | None = None
         self.slam = build_localisation(context, self.robot_pose)
         if context.config.navigation is not None:
+            from twin.runtime.stacks.navigation import build_navigation
+
             self.navigator = build_navigation(
                 context, context.config.navigation, self.robot_pose, self.footprint
             )
         elif drive is not None:
+            from twin.nodes.navigation.behavior_server import BehaviorServerNode
+
             BehaviorServerNode(
                 bus,
                 self.robot_pose,
@@ -110,8 +117,14 @@ class RobotStack:
         bus, namespace, hardware = self.context.bus, self.context.namespace, self.handle.hardware
         if self.manipulator is None:
             if description.commands:
+                from twin.nodes.position_controller import PositionControllerNode
+
                 PositionControllerNode(bus, hardware, tuple(description.commands), namespace=namespace)
             return
+        from twin.nodes.gripper_controller import GripperControllerNode
+        from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
+        from twin.nodes.tote_detector import ToteDetectorNode
+
         JointTrajectoryControllerNode(bus, hardware, self.manipulator.arm_joints, namespace=namespace)
         GripperControllerNode(
             bus,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from twin.geometry import Array, Pose2
 from twin.navigation.maps.occupancy_map import UNKNOWN, OccupancyMap
@@ -78,6 +76,8 @@ class MapTruth:
         points = self.wall_points[grid.value_at(self._wall_fronts) != UNKNOWN]
         if not len(cells) or not len(points):
             return np.full(len(points), np.inf)
+        from scipy.spatial import cKDTree  # takes a third of a second to import, and few runs judge a map
+
         count = min(_NEIGHBOURS, len(cells))
         nearest = cells[cKDTree(cells).query(points, k=count)[1].reshape(-1, count)]
         offsets = points[:, None] - nearest
@@ -93,6 +93,8 @@ class MapTruth:
 
     def _reachable(self, solid: NDArray[np.bool_], surroundings: Surroundings) -> NDArray[np.bool_]:
         """Return the floor that a disc of the robot's radius covers, rolling from the start."""
+        from scipy import ndimage
+
         roomy = ndimage.distance_transform_edt(~solid) * _CELL > surroundings.radius
         labels, _ = ndimage.label(roomy)
         start = surroundings.start
@@ -110,6 +112,8 @@ class MapTruth:
         outlines = [_outline(solid) for solid in self._solids]
         edges, out = (np.concatenate(parts) for parts in zip(*outlines, strict=True))
         fronts = edges + _BESIDE * out
+        from scipy import ndimage
+
         near = ndimage.binary_dilation(self._floor, iterations=2)
         cells = np.floor((fronts - self._low) / _CELL).astype(int)
         beside = ~self._inside(fronts) & near[cells[:, 1], cells[:, 0]]

@@ -33,7 +33,7 @@ class Odometer:
     def __init__(self, node: Node, topic: str, filter_duration_ns: int) -> None:
         self._window_ns = filter_duration_ns
         self._readings: deque[tuple[int, float, float]] = deque()
-        node.create_subscription(Odometry, topic, self._on_odom, SENSOR_DATA)
+        node.create_subscription(Odometry, topic, self._on_odom, SENSOR_DATA, frozen=True)
 
     def _on_odom(self, message: Odometry) -> None:
         now = ns(message.header.stamp)

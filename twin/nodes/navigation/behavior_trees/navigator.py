@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.msgs import Path, duration, new
+from twin.bridge.node.tasks import Steps
 from twin.bridge.types import ActionType
 from twin.errors import NavigationError, nearest
 from twin.navigation.behavior_trees.blackboard import Blackboard
@@ -119,10 +120,10 @@ class Navigator:
 
     # Execution
 
-    def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
+    def _execute(self, handle: GoalHandle) -> Steps:
         patience = self._context.now_ns() + _POSE_PATIENCE_NS
         while self._context.pose() is None and self._context.now_ns() < patience:
-            yield  # the first scan may be on its way
+            yield None  # the first scan may be on its way
         refused = self._begin(handle)
         if refused is not None:
             handle.abort()
@@ -139,7 +140,7 @@ class Navigator:
                     if status is not Status.RUNNING and not self._was_for_an_older_goal(status):
                         return self._end(handle, status)
                     self._publish_feedback(handle)
-                yield
+                yield self._due
             handle.abort()
             return self._result(0, "preempted by another goal")
         except NavigationError as error:

@@ -27,7 +27,7 @@ class Progress:
         self._path: Path | None = None
         self._points: Array = np.zeros((0, 3))
         self._to_go: Array = np.zeros(0)
-        """From each point to the end [m]."""
+        """From each point to the end, below zero, so that it rises along the path [m]."""
         self._nearest = 0
 
     def update(self, path: Path | None, pose: Pose2, now_ns: int) -> tuple[float, int]:
@@ -50,13 +50,12 @@ class Progress:
             self._path, self._nearest = path, 0
             self._points = path_array(path) if path is not None else np.zeros((0, 3))
             ahead = paths.steps(self._points)[::-1].cumsum()[::-1] if len(self._points) else np.zeros(0)
-            self._to_go = np.append(ahead, 0.0)
+            self._to_go = -np.append(ahead, 0.0)
         if not len(self._points):
             return 0.0
         to_go = self._to_go
-        # Falls along the path, so what is within the window is found from its far end.
-        behind = int(np.searchsorted(-to_go, _SEARCH_WINDOW - to_go[self._nearest], side="right"))
+        behind = int(to_go.searchsorted(_SEARCH_WINDOW + to_go[self._nearest], side="right"))
         ahead_xy = self._points[self._nearest : behind, :2]
         aside = ahead_xy - (pose.x, pose.y)
-        self._nearest += int(np.argmin(np.einsum("ij,ij->i", aside, aside)))
-        return float(to_go[self._nearest])
+        self._nearest += int(np.einsum("ij,ij->i", aside, aside).argmin())
+        return -float(to_go[self._nearest])

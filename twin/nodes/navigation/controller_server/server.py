@@ -6,7 +6,6 @@ A goal becomes a `goal.py:FollowGoal`; each period `command.py:Commander` finds 
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Odometry, SpeedLimit, Twist, new
+from twin.bridge.node.tasks import Steps
 from twin.geometry import Array, Pose2
 from twin.navigation.control.path_handler import PathHandler
 from twin.navigation.failures import ControlFailure
@@ -68,7 +68,7 @@ class ControllerServerNode:
         """What was followed until another path came."""
         self._publisher = node.create_publisher(Twist, "cmd_vel_nav", 1)
         self._display = ControllerDisplay(node, robot_pose.frames.map)
-        node.create_subscription(Odometry, "odom", self._on_odom, 1)
+        node.create_subscription(Odometry, "odom", self._on_odom, 1, frozen=True)
         node.create_subscription(SpeedLimit, "speed_limit", self._on_speed_limit, 1)
         ActionServer(node, FollowPath, "follow_path", self._execute)
 
@@ -107,7 +107,7 @@ class ControllerServerNode:
 
     # The action
 
-    def _execute(self, handle: GoalHandle) -> Generator[None, None, Any]:
+    def _execute(self, handle: GoalHandle) -> Steps:
         finished = stop = False
         try:
             goal = self._begin(handle.request)
@@ -124,7 +124,7 @@ class ControllerServerNode:
                     if self._control(goal, handle):
                         finished, stop = True, self.config.publish_zero_velocity
                         return new(FollowPath.Result)
-                yield
+                yield due
         except Abort as failure:
             finished = stop = True
             handle.abort()
@@ -201,4 +201,4 @@ class ControllerServerNode:
         return False
 
     def _drive(self, v: float, w: float) -> None:
-        self._publisher.publish(twist_from_planar(v, w))
+        self._publisher.publish(twist_from_planar(v, w), frozen=True)

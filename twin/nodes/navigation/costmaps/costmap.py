@@ -92,9 +92,11 @@ class CostmapNode:
         node.create_subscription(OccupancyGrid, f"{namespace}/map", on_map, LATCHED)
         for topic, source in self._scans.items():
             on_scan = partial(self._on_scan, source)
-            node.create_subscription(LaserScan, f"{namespace}/{topic}", on_scan, SENSOR_DATA)
+            node.create_subscription(LaserScan, f"{namespace}/{topic}", on_scan, SENSOR_DATA, frozen=True)
         for topic in config.range_topics:
-            node.create_subscription(Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA)
+            node.create_subscription(
+                Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA, frozen=True
+            )
         CostmapServices(
             node, config.name, config.frame, robot_pose, lambda: self._layers, self._after_clearing
         )

@@ -28,7 +28,7 @@ class DockDetection:
         self._scans = ScanInput(robot_pose, node.now_ns)
         self._told: PoseStamped | None = None
         """The latest on `detected_dock_pose`."""
-        node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA)
+        node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA, frozen=True)
         node.create_subscription(PoseArray, boxes, self._on_boxes, 10)
         node.create_subscription(PoseStamped, "detected_dock_pose", self._on_detected, 1)
 

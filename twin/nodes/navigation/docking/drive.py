@@ -47,7 +47,7 @@ class DockDrive:
 
     def stop(self) -> None:
         """Command to stand."""
-        self._publisher.publish(twist_from_planar(0.0, 0.0))
+        self._publisher.publish(twist_from_planar(0.0, 0.0), frozen=True)
 
     def drive(
         self,
@@ -58,7 +58,7 @@ class DockDrive:
         state: int = CONTROLLING,
         backward: bool = False,
         docked: Pose2 | None = None,
-    ) -> Generator[None, None, None]:
+    ) -> Generator[int, None, None]:
         """Drive to `goal()`, which may move on the way.
 
         Args:
@@ -79,7 +79,7 @@ class DockDrive:
             attempt.check()
             pose, now_ns = self._robot_pose.in_odom(), self._node.now_ns
             if now_ns < due or pose is None:
-                yield
+                yield due
                 continue
             due += self._period_ns
             attempt.tell(state, now_ns)
@@ -94,12 +94,12 @@ class DockDrive:
             else:
                 control.halt()
                 self.stop()
-            yield
+            yield due
 
     def _step(self, control: LineApproach, pose: Pose2) -> bool:
         """Command one period; return whether the robot is there."""
         step = control.update(pose, self._period_ns * 1e-9)
-        self._publisher.publish(twist_from_planar(step.v, step.w))
+        self._publisher.publish(twist_from_planar(step.v, step.w), frozen=True)
         if step.failed_reason is not None:
             _, lateral, yaw = control.errors(pose)
             where = f"{lateral:+.3f} m aside, {math.degrees(yaw):+.1f}° off"

@@ -40,7 +40,7 @@ from twin.nodes.navigation.docking.drive import BlindError, DockDrive
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
 
-Work = Generator[None, None, Any]
+Work = Generator[int | None, None, Any]
 
 
 class DockingServerNode:
@@ -144,7 +144,7 @@ class DockingServerNode:
                     raise DockError(
                         FAILED_TO_STAGE, f"not at the staging pose after {goal.max_staging_time:g} s"
                     )
-                yield
+                yield None
         finally:
             if not sent.done:
                 sent.cancel()
@@ -196,7 +196,7 @@ class DockingServerNode:
             attempt.tell(PERCEPTION, self.node.now_ns)
             if self.node.now_ns > deadline:
                 raise DockError(FAILED_TO_DETECT_DOCK, f"no {self._detection.lacks} in sight")
-            yield
+            yield None
 
     def _back_off(self, attempt: Attempt, goal: Callable[[], Pose2], docked: Pose2) -> Work:
         attempt.tell(RETRY, self.node.now_ns)
@@ -215,7 +215,7 @@ class DockingServerNode:
             attempt.tell(WAITING, self.node.now_ns)
             if self.node.now_ns > deadline:
                 raise DockError(FAILED_TO_CHARGE, "docked, but the battery is not charged")
-            yield
+            yield None
 
     def _is_charging(self, type_: DockType) -> bool:
         if type_.use_battery_status:

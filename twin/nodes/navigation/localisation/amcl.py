@@ -26,7 +26,7 @@ from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import Empty, SetInitialPose
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.errors import MapError
-from twin.geometry import Array, Pose2, Pose3
+from twin.geometry import Array, Pose2
 from twin.navigation.localisation.amcl import Amcl, Estimate
 from twin.navigation.localisation.amcl_config import AmclConfig
 from twin.navigation.localisation.input_watch import InputWatch
@@ -140,7 +140,7 @@ class AmclNode:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         node.create_subscription(OccupancyGrid, config.map_topic, self._on_map, LATCHED)
         node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, 1)
-        node.create_subscription(LaserScan, config.scan_topic, self._on_scan, SENSOR_DATA)
+        node.create_subscription(LaserScan, config.scan_topic, self._on_scan, SENSOR_DATA, frozen=True)
         node.create_service(Empty, "reinitialize_global_localization", self._on_global)
         node.create_service(Empty, "request_nomotion_update", self._on_no_motion)
         node.create_service(SetInitialPose, "set_initial_pose", self._on_set_initial_pose)
@@ -276,8 +276,8 @@ class AmclNode:
     def _broadcast(self, estimate: Estimate, stamp_ns: int) -> None:
         if self.config.tf_broadcast:
             valid_until, frames = stamp_ns + self.config.transform_tolerance_ns, self._robot_pose.frames
-            T_map_odom = Pose3.from_pose2(estimate.T_map_odom)
-            self._tf.send_transform(transform_stamped(frames.map, frames.odom, valid_until, T_map_odom))
+            moved = transform_stamped(frames.map, frames.odom, valid_until, estimate.T_map_odom)
+            self._tf.send_transform(moved, frozen=True)
 
     def _publish_pose(self, estimate: Estimate, stamp_ns: int) -> None:
         self._pose_publisher.publish(

@@ -82,7 +82,7 @@ class EkfNode:
                 self._tell_wheels(message)
 
         qos = replace(SENSOR_DATA if kind is Imu else QoS(), depth=source.queue_size)
-        self.node.create_subscription(kind, source.topic, on_message, qos)
+        self.node.create_subscription(kind, source.topic, on_message, qos, frozen=True)
 
     def _tell_wheels(self, message: Odometry) -> None:
         """Tell all gyroscopes what wheels do: while they stand, what is measured is bias."""
@@ -153,6 +153,5 @@ class EkfNode:
         if config.publish_tf:
             pose = Pose3(state[states.POSITION].copy(), np.array([w, x, y, z]))
             stamp_ns = now_ns + config.transform_time_offset_ns
-            self._tf.send_transform(
-                transform_stamped(config.world_frame, config.base_link_frame, stamp_ns, pose)
-            )
+            moved = transform_stamped(config.world_frame, config.base_link_frame, stamp_ns, pose)
+            self._tf.send_transform(moved, frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twin.bridge.bus import Bus
 from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2
 from twin.nodes.navigation.robot_pose import Frames
 
 
@@ -14,5 +14,5 @@ class StaticLocalisationNode:
     def __init__(self, bus: Bus, frames: Frames, start: Pose2, *, namespace: str = "") -> None:
         self.node = bus.create_node("static_localisation", namespace)
         StaticTransformBroadcaster(self.node).send_transform(
-            transform_stamped(frames.map, frames.odom, self.node.now_ns, Pose3.from_pose2(start))
+            transform_stamped(frames.map, frames.odom, self.node.now_ns, start)
         )

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import OccupancyGrid, new
+from twin.bridge.node.tasks import Steps
 from twin.bridge.qos import LATCHED, QoS
 from twin.bridge.services import Respond
 from twin.bridge.srvs import SaveMap
@@ -56,7 +57,7 @@ class MapSaverNode:
     def _on_save(self, request: Any, respond: Respond) -> None:
         self.node.create_task(self._save(request, respond))
 
-    def _save(self, request: Any, respond: Respond) -> Generator[None, None, None]:
+    def _save(self, request: Any, respond: Respond) -> Steps:
         """Wait for a map, write it, answer whether that went well; the log says what did not."""
         topic = request.map_topic or "map"
         message = yield from self._first(topic)
@@ -72,13 +73,13 @@ class MapSaverNode:
         self.node.get_logger().info(f"map saved to {path}")
         respond(new(SaveMap.Response, result=True))
 
-    def _first(self, topic: str) -> Generator[None, None, OccupancyGrid | None]:
+    def _first(self, topic: str) -> Generator[int, None, OccupancyGrid | None]:
         got: list[OccupancyGrid] = []
         qos = LATCHED if self.config.map_subscribe_transient_local else QoS(depth=1)
         subscription = self.node.create_subscription(OccupancyGrid, topic, got.append, qos)
         end = self.node.now_ns + self.config.save_map_timeout_ns
         while not got and self.node.now_ns < end:
-            yield
+            yield end
         self.node.destroy_subscription(subscription)
         return got[0] if got else None
 

@@ -24,7 +24,7 @@ from twin.bridge.msgs import (
 from twin.bridge.qos import LATCHED, SENSOR_DATA
 from twin.bridge.srvs import GetMap
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
-from twin.geometry import Pose2, Pose3
+from twin.geometry import Pose2
 from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.slam import Slam, SlamUpdate
 from twin.navigation.mapping.warm_up import warm_up
@@ -69,7 +69,7 @@ class SlamToolboxNode:
         self._entropy_publisher = node.create_publisher(Float64, "entropy", 1)
         self._pose_publisher = node.create_publisher(PoseWithCovarianceStamped, "pose", 10)
         self._graph_publisher = node.create_publisher(MarkerArray, "slam_toolbox/graph_visualization", 1)
-        node.create_subscription(LaserScan, self.config.scan_topic, self._on_scan, SENSOR_DATA)
+        node.create_subscription(LaserScan, self.config.scan_topic, self._on_scan, SENSOR_DATA, frozen=True)
         node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, 10)
         for name in ("dynamic_map", "slam_toolbox/dynamic_map"):
             node.create_service(GetMap, name, self._on_dynamic_map)
@@ -138,9 +138,9 @@ class SlamToolboxNode:
                 if not self._started:
                     self._started = True
                     self._publish_map()
-        T_map_odom = Pose3.from_pose2(self.slam.T_map_odom)
         valid_until = stamp_ns + self.config.transform_timeout_ns
-        self._tf.send_transform(transform_stamped(frames.map, frames.odom, valid_until, T_map_odom))
+        moved = transform_stamped(frames.map, frames.odom, valid_until, self.slam.T_map_odom)
+        self._tf.send_transform(moved, frozen=True)
 
     def _publish_pose(self, update: SlamUpdate, stamp_ns: int) -> None:
         covariance = planar_covariance(update.covariance)

@@ -76,10 +76,10 @@ class CollisionMonitorNode:
         self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
         self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
         for topic in scan_topics:
-            node.create_subscription(LaserScan, topic, self._keep(topic), SENSOR_DATA)
+            node.create_subscription(LaserScan, topic, self._keep(topic), SENSOR_DATA, frozen=True)
         for topic in range_topics:
-            node.create_subscription(Range, topic, self._keep(topic), SENSOR_DATA)
-        node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10)
+            node.create_subscription(Range, topic, self._keep(topic), SENSOR_DATA, frozen=True)
+        node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10, frozen=True)
         node.create_service(Toggle, "collision_monitor/toggle", self._on_toggle)
 
     def _reconfigure(self, config: CollisionMonitorConfig) -> None:
@@ -107,12 +107,12 @@ class CollisionMonitorNode:
     def _on_twist(self, message: Twist) -> None:
         velocity = (message.linear.x, message.angular.z)
         if not all(map(math.isfinite, velocity)):
-            self._publisher.publish(message)  # refused, and said, by who drives
+            self._publisher.publish(message, frozen=True)  # refused, and said, by who drives
             return
         action = self.monitor.process(velocity, self._points()) if self._enabled else Action(velocity)
         if action.polygon_name != self._polygon:
             self._tell(action)
-        self._publisher.publish(twist_from_planar(*self._braked(action)))
+        self._publisher.publish(twist_from_planar(*self._braked(action)), frozen=True)
 
     def _braked(self, action: Action) -> tuple[float, float]:
         """Return what the drive can do of it on the same curve: each of its axes brakes by itself."""

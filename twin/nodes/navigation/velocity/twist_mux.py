@@ -32,11 +32,12 @@ class TwistMuxNode:
             direct = self.node.create_publisher(Twist, _WHEELS, 10)
         for source in _INPUTS:
             publisher = guarded if source.guarded else direct
-            self.node.create_subscription(Twist, source.topic, self._callback(source.name, publisher), 10)
+            on_twist = self._callback(source.name, publisher)
+            self.node.create_subscription(Twist, source.topic, on_twist, 10, frozen=True)
 
     def _callback(self, name: str, publisher: Publisher[Twist]) -> Callable[[Twist], None]:
         def on_twist(message: Twist) -> None:
             if self.mux.accept(name, self.node.now_ns * 1e-9):
-                publisher.publish(message)
+                publisher.publish(message, frozen=True)
 
         return on_twist

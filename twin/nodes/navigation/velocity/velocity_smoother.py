@@ -20,7 +20,7 @@ class VelocitySmootherNode:
         declare_config(self.node, config)
         self._period_s = period_ns * 1e-9
         self._publisher = self.node.create_publisher(Twist, "cmd_vel_smoothed", 10)
-        self.node.create_subscription(Twist, "cmd_vel_nav", self._on_twist, 10)
+        self.node.create_subscription(Twist, "cmd_vel_nav", self._on_twist, 10, frozen=True)
         self.node.create_timer(period_ns, self._update)
 
     def _on_twist(self, message: Twist) -> None:
@@ -30,4 +30,5 @@ class VelocitySmootherNode:
     def _update(self) -> None:
         if self.smoother.idle:
             return
-        self._publisher.publish(twist_from_planar(*self.smoother.update(self._period_s)))
+        command = twist_from_planar(*self.smoother.update(self._period_s))
+        self._publisher.publish(command, frozen=True)

@@ -1,4 +1,4 @@
-"""Services and their clients, over Zenoh queryables."""
+"""Services and their clients: from inbox to inbox if no other process can take part, else over Zenoh."""
 
 from __future__ import annotations
 
@@ -7,20 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 
-from twin.bridge.cdr.codec import codec
+from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import QoS
+from twin.bridge.services.future import Future
+from twin.bridge.services.questions import InProcessQuestion, Question, ZenohQuestion
 from twin.bridge.topics import Endpoint
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, pack_attachment
-from twin.bridge.wire.naming import parse_key
 from twin.bridge.wire.ros2dds import pack_request_id
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
+
+__all__ = ["Client", "Future", "Respond", "Service"]
 
 _QOS = QoS(depth=10)
 _FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
@@ -29,61 +32,9 @@ Respond = Callable[[Any], None]
 """Sends the response; may be called in a later spin."""
 
 
-class Future:
-    """A response that may not have come yet; done in a spin of the client's node.
-
-    In executions and tasks: `response = yield from future`.
-    """
-
-    def __init__(self, service: str) -> None:
-        self.done = False
-        self._service = service
-        self._response: Any = None
-        self.error: str | None = None
-        """Why there will be no response; None if there is one or it may still come."""
-        self._callbacks: list[Callable[[Future], None]] = []
-
-    @property
-    def result(self) -> Any:
-        """The response.
-
-        Raises:
-            BridgeError: nobody answered, or not yet.
-        """
-        if not self.done:
-            raise BridgeError(f"{self._service} has not answered yet; look at `done` first")
-        if self.error is not None:
-            raise BridgeError(self.error)
-        return self._response
-
-    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
-        """Call back when done, at once if it is."""
-        if self.done:
-            callback(self)
-        else:
-            self._callbacks.append(callback)
-
-    def __iter__(self) -> Generator[None, None, Any]:
-        """Wait in an execution; the value is the response.
-
-        Raises:
-            BridgeError: nobody answered.
-        """
-        while not self.done:
-            yield
-        return self.result
-
-    def cancel(self) -> None:
-        """Wait no more; a response that comes later is ignored."""
-        self.finish(None, f"the request to {self._service} was cancelled")
-
-    def finish(self, response: Any, error: str | None = None) -> None:
-        """Set the response, or why there is none; what comes later is ignored."""
-        if self.done:
-            return
-        self.done, self._response, self.error = True, response, error
-        for callback in self._callbacks:
-            callback(self)
+def codecs(srv_type: ServiceType) -> tuple[Codec[Any], Codec[Any]]:
+    """Return how requests and responses travel."""
+    return codec(f"{srv_type.name}_Request"), codec(f"{srv_type.name}_Response")
 
 
 class Service(Endpoint):
@@ -93,55 +44,53 @@ class Service(Endpoint):
         self, node: Node, srv_type: ServiceType, name: str, callback: Callable[[Any, Respond], None]
     ) -> None:
         super().__init__(node, "SS", name, srv_type.name, _QOS)
-        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._requests, self._responses = codecs(srv_type)
         self._callback = callback
-        self._open: set[zenoh.Query] = set()
+        self._open: set[Question] = set()
         bus = node.bus
         self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
             queryable = bus.zenoh.declare_queryable(key, direct(self._on_query), complete=True)
             self._declared.append(queryable)
+        self._listeners = bus.in_process.listeners(self.key)
+        self._listeners.receivers.append(self)
         self.announce()
 
-    def enqueue(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
+    def enqueue(self, data: Question, external: bool) -> None:
         """Put a request into the node's inbox."""
         self.node.inbox.append([self, data, external])
 
     def destroy(self) -> None:
         """Leave the graph; who still waits for a response learns that there will be none."""
+        if self._declared:
+            self._listeners.receivers.remove(self)
         super().destroy()
         for entry in self.node.inbox:
             if entry[0] is self:
                 entry[0] = None
-                self._open.add(entry[1][0])
+                self._open.add(entry[1])
         while self._open:
-            self._open.pop().drop()  # type: ignore[no-untyped-call]
+            self._open.pop().drop()
 
-    def handle(self, data: tuple[zenoh.Query, Attachment], external: bool) -> None:
+    def handle(self, data: Question, external: bool) -> None:
         """Decode and call back."""
-        query, source = data
-        payload = query.payload.to_bytes() if query.payload else b""
-        request = read(self.node.bus.external, self.name, self._requests, payload)
+        request = read(self.node.bus.external, self.name, self._requests, data.payload)
         if request is None:
-            query.drop()  # type: ignore[no-untyped-call]
+            data.drop()
             return
 
         def respond(response: Any) -> None:
             if type(response) is not self._responses.cls:
                 what = type(response).__name__
                 raise TypeError(f"{self.name} answers with {self._responses.msgtype}, not {what}")
-            if query not in self._open:
+            if data not in self._open:
                 if not self._declared:
                     return  # destroyed meanwhile: the client knows
                 raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
-            self._open.discard(query)
-            now_ns = self.node.bus.clock.now_ns
-            typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
-            attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
-            with query:
-                query.reply(query.key_expr, self._responses.encode(response), attachment=attachment)
+            self._open.discard(data)
+            data.reply(self._responses.encode(response), self.node.now_ns)
 
-        self._open.add(query)
+        self._open.add(data)
         self._callback(request, respond)
 
     def _on_query(self, query: zenoh.Query) -> None:
@@ -149,10 +98,10 @@ class Service(Endpoint):
         if source is None:
             query.drop()  # type: ignore[no-untyped-call]
         elif bus.in_own_thread():
-            self.enqueue((query, source), False)
+            self.enqueue(ZenohQuestion(query, source), False)
         else:
             size = len(query.payload) if query.payload else 0
-            bus.external.push(Arrival(source, self, (query, source), size))
+            bus.external.push(Arrival(source, self, ZenohQuestion(query, source), size))
 
 
 class Client(Endpoint):
@@ -160,7 +109,7 @@ class Client(Endpoint):
 
     def __init__(self, node: Node, srv_type: ServiceType, name: str) -> None:
         super().__init__(node, "SC", name, srv_type.name, _QOS)
-        self._requests, self._responses = codec(srv_type.Request), codec(srv_type.Response)
+        self._requests, self._responses = codecs(srv_type)
         self._sequence = 0
         self._pending: dict[Future, None] = {}
         node.bus.standard_services.want(name, node.bus.nodes)
@@ -173,11 +122,15 @@ class Client(Endpoint):
             timeout=_FOREVER_S,
         )
         self._declared.append(self._querier)
+        self._services = node.bus.in_process.listeners(self.key)
+        self._short = node.bus.savings.services_in_process
         self.announce()
 
     @property
     def service_is_ready(self) -> bool:
         """Whether somebody offers the service now."""
+        if self._short and self._services.is_direct:
+            return bool(self._services.receivers)
         return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
 
     def wait_for_service(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
@@ -228,21 +181,28 @@ class Client(Endpoint):
 
         answered: list[bool] = []
 
+        def on_response(payload: bytes) -> None:
+            answered.append(True)
+            deliver((future, payload))
+
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                answered.append(True)
-                deliver((future, reply.ok.payload.to_bytes()))
+                on_response(reply.ok.payload.to_bytes())
 
         def on_end() -> None:
             # May run in any thread, the bus's own too: it must not overtake a reply that waits outside.
             if not answered:
                 deliver((future, None))
 
-        self._querier.get(
-            direct(on_reply, on_end),
-            payload=self._requests.encode(request),
-            attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
-        )
+        payload = self._requests.encode(request)
+        if self._short and self._services.is_direct and bus.in_own_thread():
+            InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers)
+        else:
+            self._querier.get(
+                direct(on_reply, on_end),
+                payload=payload,
+                attachment=pack_request_id(source) if self._bridged else pack_attachment(*source),
+            )
         return future
 
     def enqueue(self, data: tuple[Future, bytes | None], external: bool) -> None:

@@ -1,0 +1,69 @@
+"""Requests as a service sees them: each is answered once or dropped, and the client learns which."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import zenoh
+
+from twin.bridge.wire.external import Receiver
+from twin.bridge.wire.keys import Attachment, pack_attachment
+from twin.bridge.wire.naming import parse_key
+
+
+class ZenohQuestion:
+    """A request that came through Zenoh, from anywhere."""
+
+    def __init__(self, query: zenoh.Query, source: Attachment) -> None:
+        self.query = query
+        self._source = source
+
+    @property
+    def payload(self) -> bytes:
+        """The request as CDR."""
+        return self.query.payload.to_bytes() if self.query.payload else b""
+
+    def reply(self, payload: bytes, now_ns: int) -> None:
+        """Answer at a time [ns] with a response as CDR."""
+        query, source = self.query, self._source
+        typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
+        attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
+        with query:
+            query.reply(query.key_expr, payload, attachment=attachment)
+
+    def drop(self) -> None:
+        """Answer never."""
+        self.query.drop()  # type: ignore[no-untyped-call]
+
+
+class InProcessQuestion:
+    """A request of a client of the same bus."""
+
+    def __init__(
+        self, payload: bytes, on_response: Callable[[bytes], None], on_end: Callable[[], None]
+    ) -> None:
+        """Take a request as CDR, and who is told of each response and, when there can be no more, of that."""
+        self.payload = payload
+        self._on_response, self._on_end = on_response, on_end
+        self._open = 1
+
+    def ask(self, services: Sequence[Receiver]) -> None:
+        """Put it into the inboxes of all services of the name: mostly one."""
+        self._open += len(services)
+        for service in services:
+            service.enqueue(self, False)
+        self.drop()
+
+    def reply(self, payload: bytes, _now_ns: int) -> None:
+        """Answer with a response as CDR."""
+        self._on_response(payload)
+        self.drop()
+
+    def drop(self) -> None:
+        """Answer never: one less may."""
+        self._open -= 1
+        if not self._open:
+            self._on_end()
+
+
+Question = ZenohQuestion | InProcessQuestion
