@@ -65,7 +65,7 @@ def _arrow(values: Any, kind: pa.DataType) -> pa.Array:
     if pa.types.is_list(kind):
         items = _arrow(np.concatenate(values), kind.value_type)
         return pa.ListArray.from_arrays(_offsets([len(value) for value in values]), items, type=kind)
-    return values if isinstance(values, pa.Array) else pa.array(values, kind)
+    return pa.array(values, kind)
 
 
 def _offsets(lengths: ArrayLike) -> NDArray[np.int32]:
@@ -91,8 +91,8 @@ def scalars(index: list[rr.TimeColumn], series: Mapping[str, ArrayLike]) -> Iter
 def transforms(
     entity: str,
     index: list[rr.TimeColumn],
-    parents: pa.Array | Sequence[str],
-    children: pa.Array | Sequence[str],
+    parents: Sequence[str] | NDArray[np.object_],
+    children: Sequence[str] | NDArray[np.object_],
     xyz: ArrayLike,
     quat_xyzw: ArrayLike,
 ) -> Chunk:

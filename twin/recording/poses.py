@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import pyarrow as pa  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from twin.geometry import Array
@@ -38,7 +37,7 @@ class Poses(Rows[tuple[int, Array, Array]]):
                 what was sent.
         """
         super().__init__()
-        self._names = pa.array(names, pa.string())
+        self._names = np.array(names, dtype=object)
         self._stage = stage
         self._bases = list(bases)
         self._tolerance = tolerance
@@ -55,8 +54,8 @@ class Poses(Rows[tuple[int, Array, Array]]):
             yield transforms(
                 "/tf",
                 sim_time(np.array(times)[at]),
-                pa.repeat(WORLD, len(at)),
-                self._names.take(pa.array(bodies)),
+                [WORLD] * len(at),
+                self._names[bodies],
                 kept[:, :3],
                 kept[:, [4, 5, 6, 3]],
             )

@@ -10,7 +10,6 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 from numpy.typing import NDArray
 
@@ -84,7 +83,7 @@ class _SpatialChannel(Channel[Placement[Shown]]):
         fixed = [(row.time_ns, *row.body_pose) for row in rows if row.body_pose is not None]
         if fixed:
             times, xyz, quat_wxyz = zip(*fixed, strict=True)
-            parents, children = (pa.repeat(name, len(fixed)) for name in (WORLD, self._origin))
+            parents, children = [WORLD] * len(fixed), [self._origin] * len(fixed)
             quat_xyzw = np.array(quat_wxyz)[:, [1, 2, 3, 0]]
             entity = f"/tf_topics{self.topic}"
             yield transforms(entity, sim_time(times), parents, children, xyz, quat_xyzw)
