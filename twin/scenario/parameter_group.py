@@ -31,11 +31,11 @@ class ParameterGroup(StrictModel):
     """What those keys are that it has of them, by name."""
 
     @classmethod
-    def descriptions(cls) -> Mapping[str, str]:
+    def _descriptions(cls) -> Mapping[str, str]:
         """Return what is told of the keys."""
         groups = [base for base in cls.__mro__ if issubclass(base, ParameterGroup)]
         declared = ChainMap(*(dict(group.declared) for group in groups))
-        return {name: one.text for name, one in declared.items()} | dict(super().descriptions())
+        return {name: one.text for name, one in declared.items()} | dict(super()._descriptions())
 
     if TYPE_CHECKING:
 

@@ -38,9 +38,9 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
         return set(PlannerServerParameters.model_fields)
 
     @classmethod
-    def descriptions(cls) -> Mapping[str, str]:
+    def _descriptions(cls) -> Mapping[str, str]:
         """Return what is told of the keys, and which plugins have them."""
-        told = dict(super().descriptions())
+        told = dict(super()._descriptions())
         for name in told:
             owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if name in own]
             if 0 < len(owners) < len(_KEYS):

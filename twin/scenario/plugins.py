@@ -132,7 +132,7 @@ class _OfDataclass(StrictModel):
     config: ClassVar[type]
 
     @classmethod
-    def descriptions(cls) -> Mapping[str, str]:
+    def _descriptions(cls) -> Mapping[str, str]:
         """Return what is told of the keys, below the dataclass's fields."""
         return texts_of(cls.config)
 

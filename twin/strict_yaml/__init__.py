@@ -34,7 +34,7 @@ class StrictModel(BaseModel):
     )
 
     @classmethod
-    def descriptions(cls) -> Mapping[str, str]:
+    def _descriptions(cls) -> Mapping[str, str]:
         """Return what is told of the keys. It is read from the source, so only when somebody asks."""
         return texts_of(cls)
 
@@ -42,7 +42,7 @@ class StrictModel(BaseModel):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         reference = handler(core)
         properties = handler.resolve_ref_schema(reference).get("properties", {})
-        for name, text in cls.descriptions().items():
+        for name, text in cls._descriptions().items():
             if name in properties:
                 properties[name].setdefault("description", text)
         return reference
