@@ -1,4 +1,4 @@
-# ruff: noqa: E501  (summaries are sentences)
+# ruff: noqa: E501  (a command is a row)
 """The table of commands; the module of a command is imported when somebody calls it, or asks it for help."""
 
 from __future__ import annotations
@@ -40,133 +40,25 @@ class Command:
         return get_command(alone)
 
 
+# fmt: off
 TABLE = {
-    "run": Command(
-        _SCENARIOS,
-        "Run a scenario to its verdict.",
-        "run",
-        "run",
-        "twin run warehouse --seed 7 --set robots.0.pose.x=1.5",
-        needs_arguments=True,
-    ),
-    "test": Command(
-        _SCENARIOS,
-        "Run many scenarios, each in a process of its own.",
-        "run.batch",
-        "run_batch",
-        "twin test scenarios --junit results.xml",
-    ),
-    "play": Command(
-        _SCENARIOS,
-        "Open a recording in the Rerun viewer.",
-        "play",
-        "play",
-        "twin play runs/warehouse/20261121-101500",
-        needs_arguments=True,
-    ),
-    "new": Command(
-        _SCENARIOS,
-        "Write a small project that runs as it is: a robot, an arena, a scenario, a check, a test, a CI file.",
-        "new",
-        "new",
-        "twin new my_robot",
-        needs_arguments=True,
-    ),
-    "scenarios": Command(
-        _SCENARIOS,
-        "List the scenarios that `twin run` knows by name: those in the folder `scenarios`, and shipped ones.",
-        "listings",
-        "scenarios",
-        "twin scenarios",
-    ),
-    "arenas": Command(
-        _SCENARIOS,
-        "List the arenas that ship with twin; a scenario names them as `arena`, their poses as `start`.",
-        "listings",
-        "arenas",
-        "twin arenas",
-    ),
-    "examples": Command(
-        _SCENARIOS,
-        "List the example programs, or say where one is: `python $(twin examples talker)` runs it.",
-        "examples",
-        "examples",
-        "twin examples talker",
-    ),
-    "schema": Command(
-        _SCENARIOS,
-        "Print the JSON schema of scenario files, for completion and checks in an editor.",
-        "schema",
-        "schema",
-        "twin schema -o scenario.schema.json",
-    ),
-    "robots": Command(
-        _ROBOTS,
-        "List the robots that ship with twin; a scenario names them as `model`.",
-        "listings",
-        "robots",
-        "twin robots",
-    ),
-    "check": Command(
-        _ROBOTS,
-        "Name every fault of a robot file, with its line, the number found, and how to mend it.",
-        "model.check",
-        "check",
-        "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06",
-        needs_arguments=True,
-    ),
-    "tree": Command(
-        _ROBOTS,
-        "Print the tree of links in check_urdf's format.",
-        "model.tree",
-        "tree",
-        "twin tree my_robot.urdf",
-        needs_arguments=True,
-    ),
-    "graph": Command(
-        _ROBOTS,
-        "Draw links and joints: Graphviz text as urdf_to_graphviz writes it, or SVG, which needs no Graphviz.",
-        "model.tree",
-        "graph",
-        "twin graph my_robot.urdf -o my_robot.svg",
-        needs_arguments=True,
-    ),
-    "convert": Command(
-        _ROBOTS,
-        "Write robot.xml and assets/, which plain MuJoCo loads, and report.json: what became of every tag.",
-        "model.convert",
-        "convert",
-        "twin convert my_robot.urdf -o my_robot",
-        needs_arguments=True,
-    ),
-    "view": Command(
-        _ROBOTS,
-        "Look at a robot file, and move its joints.",
-        "model.view",
-        "view",
-        "twin view my_robot.urdf --joint lift_joint=0.5",
-        needs_arguments=True,
-    ),
-    "router": Command(
-        _GRAPH,
-        "Run a Zenoh router, as rmw_zenohd, until Ctrl-C.",
-        "ros.router",
-        "router",
-        "twin router --listen tcp/127.0.0.1:7447",
-    ),
-    "exec": Command(
-        _GRAPH,
-        "Run nodes beside a simulation until it ends, or Ctrl-C.",
-        "exec",
-        "execute",
-        "twin exec my_controller.py:make_node --lockstep",
-        needs_arguments=True,
-    ),
-    "topic": Command(
-        _GRAPH,
-        "Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.",
-        "ros.topic",
-    ),
+    "run": Command(_SCENARIOS, "Run a scenario to its verdict.", "run", "run", "twin run warehouse --seed 7 --set robots.0.pose.x=1.5", needs_arguments=True),
+    "test": Command(_SCENARIOS, "Run many scenarios, each in a process of its own.", "run.batch", "run_batch", "twin test scenarios --junit results.xml"),
+    "play": Command(_SCENARIOS, "Open a recording in the Rerun viewer.", "play", "play", "twin play runs/warehouse/20261121-101500", needs_arguments=True),
+    "new": Command(_SCENARIOS, "Write a small project that runs as it is: a robot, an arena, a scenario, a check, a test, a CI file.", "new", "new", "twin new my_robot", needs_arguments=True),
+    "scenarios": Command(_SCENARIOS, "List the scenarios that `twin run` knows by name: those in the folder `scenarios`, and shipped ones.", "listings", "scenarios", "twin scenarios"),
+    "arenas": Command(_SCENARIOS, "List the arenas that ship with twin; a scenario names them as `arena`, their poses as `start`.", "listings", "arenas", "twin arenas"),
+    "examples": Command(_SCENARIOS, "List the example programs, or say where one is: `python $(twin examples talker)` runs it.", "examples", "examples", "twin examples talker"),
+    "schema": Command(_SCENARIOS, "Print the JSON schema of scenario files, for completion and checks in an editor.", "schema", "schema", "twin schema -o scenario.schema.json"),
+    "robots": Command(_ROBOTS, "List the robots that ship with twin; a scenario names them as `model`.", "listings", "robots", "twin robots"),
+    "check": Command(_ROBOTS, "Name every fault of a robot file, with its line, the number found, and how to mend it.", "model.check", "check", "twin check my_robot.urdf.xacro --arg wheel_radius:=0.06", needs_arguments=True),
+    "tree": Command(_ROBOTS, "Print the tree of links in check_urdf's format.", "model.tree", "tree", "twin tree my_robot.urdf", needs_arguments=True),
+    "graph": Command(_ROBOTS, "Draw links and joints: Graphviz text as urdf_to_graphviz writes it, or SVG, which needs no Graphviz.", "model.tree", "graph", "twin graph my_robot.urdf -o my_robot.svg", needs_arguments=True),
+    "convert": Command(_ROBOTS, "Write robot.xml and assets/, which plain MuJoCo loads, and report.json: what became of every tag.", "model.convert", "convert", "twin convert my_robot.urdf -o my_robot", needs_arguments=True),
+    "view": Command(_ROBOTS, "Look at a robot file, and move its joints.", "model.view", "view", "twin view my_robot.urdf --joint lift_joint=0.5", needs_arguments=True),
+    "router": Command(_GRAPH, "Run a Zenoh router, as rmw_zenohd, until Ctrl-C.", "ros.router", "router", "twin router --listen tcp/127.0.0.1:7447"),
+    "exec": Command(_GRAPH, "Run nodes beside a simulation until it ends, or Ctrl-C.", "exec", "execute", "twin exec my_controller.py:make_node --lockstep", needs_arguments=True),
+    "topic": Command(_GRAPH, "Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.", "ros.topic"),
     "node": Command(_GRAPH, "Nodes: list, look, draw; as `ros2 node` and rqt_graph.", "ros.node"),
     "service": Command(_GRAPH, "Services: list, look, call; as `ros2 service`.", "ros.service"),
     "action": Command(_GRAPH, "Actions: list, look, send goals; as `ros2 action`.", "ros.action"),
@@ -176,6 +68,7 @@ TABLE = {
     "bag": Command(_GRAPH, "Bags: record, play, look, convert; as `ros2 bag`.", "ros.bag"),
     "map": Command(_NAVIGATION, "Maps: look at them, save, convert, render, draw zones.", "map"),
 }
+# fmt: on
 
 
 class OwnCommands(MutableMapping[str, Any]):
