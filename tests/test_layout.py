@@ -195,9 +195,9 @@ def test_no_global_random_state() -> None:
 def subject(tests: Path) -> Path:
     """Return the folder that a folder of tests is about."""
     first, *rest = tests.relative_to(ROOT / "tests").parts or ("",)
-    if first == "benchmarks":
+    if first == "benchmarks" and rest != ["measures"]:  # which are in no package
         return ROOT.joinpath("benchmarks", "twin_benchmarks", *rest)
-    return ROOT.joinpath("" if first == "examples" else "twin", first, *rest)
+    return ROOT.joinpath("" if first in ("benchmarks", "examples") else "twin", first, *rest)
 
 
 def test_tests_mirror_the_package() -> None:

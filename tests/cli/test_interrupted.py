@@ -91,7 +91,7 @@ finally:
 """
 
 
-@pytest.mark.parametrize(("command", "step", "imports"), [("--help", 30, 200), ("schema", 150, 400)])
+@pytest.mark.parametrize(("command", "step", "imports"), [("--help", 30, 100), ("schema", 150, 400)])
 def test_an_interrupt_at_any_import_ends_with_130_and_no_word(command: str, step: int, imports: int) -> None:
     """The process forks where it imports, and the child gets the signal: every moment for the price of one.
 
