@@ -10,8 +10,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
+
+from twin.cli.ros.topic.echo import EchoPrinter, EchoStyle
 
 Twin = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -127,6 +130,15 @@ def test_an_unknown_topic_is_told_with_the_nearest_one(twin: Twin, verb: str) ->
     assert done.stderr.startswith(
         "error: Unknown topic '/robot/cmdvel'; did you mean '/robot/cmd_vel'? Valid: /"
     )
+
+
+def test_echo_once_prints_one_of_those_that_come_together(capsys: pytest.CaptureFixture[str]) -> None:
+    style = EchoStyle(raw=True, no_lost=True)
+    printer = EchoPrinter(Mock(), Mock(), style, None, once=True)
+    for payload in (b"one", b"two"):
+        printer.on_sample(Mock(payload=payload))
+    assert capsys.readouterr().out == "b'one'\n---\n"
+    assert printer.is_done
 
 
 def test_echo_prints_what_was_latched_before(twin: Twin) -> None:

@@ -100,9 +100,9 @@ def echo(
             listener = Listener.of_topic(process, name, endpoints, cls)
         else:
             listener = Listener.of_type(process, name, message_type)
-        printer = EchoPrinter(process, listener, style, accepts)
+        printer = EchoPrinter(process, listener, style, accepts, once=once)
         listener.listen(chosen_qos(choice, process.graph.publishers(name)), printer.on_sample)
-        process.live.spin(lambda: once and printer.printed > 0, timeout)
+        process.live.spin(lambda: printer.is_done, timeout)
 
 
 def chosen_qos(choice: SubscriptionQos, publishers: tuple[EndpointInfo, ...]) -> QoS:
@@ -138,6 +138,8 @@ class EchoPrinter:
         listener: Any,
         style: EchoStyle,
         accepts: Callable[[Any], bool] | None,
+        *,
+        once: bool = False,
     ) -> None:
         self._process = process
         self._decode = listener.decode
@@ -145,11 +147,15 @@ class EchoPrinter:
         self._accepts = accepts
         self._sequences: dict[bytes, int] = {}
         self._lost = 0
-        self.printed = 0
+        self._once = once
+        self.is_done = False
+        """Whether one was printed that shall be the only one: several may have come before this is asked."""
 
     def on_sample(self, sample: RawSample) -> None:
         """Print a sample, if the filter lets it through."""
         style = self._style
+        if self.is_done:
+            return
         if not style.no_lost:
             self._count_lost(sample)
         if style.raw and self._accepts is None:
@@ -163,7 +169,7 @@ class EchoPrinter:
             if self._accepts is not None and not self._accepts(value):
                 return
             value = sample.payload if style.raw else value
-        self.printed += 1
+        self.is_done = self._once
         if style.clear:
             typer.echo("\x1b[H\x1b[2J")
         typer.echo(self._text(sample, value, field), nl=False)
