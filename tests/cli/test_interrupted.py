@@ -37,6 +37,16 @@ def test_an_interrupt_that_python_wraps_is_one_all_the_same() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
+def test_an_interrupt_that_python_cannot_raise_is_silent() -> None:
+    """In a destructor Python would print the KeyboardInterrupt, and go on."""
+    script = _SCRIPT.replace("__set_name__(self, owner, name)", "__del__(self)")
+    script = script.replace(
+        "    class Owner:\n        field = Descriptor()", "    Descriptor()\n    raise RuntimeError"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 def test_an_interrupt_while_the_interpreter_ends_is_silent() -> None:
     script = (
         "import atexit, signal, sys\n"

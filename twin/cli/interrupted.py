@@ -17,6 +17,7 @@ _interrupts: list[int] = []
 def ends_on_interrupt() -> Iterator[None]:
     """Exit with 130 when Ctrl-C ends the block, whatever became of the KeyboardInterrupt on its way."""
     _interrupts.clear()
+    sys.unraisablehook = _on_unraisable
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _on_signal)
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup wants it
@@ -62,6 +63,12 @@ def sigterm_is_ctrl_c() -> None:
     Also where Ctrl-C itself is ignored, as in what a shell's script has put into the background.
     """
     signal.signal(signal.SIGTERM, _on_signal)
+
+
+def _on_unraisable(told: sys.UnraisableHookArgs) -> None:
+    """Say nothing of a Ctrl-C in a destructor, or in a generator that nobody needs any more: it is known."""
+    if not issubclass(told.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(told)
 
 
 def _on_signal(number: int, frame: FrameType | None) -> None:
