@@ -258,10 +258,13 @@ class _OrAUsers:
         return UserMission.model_validate({**data, "type": used.reference}, strict=True)
 
 
-_Ships = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle
+_Tasks = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore
+_Ships = _Tasks | Idle
 for _mission in get_args(_Ships):
     (_name,) = get_args(_mission.model_fields["type"].annotation)
     MISSIONS.register(_name, f"twin.runtime.stacks.missions:{_name}")
 _Shipped = Annotated[_Ships, Field(discriminator="type")]
 _SHIPPED: TypeAdapter[Any] = TypeAdapter(_Shipped)
 Mission = Annotated[_Ships | UserMission, _OrAUsers()]
+Task = _Tasks | UserMission
+"""What a robot does."""
