@@ -1,8 +1,8 @@
 """Writes the tables of docs/scenarios.md, arenas.md, navigation.md and api.md: `python docs/reference.py`.
 
-Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of the
-hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code is 1 if something is
-not up to date.
+Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
+the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
+is 1 if something is not up to date.
 """
 
 from __future__ import annotations

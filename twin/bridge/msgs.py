@@ -1,8 +1,8 @@
 """Message classes by their ROS names: `Twist(linear=Vector3(...), ...)`.
 
-They are dataclasses, as rosbags makes them, each when it is first used: every field is given, by name or position; `new(Twist)` fills what is left out
-with ROS's defaults. Sequences of numbers are numpy arrays of the field's type, read-only when received.
-Services and actions are in `srvs` and `action_types`.
+They are dataclasses, as rosbags makes them, each when it is first used: every field is given, by name
+or position; `new(Twist)` fills what is left out with ROS's defaults. Sequences of numbers are numpy
+arrays of the field's type, read-only when received. Services and actions are in `srvs` and `action_types`.
 """
 
 from __future__ import annotations

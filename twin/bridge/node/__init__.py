@@ -64,7 +64,7 @@ class Node(NodeParameters, NodeGraph):
         self.is_destroyed = self._closing = False
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
-        self._liveliness: Any = bus.zenoh.liveliness().declare_token(str(self.token))
+        self._liveliness: Any = bus.wire.declare_token(str(self.token))
         self.action_clients = 0
         """How many there have been."""
         self._endpoints: list[OwnedEndpoint] = []
