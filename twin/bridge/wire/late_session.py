@@ -27,6 +27,11 @@ class LateSession:
         return self._session is not None
 
     @property
+    def is_closed(self) -> bool:
+        """Whether nothing is left of it."""
+        return self._is_closed and (self._session is None or self._session.is_closed())
+
+    @property
     def waiting_tokens(self) -> list[str]:
         """The liveliness tokens that a session would have, in the order of their declaration."""
         return [late.token for late in self._waiting if late.token]
