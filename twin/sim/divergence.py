@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from pathlib import Path
 
@@ -29,7 +30,7 @@ class DivergenceGuard:
         self._model = model
         self._data = data
         self._warnings = [data.warning[kind] for kind in _BAD]
-        self._zeros = np.zeros(model.nv)
+        self._velocity = data.qvel
         self._size = mujoco.mj_stateSize(model, _STATE)
         self._states = deque[Array](maxlen=capacity)
         """The states kept, oldest first."""
@@ -52,8 +53,8 @@ class DivergenceGuard:
         """
         position, velocity, acceleration = self._warnings
         warned = position.number or velocity.number or acceleration.number
-        # Nothing but a number that is not finite makes zeros times numbers other than zero.
-        if not warned and self._data.qvel.dot(self._zeros) == 0.0:
+        # A number that is not finite makes the sum one, too.
+        if not warned and math.isfinite(sum(self._velocity.tolist())):
             return
         what, part = self._replay()
         time = self._data.time

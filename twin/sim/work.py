@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-_ROWS = 128
+from twin.geometry import Array
+
+_MOST = 128
 """States that are noted before they are added up."""
 
 
@@ -28,40 +30,41 @@ class WorkMeter:
         self._dofs = model.jnt_dofadr[joints]
         self._of = {robot: np.array([owner == robot for owner in owners], dtype=bool) for robot in robots}
         self._work = np.zeros(len(joints))
-        # A row for the state before physics steps, then one for each; row, first row of these steps.
-        self._forces, self._velocities = np.zeros((_ROWS, model.nv)), np.zeros((_ROWS, model.nv))
-        self._row = self._first = 0
+        # The state before physics steps, then that after each, as bytes: nothing copies an array for less.
+        self._forces: list[bytes] = []
+        self._velocities: list[bytes] = []
         self._noted: list[tuple[int, int]] = []
+        """Of the calls: where each began, and its last state."""
 
     def begin(self, steps: int) -> None:
         """Note the state before so many physics steps."""
-        if self._row + steps >= len(self._forces):
+        noted = len(self._forces)
+        if noted + steps >= _MOST:
             self._add_up()
-        if steps >= len(self._forces):
-            self._forces, self._velocities = (np.zeros((steps + 1, len(self._force))) for _ in range(2))
-        self._first = self._row
-        self._velocities[self._row] = self._velocity
+            noted = 0
+        self._noted.append((noted, noted + steps))
+        self.note()
 
     def note(self) -> None:
-        """Note a physics step."""
-        self._row += 1
-        self._forces[self._row] = self._force
-        self._velocities[self._row] = self._velocity
-
-    def end(self) -> None:
-        """Note that these were all."""
-        self._noted.append((self._first, self._row))
-        self._row += 1
+        """Note the state after a physics step."""
+        self._forces.append(self._force.tobytes())
+        self._velocities.append(self._velocity.tobytes())
 
     def _add_up(self) -> None:
         """Add up what was noted; that of several calls together costs little more than that of one."""
-        velocities = self._velocities[: self._row, self._dofs]
-        powers = self._forces[1 : self._row, self._dofs] * (velocities[:-1] + velocities[1:])
+        if not self._noted:
+            return
+        forces, velocities = self._of_drives(self._forces), self._of_drives(self._velocities)
+        powers = forces[1:] * (velocities[:-1] + velocities[1:])
         np.maximum(powers, 0.0, out=powers)
         for first, last in self._noted:
-            self._work += self._half_step * powers[first:last].sum(axis=0)
-        self._row = 0
-        self._noted.clear()
+            self._work += self._half_step * np.add.reduce(powers[first:last])
+        for noted in (self._forces, self._velocities, self._noted):
+            noted.clear()
+
+    def _of_drives(self, noted: list[bytes]) -> Array:
+        """Return of every state what belongs to the joints that are driven, shape (states, joints)."""
+        return np.frombuffer(b"".join(noted)).reshape(len(noted), -1)[:, self._dofs]
 
     def work(self, robot: str) -> float:
         """Return the work of a robot's actuators since the start [J]."""

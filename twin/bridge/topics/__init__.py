@@ -82,6 +82,7 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
+        self.msgtype = self.codec.msgtype
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
@@ -115,16 +116,18 @@ class Publisher(Endpoint, Generic[M]):
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         bus, listeners = self._bus, self._listeners
+        frozen = frozen and self._by_reference
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
-        if bus.taps:
-            sample.settle(frozen and self._by_reference)
-            for tap in bus.taps:
-                tap(sample)
-        if listeners is not None and listeners.is_direct and bus.in_own_thread():
-            if listeners.receivers:
-                sample.settle(frozen and self._by_reference)
-                for receiver in listeners.receivers:
-                    receiver.enqueue(sample, False)
+        is_direct = listeners is not None and listeners.is_direct and bus.in_own_thread()
+        receivers = listeners.receivers if listeners is not None and is_direct else ()
+        # What stays as it is, and nobody is given, need not be settled.
+        if receivers or (bus.taps and not frozen):
+            sample.settle(frozen)
+        for tap in bus.taps:
+            tap(sample)
+        if is_direct:
+            for receiver in receivers:
+                receiver.enqueue(sample, False)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         elif bus.taps or self.has_subscribers:
             self._zenoh.put(sample.payload, attachment=pack_attachment(*sample.source))
