@@ -43,6 +43,7 @@ class Observer:
         self._start = world.body_poses()
         self._roots = [name.partition("/")[0] for name in world.body_names]
         self._still = np.ones(len(self._roots), dtype=bool)
+        self._still_poses = b""
         self._moved: frozenset[str] = frozenset()
         self._fingers = {
             f"{stack.name}/{link}": stack.name
@@ -101,6 +102,10 @@ class Observer:
 
     def _note_moved(self) -> frozenset[str]:
         xyz, quat_wxyz = self._world.body_poses()
+        poses = xyz[self._still].tobytes() + quat_wxyz[self._still].tobytes()
+        if poses == self._still_poses:
+            return self._moved
+        self._still_poses = poses
         xyz -= self._start[0]
         came = np.einsum("ij,ij->i", xyz, xyz) > _MOVED**2
         turned = np.abs(np.einsum("ij,ij->i", quat_wxyz, self._start[1])) < _COS_HALF_TURNED

@@ -44,10 +44,15 @@ class Payload:
         To be called at every control tick.
         """
         near: dict[str, list[str]] = {}
-        for contact in self._world.contacts():
-            if contact.body2 in self._weights:
-                near.setdefault(contact.body1.partition("/")[0], []).append(contact.body2)
         stood_at, self._stood_at = self._stood_at, {}
+        for contact in self._world.contacts():
+            good = contact.body2
+            if good in self._weights:
+                robot = contact.body1.partition("/")[0]
+                # What nothing but the robot touches, as in the air, hits nothing.
+                others = [it for it in self._world.neighbours(good) if not it.startswith(f"{robot}/")]
+                if others or good in stood_at:
+                    near.setdefault(robot, []).append(good)
         return [
             ContactObservation(robot=robot, body=good, other=other, force_N=force, carried=True)
             for robot in sorted(near)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 Vector = tuple[float, float, float]
 
@@ -81,19 +80,22 @@ class ContactReader:
 
     def touches(self, data: mujoco.MjData, body: str) -> list[Touch]:
         """Return what touches a body, point by point, whatever it is."""
-        if not self._touching:
+        contacts = self._contacts_with(data, body)
+        if not contacts:
             return []
-        if body not in self._of_body:
-            self._of_body[body] = list(self._contacts_of(body, data.contact.geom))
         forces, normals = self._normal_forces(data), data.contact.frame[:, :3].tolist()
         touches = []
-        for index, is_first, other in self._of_body[body]:
+        for index, is_first, other in contacts:
             size = forces[index]
             if size is not None:
                 x, y, z = normals[index]
                 force = -size if is_first else size  # normals point from the first geom to the second
                 touches.append(Touch(other, (force * x, force * y, force * z)))
         return touches
+
+    def neighbours(self, data: mujoco.MjData, body: str) -> list[str]:
+        """Return the names of what touches a body, or is about to, as often as there are points."""
+        return [other for _, _, other in self._contacts_with(data, body)]
 
     def look(self, data: mujoco.MjData) -> None:
         """Take in the contacts of another physics step: which matter, if other geoms touch than before."""
@@ -113,11 +115,15 @@ class ContactReader:
             bodies, names = (self._owners[a], self._owners[b]), (self._names[a], self._names[b])
             self._pairs.append((index, bodies, names))
 
-    def _contacts_of(self, body: str, geoms: NDArray[np.int32]) -> Iterator[tuple[int, bool, str]]:
-        for index, pair in enumerate(geoms.tolist()):
-            first, second = (self._owners[geom] for geom in pair)
-            if (first == body) != (second == body):
-                yield index, first == body, second if first == body else first
+    def _contacts_with(self, data: mujoco.MjData, body: str) -> list[tuple[int, bool, str]]:
+        found = self._of_body.get(body)
+        if found is None:
+            found = self._of_body[body] = []
+            for index, pair in enumerate(data.contact.geom.tolist()):
+                first, second = (self._owners[geom] for geom in pair)
+                if (first == body) != (second == body):
+                    found.append((index, first == body, second if first == body else first))
+        return found
 
     def _normal_forces(self, data: mujoco.MjData) -> list[float | None]:
         if self._forces is not None:

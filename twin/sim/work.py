@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from twin.geometry import Array
-
-_MOST = 128
-"""States that are noted before they are added up."""
+_MOST = 256
+"""Arrays that are noted before they are added up."""
 
 
 class WorkMeter:
@@ -30,41 +28,35 @@ class WorkMeter:
         self._dofs = model.jnt_dofadr[joints]
         self._of = {robot: np.array([owner == robot for owner in owners], dtype=bool) for robot in robots}
         self._work = np.zeros(len(joints))
-        # The state before physics steps, then that after each, as bytes: nothing copies an array for less.
-        self._forces: list[bytes] = []
-        self._velocities: list[bytes] = []
-        self._noted: list[tuple[int, int]] = []
-        """Of the calls: where each began, and its last state."""
+        # Force and velocity before physics steps, then after each: as bytes an array is copied for least.
+        self._noted: list[bytes] = []
+        self._steps, self._arrays = 0, 2
+        """Of each call whose states are noted."""
 
     def begin(self, steps: int) -> None:
         """Note the state before so many physics steps."""
-        noted = len(self._forces)
-        if noted + steps >= _MOST:
+        noted = len(self._noted)
+        if steps != self._steps or noted >= _MOST or noted % self._arrays:
             self._add_up()
-            noted = 0
-        self._noted.append((noted, noted + steps))
+            self._steps, self._arrays = steps, 2 * (steps + 1)
         self.note()
 
     def note(self) -> None:
         """Note the state after a physics step."""
-        self._forces.append(self._force.tobytes())
-        self._velocities.append(self._velocity.tobytes())
+        self._noted += (self._force.tobytes(), self._velocity.tobytes())
 
     def _add_up(self) -> None:
         """Add up what was noted; that of several calls together costs little more than that of one."""
-        if not self._noted:
-            return
-        forces, velocities = self._of_drives(self._forces), self._of_drives(self._velocities)
-        powers = forces[1:] * (velocities[:-1] + velocities[1:])
+        whole = len(self._noted) - len(self._noted) % self._arrays  # without a call that was interrupted
+        states = np.frombuffer(b"".join(self._noted[:whole]))
+        states = states.reshape(whole // self._arrays, self._steps + 1, 2, len(self._force))
+        driven = states[..., self._dofs]  # shape (calls, states, 2, joints)
+        velocities = driven[:, :, 1]
+        powers = driven[:, 1:, 0] * (velocities[:, :-1] + velocities[:, 1:])
         np.maximum(powers, 0.0, out=powers)
-        for first, last in self._noted:
-            self._work += self._half_step * np.add.reduce(powers[first:last])
-        for noted in (self._forces, self._velocities, self._noted):
-            noted.clear()
-
-    def _of_drives(self, noted: list[bytes]) -> Array:
-        """Return of every state what belongs to the joints that are driven, shape (states, joints)."""
-        return np.frombuffer(b"".join(noted)).reshape(len(noted), -1)[:, self._dofs]
+        for work in self._half_step * np.add.reduce(powers, axis=1):
+            self._work += work
+        self._noted.clear()
 
     def work(self, robot: str) -> float:
         """Return the work of a robot's actuators since the start [J]."""

@@ -170,6 +170,10 @@ class World:
         """Return what touches goods or a link, the floor too, point by point, as of the last physics step."""
         return self._reader().touches(self.data, body)
 
+    def neighbours(self, body: str) -> list[str]:
+        """Return the names of what `touches` would tell of, or of more; it costs less."""
+        return self._reader().neighbours(self.data, body)
+
     def _reader(self) -> ContactReader:
         """Return who knows the contacts of the last physics step."""
         if self._contact_step != self.step_count:

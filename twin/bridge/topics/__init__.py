@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import zenoh
@@ -118,14 +119,15 @@ class Publisher(Endpoint, Generic[M]):
         bus, listeners = self._bus, self._listeners
         frozen = frozen and self._by_reference
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
-        is_direct = listeners is not None and listeners.is_direct and bus.in_own_thread()
-        receivers = listeners.receivers if listeners is not None and is_direct else ()
+        receivers = None
+        if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
+            receivers = listeners.receivers
         # What stays as it is, and nobody is given, need not be settled.
         if receivers or (bus.taps and not frozen):
             sample.settle(frozen)
         for tap in bus.taps:
             tap(sample)
-        if is_direct:
+        if receivers is not None:
             for receiver in receivers:
                 receiver.enqueue(sample, False)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.

@@ -8,10 +8,10 @@ from twin.bridge.wire.external import Receiver
 class Listeners:
     """Who hears one key."""
 
-    __slots__ = ("_all", "receivers", "through_zenoh")
+    __slots__ = ("every", "receivers", "through_zenoh")
 
     def __init__(self, every: InProcess) -> None:
-        self._all = every
+        self.every = every
         self.receivers: list[Receiver] = []
         """Those who can be given a message directly; Zenoh reaches them too."""
         self.through_zenoh = 0
@@ -20,7 +20,7 @@ class Listeners:
     @property
     def is_direct(self) -> bool:
         """Whether the receivers are all who hear the key."""
-        return not self.through_zenoh and self._all.is_private
+        return not self.through_zenoh and self.every.is_private
 
 
 class InProcess:
