@@ -149,7 +149,7 @@ def build(
             for robot in scenario.robots
         }
         mission = build_missions(scenario.tasks, stacks, arena)
-        bus.node_options = None
+        bus.node_options, bus.group = None, ""
         for place in outside.nodes:
             create_nodes(bus, place)
         warn_of_unpublished_scans(bus)

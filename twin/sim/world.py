@@ -186,6 +186,10 @@ class World:
         gravity = float(np.linalg.norm(self.model.opt.gravity))
         return float(self.model.body_subtreemass[self._index[body]]) * gravity
 
+    def use_threads(self, count: int) -> None:
+        """Let so many threads share each step with this one: same results, sooner where robots are apart."""
+        mujoco.mju_threadpool(self.data, count)
+
     def measure_work(self) -> None:
         """Add up the work of actuators from now on; it costs a little of each step."""
         self._work_meter = WorkMeter(self.model, self.data, tuple(self.robots))

@@ -122,6 +122,7 @@ def _build(mission: Task, stacks: Mapping[str, RobotStack], arena: Arena | None)
         seed=robot.context.seed,
         control_period_ns=robot.context.control_period_ns,
     )
+    context.bus.group = context.namespace
     plugin = MISSIONS.find(mission.type)
     if not isinstance(mission, UserMission):
         shipped: MissionNode = plugin.create(context, mission)
