@@ -30,6 +30,7 @@ from twin.geometry import Pose2
 from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
+from twin.plugins.execution import told
 from twin.runtime.stacks.missions import Missions
 from twin.runtime.threads import end_threads
 
@@ -87,6 +88,8 @@ class Workers:
         leaving = [s for s in run.parts.stacks.values() if _can_leave(s, missions.get(s.name))]
         shares = [leaving[i::count] for i in range(min(count, len(leaving)))]
         self.state = _State(run.world)
+        self.pipes: list[Connection] = []
+        """The run's ends, which no worker may keep open."""
         end_threads()
         self._workers = [_Worker(self, i, share) for i, share in enumerate(shares)]
         self._by_peer = {id(worker.peer): worker for worker in self._workers}
@@ -100,6 +103,11 @@ class Workers:
             stack.robot_pose, stack.navigator = told, cast(Any, stack.navigator and told)
         if shares:
             run.world.use_threads(len(shares))
+
+    @property
+    def pids(self) -> list[int]:
+        """Their process ids."""
+        return [worker.pid for worker in self._workers]
 
     def spin(self) -> None:
         """Run all nodes once, here and in the workers.
@@ -120,8 +128,10 @@ class Workers:
 
     def close(self) -> None:
         """End the workers. Harmless when repeated."""
+        for pipe in self.pipes:
+            pipe.close()  # which they notice
         for worker in self._workers:
-            worker.close()
+            worker.wait()
         self._crew.close()
 
     def _exchange(
@@ -153,14 +163,15 @@ class _Worker:
         self._world = workers.run.world
         self._name = f"worker {index} ({', '.join(stack.name for stack in stacks)})"
         self._pipe, theirs = Pipe()
+        workers.pipes.append(self._pipe)
         sys.stdout.flush()
         sys.stderr.flush()
         with warnings.catch_warnings():
             # From Python 3.12 on: of threads, such as NumPy's, that the worker does without.
             warnings.simplefilter("ignore", DeprecationWarning)
-            self._pid = os.fork()
-        if not self._pid:
-            _serve(workers.run, theirs, self._pipe, workers.state, stacks, index)
+            self.pid = os.fork()
+        if not self.pid:
+            _serve(workers.run, theirs, workers.pipes, workers.state, stacks, index)
         theirs.close()
 
     def send(self, what: Any) -> None:
@@ -184,19 +195,18 @@ class _Worker:
             raise answer
         return answer
 
-    def close(self) -> None:
-        """End it. Harmless when repeated."""
-        self._pipe.close()  # which it notices
+    def wait(self) -> None:
+        """Wait for its end, not for ever."""
         end = time.monotonic() + _LEAVE_S
-        while self._pid and not os.waitpid(self._pid, os.WNOHANG)[0]:
+        while self.pid and not os.waitpid(self.pid, os.WNOHANG)[0]:
             if time.monotonic() > end:
-                os.kill(self._pid, signal.SIGKILL)
+                os.kill(self.pid, signal.SIGKILL)
             time.sleep(0.001)
-        self._pid = 0
+        self.pid = 0
 
     def _ended(self) -> SimulationError:
-        _, status = os.waitpid(self._pid, 0)
-        self._pid = 0
+        _, status = os.waitpid(self.pid, 0)
+        self.pid = 0
         code = os.waitstatus_to_exitcode(status)
         how = f"with exit code {code}" if code >= 0 else f"by {signal.Signals(-code).name}"
         seconds = self._world.time_ns * 1e-9
@@ -223,7 +233,7 @@ class _State:
 
 
 class _Told(RobotPose):
-    """The pose of a robot, and what its navigator did, whose nodes are in a worker, as of the last observation."""
+    """What a robot whose nodes are in a worker believed, and its navigator had done, when last observed."""
 
     def __init__(self, known: RobotPose, beliefs: dict[str, _Belief], name: str) -> None:
         super().__init__(known.buffer, known.frames)
@@ -276,16 +286,22 @@ def _can_leave(stack: RobotStack, mission: MissionNode | None) -> bool:
     )
 
 
-# -- in the worker ---------------------------------------------------------------------------------------------
+# -- in the worker -------------------------------------------------------------------------------------------
 
 
 def _serve(
-    run: Run, pipe: Connection, other: Connection, state: _State, stacks: Sequence[RobotStack], index: int
+    run: Run,
+    pipe: Connection,
+    others: Sequence[Connection],
+    state: _State,
+    stacks: Sequence[RobotStack],
+    index: int,
 ) -> None:
     """Be a worker until the run is over; never returns."""
     code = 1
     try:
-        other.close()
+        for pipe_of_other in others:
+            pipe_of_other.close()
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run takes it, and ends us
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         gc.freeze()
@@ -295,7 +311,7 @@ def _serve(
             try:
                 answer: Any = worker.observe() if asked is None else worker.tick(*asked)
             except Exception as error:
-                answer = _portable(error)
+                answer = _portable(told(error))
             pipe.send_bytes(pickle.dumps(answer, pickle.HIGHEST_PROTOCOL))
     except (EOFError, OSError):
         code = 0
@@ -353,7 +369,7 @@ def _belief(stack: RobotStack) -> _Belief:
     return _Belief(pose.in_map(), pose.in_odom(), *goals)
 
 
-def _portable(error: Exception) -> Exception:
+def _portable(error: BaseException) -> BaseException:
     """Return an error as it can be told to another process."""
     try:
         again = pickle.loads(pickle.dumps(error))

@@ -18,7 +18,7 @@ from twin.bridge.qos import QoS
 from twin.bridge.services import Service
 from twin.bridge.topics import Endpoint, Publisher, Sample, Subscription
 from twin.bridge.topics.in_process import Listeners, Member
-from twin.bridge.workers.part import Act
+from twin.bridge.workers.part import Act, refuse_late_service
 from twin.bridge.workers.questions import Passed, Questions
 
 _Do = Callable[..., None]
@@ -180,6 +180,7 @@ class Crew:
 
     def _on_endpoint(self, endpoint: Endpoint) -> None:
         if isinstance(endpoint, Service):
+            refuse_late_service(self._bus, endpoint)
             self._services[endpoint.gid] = endpoint
 
 

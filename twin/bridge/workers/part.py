@@ -12,12 +12,22 @@ from twin.bridge.topics import Endpoint, Publisher, ReceivedSample, Sample, Subs
 from twin.bridge.topics.in_process import Member
 from twin.bridge.wire.keys import Attachment
 from twin.bridge.workers.questions import Passed, Questions
+from twin.errors import BridgeError
 
 _IDS = 1_000_000
 """New nodes and endpoints of a worker have numbers from here on, and the next worker's from twice that."""
 
 Act = tuple[Any, ...]
 """Number of the node that ran; name of a method of `Crew`; what it takes."""
+
+
+def refuse_late_service(bus: Bus, endpoint: Endpoint) -> None:
+    """Raise a BridgeError if somebody wants a service, such as of parameters, of a node that is elsewhere."""
+    if bus.is_away(endpoint.group):
+        raise BridgeError(
+            f"the first client of {endpoint.name} came while the run went on; with --workers, clients of "
+            "another robot's nodes are to be made at the start"
+        )
 
 
 class Part:
@@ -107,6 +117,7 @@ class Part:
             self._publishers[endpoint.gid] = endpoint
             self._act("publisher", (endpoint.gid, node, endpoint.msgtype, endpoint.name, endpoint.qos))
         elif isinstance(endpoint, Subscription | Service):
+            refuse_late_service(self._bus, endpoint)
             self._receivers[endpoint.gid] = endpoint
             latched = endpoint.qos.depth if endpoint.qos.durability == "transient_local" else 0
             self._act("receiver", (endpoint.gid, endpoint.name, endpoint.key, endpoint.group, latched))

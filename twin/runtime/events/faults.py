@@ -42,7 +42,7 @@ class FaultSchedule:
         self._logger = bus.create_node("faults").get_logger() if events else None
 
     def update(self, *, tell: bool = True) -> None:
-        """Let happen what is due at the world's present time, and tell it; takes effect with the next step."""
+        """Let happen what is due at the world's time, and tell it; takes effect with the next step."""
         while self._events and self._events[0].time_ns <= self._world.time_ns:
             event = self._events.pop(0)
             event.happen()
