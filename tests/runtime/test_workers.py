@@ -18,7 +18,7 @@ from twin.scenario.schema import Scenario
 MakeScenario = Callable[[str], Scenario]
 TRIO = """
 name: trio
-duration: 2.4 s
+duration: 1.6 s
 seed: 3
 robots:
   - {model: diff_bot, name: a, pose: {y: 2}, localisation: {type: odometry}}
@@ -31,8 +31,8 @@ faults:
   - odometry_jump: {robot: a, at: 0.5 s, distance: 0.3 m}
 checks:
   - localisation_error: {robot: a, max: 50 cm}
-  - driven_distance: {robot: b, min: 0.1}
-  - driven_distance: {robot: c, min: 0.1}
+  - driven_distance: {robot: b, min: 0.05}
+  - driven_distance: {robot: c, min: 0.05}
 """
 CROSSING = '''
 """Node groups that do talk to each other."""
@@ -61,7 +61,7 @@ def boss(bus):
         if counts["odom"] == 10:
             future = asked.call_async(new(GetParameters.Request, names=["use_sim_time"]))
             future.add_done_callback(lambda f: f.error or heard.publish(String(repr(f.result.values[0]))))
-        if counts["odom"] == 100:
+        if counts["odom"] == 30:
             limit = duration(9_000_000_000)
             back.send_goal(new(BackUp.Goal, target=Point(0.1, 0.0, 0.0), speed=0.1, time_allowance=limit))
         heard.publish(String(f"{message.header.stamp.nanosec} {message.pose.pose.position.x!r}"))
@@ -119,7 +119,7 @@ def boss(tmp_path: Path) -> Outside:
 
 
 def test_any_number_of_workers_gives_the_same_run(trio: Scenario, tmp_path: Path) -> None:
-    alone, *others = (run(trio, record=False, outside=boss(tmp_path), workers=n) for n in range(4))
+    alone, *others = (run(trio, record=False, outside=boss(tmp_path), workers=n) for n in (0, 1, 3))
     assert alone.verdict == "pass", [check.reason for check in alone.checks]
     for verdict in others:
         assert verdict.checks == alone.checks

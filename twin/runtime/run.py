@@ -43,7 +43,7 @@ class Run:
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
         self._sink = sink
-        self._schedule = SensorSchedule(
+        self.schedule = SensorSchedule(
             [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
         )
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
@@ -113,7 +113,7 @@ class Run:
 
     def step(self) -> None:
         """4. Physics; a sensor due on the way samples and publishes there."""
-        world, schedule = self.world, self._schedule
+        world, schedule = self.world, self.schedule
         end = world.step_count + self._substeps
         while schedule.next_step < end:
             world.step(schedule.next_step - world.step_count)
@@ -124,7 +124,7 @@ class Run:
     def sense(self) -> None:
         """5. Sensors due publish, stamped with the new time."""
         self.parts.clock.now_ns = self.world.time_ns
-        self._schedule.fire(self.world.step_count)
+        self.schedule.fire(self.world.step_count)
 
     def clock(self) -> None:
         """6. `/clock`."""

@@ -2,8 +2,8 @@
 
 Each is a fork of the run as it was built, so it has the nodes, maps and the model already. In every tick in
 which its robots have something to do it is told the state of the physics and what others told its nodes, and
-answers with what these did and want the actuators to do. Physics, sensors, checks and recording stay in the
-run's own process. A run gives the same digest with any number of workers.
+answers with what these did and want the actuators to do. It samples their lidars, too. Physics, all other
+sensors, checks and recording stay in the run's own process. Any number of workers gives the same digest.
 """
 
 from __future__ import annotations
@@ -26,15 +26,17 @@ import numpy as np
 from twin.bridge.workers.crew import Crew, Peer
 from twin.bridge.workers.part import Act, Part
 from twin.errors import ScenarioError, SimulationError, TwinError
-from twin.geometry import Pose2
+from twin.geometry import Array, Pose2
 from twin.nodes.missions.mission_node import MissionNode
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.r2d2_state_publisher import R2D2StatePublisherNode
 from twin.plugins.execution import told
 from twin.runtime.stacks.missions import Missions
 from twin.runtime.threads import end_threads
+from twin.sensors.lidar import Lidar, LidarReading
 
 if TYPE_CHECKING:
+    from twin.nodes.sensor_publishers import SensorPublisher
     from twin.runtime.run import Run
     from twin.runtime.stacks.robot import RobotStack
     from twin.sim.world import World
@@ -96,13 +98,20 @@ class Workers:
         self._crew = Crew(run.bus, [worker.peer for worker in self._workers])
         self._missions = missions
         self._beliefs: dict[str, _Belief] = {}
+        self._scanned: dict[int, tuple[_Worker, tuple[str, int]]] = {}
+        """By sensor: who samples it, and what it is called there."""
         self.cpu_s = 0.0
         """CPU time of the workers at the last observation [s]."""
-        for stack in (stack for share in shares for stack in share):
+        for worker, stack in ((w, s) for w, share in zip(self._workers, shares, strict=True) for s in share):
+            for number, sensor in enumerate(stack.sensors):
+                if type(sensor.sensor) is Lidar:
+                    sensor.sensor = _Scanned(sensor.sensor)
+                    self._scanned[id(sensor)] = worker, (stack.name, number)
             told = _Told(stack.robot_pose, self._beliefs, stack.name)
             stack.robot_pose, stack.navigator = told, cast(Any, stack.navigator and told)
         if shares:
             run.world.use_threads(len(shares))
+            run.schedule.prepare = self._scan
 
     @property
     def pids(self) -> list[int]:
@@ -120,7 +129,7 @@ class Workers:
     def observe(self) -> None:
         """Ask what the robots of the workers believe; `robot_pose` of their stacks tells it."""
         for worker in self._workers:
-            worker.send(None)
+            worker.send(_Here.observe)
         for worker in self._workers:
             beliefs, worker.cpu_s = worker.receive()
             self._beliefs |= beliefs
@@ -134,6 +143,20 @@ class Workers:
             worker.wait()
         self._crew.close()
 
+    def _scan(self, sensors: Sequence[SensorPublisher], time_ns: int) -> None:
+        """Let workers sample those of their lidars that are about to fire."""
+        asked: dict[_Worker, list[tuple[tuple[str, int], _Scanned]]] = {}
+        for sensor in sensors:
+            if (found := self._scanned.get(id(sensor))) is not None and isinstance(sensor.sensor, _Scanned):
+                asked.setdefault(found[0], []).append((found[1], sensor.sensor))
+        if asked:
+            self.state.tell(self.run.world)
+        for worker, lidars in asked.items():
+            worker.send(_Here.scan, self.run.world.step_count, [name for name, _ in lidars])
+        for worker, lidars in asked.items():
+            for (_, lidar), reading in zip(lidars, worker.receive(), strict=True):
+                lidar.reading = reading
+
     def _exchange(
         self, busy: Sequence[Peer], meanwhile: Callable[[], None]
     ) -> Iterator[tuple[Peer, Sequence[Act]]]:
@@ -141,7 +164,7 @@ class Workers:
         if busy:
             self.state.tell(world)
         for peer in busy:
-            self._by_peer[id(peer)].send((world.step_count, peer.take()))
+            self._by_peer[id(peer)].send(_Here.tick, world.step_count, peer.take())
         meanwhile()
         for peer in busy:
             done: _Done = self._by_peer[id(peer)].receive()
@@ -174,10 +197,10 @@ class _Worker:
             _serve(workers.run, theirs, workers.pipes, workers.state, stacks, index)
         theirs.close()
 
-    def send(self, what: Any) -> None:
-        """Say something; the answer comes by `receive`."""
+    def send(self, what: Callable[..., Any], *given: Any) -> None:
+        """Let it do something; the answer comes by `receive`."""
         try:
-            self._pipe.send_bytes(pickle.dumps(what, pickle.HIGHEST_PROTOCOL))
+            self._pipe.send_bytes(pickle.dumps((what.__name__, given), pickle.HIGHEST_PROTOCOL))
         except OSError:
             raise self._ended() from None
 
@@ -214,22 +237,40 @@ class _Worker:
 
 
 class _State:
-    """What nodes read of the physics, in memory that run and workers share."""
+    """What nodes and lidars read of the physics, in memory that run and workers share."""
 
     def __init__(self, world: World) -> None:
-        data = world.data
-        self._sizes = [len(data.qpos), len(data.qvel), len(data.qfrc_actuator)]
-        memory = mmap.mmap(-1, 8 * max(1, sum(self._sizes)))
-        self._numbers = np.frombuffer(memory, count=sum(self._sizes))
+        self._ends = np.cumsum([len(part) for part in self._parts(world)])
+        memory = mmap.mmap(-1, 8 * int(self._ends[-1]))
+        self._numbers = np.frombuffer(memory, count=int(self._ends[-1]))
 
     def tell(self, world: World) -> None:
         """Write the state of the run's world."""
-        np.concatenate((world.data.qpos, world.data.qvel, world.data.qfrc_actuator), out=self._numbers)
+        np.concatenate(self._parts(world), out=self._numbers)
 
-    def take(self, world: World) -> None:
-        """Read it into a worker's."""
-        data, ends = world.data, np.cumsum(self._sizes)
-        data.qpos[:], data.qvel[:], data.qfrc_actuator[:] = np.split(self._numbers, ends[:-1])
+    def take(self, world: World, step_count: int) -> None:
+        """Read it into a worker's, after so many physics steps."""
+        qpos, qvel, effort, *placed = np.split(self._numbers, self._ends[:-1])
+        world.go_to(step_count, qpos, qvel, effort, np.concatenate(placed))
+
+    @staticmethod
+    def _parts(world: World) -> list[Array]:
+        data = world.data
+        return [data.qpos, data.qvel, data.qfrc_actuator, data.mocap_pos.ravel(), data.mocap_quat.ravel()]
+
+
+class _Scanned:
+    """Stands for a lidar that a worker samples."""
+
+    def __init__(self, lidar: Lidar) -> None:
+        self.lidar, self.spec = lidar, lidar.spec
+        self.reading: LidarReading | None = None
+
+    def sample(self, time_ns: int) -> LidarReading:
+        """Return what the worker has seen."""
+        assert self.reading is not None
+        assert self.reading.time_ns == time_ns
+        return self.reading
 
 
 class _Told(RobotPose):
@@ -307,9 +348,9 @@ def _serve(
         gc.freeze()
         worker = _Here(run, state, stacks, index)
         while True:
-            asked = pickle.loads(pipe.recv_bytes())
+            what, given = pickle.loads(pipe.recv_bytes())
             try:
-                answer: Any = worker.observe() if asked is None else worker.tick(*asked)
+                answer: Any = getattr(worker, what)(*given)
             except Exception as error:
                 answer = _portable(told(error))
             pipe.send_bytes(pickle.dumps(answer, pickle.HIGHEST_PROTOCOL))
@@ -330,6 +371,11 @@ class _Here:
         self._part = Part(run.bus, [stack.context.namespace for stack in stacks], index)
         names = {stack.name for stack in stacks}
         self._missions = {name: node for name, node in _missions(run).items() if name in names}
+        self._lidars: dict[tuple[str, int], Any] = {
+            (stack.name, number): sensor.sensor
+            for stack in stacks
+            for number, sensor in enumerate(stack.sensors)
+        }
         self._told: dict[tuple[str, str], Any] = {}
         self._substeps = run.parts.control_period_ns // run.world.timestep_ns
 
@@ -338,9 +384,7 @@ class _Here:
         run, world = self._run, self._run.world
         world.step_count = step_count - self._substeps
         run.faults.update(tell=False)
-        world.step_count = step_count
-        self._state.take(world)
-        world.data.time = step_count * world.model.opt.timestep
+        self._state.take(world, step_count)
         run.parts.clock.now_ns = world.time_ns
         self._part.receive(entries)
         run.bus.spin()
@@ -352,6 +396,13 @@ class _Here:
             self._changed("orders", hardware),
             self._changed("missions", missions),
         )
+
+    def scan(self, step_count: int, sensors: Sequence[tuple[str, int]]) -> list[LidarReading]:
+        """Return what lidars see now."""
+        world = self._run.world
+        self._state.take(world, step_count)
+        world.refresh_poses()
+        return [self._lidars[sensor].sample(world.time_ns) for sensor in sensors]
 
     def observe(self) -> tuple[dict[str, _Belief], float]:
         """Return what the robots believe, and the CPU time of this process [s]."""
