@@ -264,9 +264,13 @@ class Node(NodeParameters, NodeGraph):
         for execution in tuple(self._executions):
             if execution.step():
                 self.remove_execution(execution)
-        due = [timer.due_ns for timer in self._timers]
-        due += [execution.due_ns for execution in self._executions]
-        self.due_ns = min(due, default=NEVER_NS)
+        parts: tuple[Timer | Execution, ...] = (*self._timers, *self._executions)
+        first_ns = NEVER_NS
+        for part in parts:
+            due_ns = part.due_ns
+            if due_ns < first_ns:
+                first_ns = due_ns
+        self.due_ns = first_ns
 
     def wake(self) -> None:
         """Spin the next time: what is due has changed."""

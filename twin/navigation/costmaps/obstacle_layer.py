@@ -39,7 +39,7 @@ class ObstacleLayer(SensedLayer):
         ).clipped(self.cells.shape)
         before = self.cells[around.slices].copy()
         trace_scan(self.cells, points, sensor, marking, clearing, frame)
-        return differing(before, self.cells[around.slices], around)
+        return Window(*differing(before, self.cells, around))
 
     def mark(self, points: Array, frame: Triple) -> Window:
         """Mark the cells of points, shape (n, 2) [m], without a ray to them; return where that may matter."""
@@ -59,17 +59,21 @@ class ObstacleLayer(SensedLayer):
         around = Window(*low.tolist(), *(high + 1).tolist()).clipped(self.cells.shape)
         if around.empty:
             return NOTHING
-        before = self.cells[around.slices].copy()
-        _fill_convex(self.cells, np.ascontiguousarray(cells), around)
-        return differing(before, self.cells[around.slices], around)
+        return Window(*_fill_convex(self.cells, np.ascontiguousarray(cells), around))
 
 
 @jit
-def _fill_convex(cells: Cells, corners: Array, window: Window) -> None:
-    """Free the cells of a window whose centres lie in a convex polygon, given in cells, of either sense."""
+def _fill_convex(cells: Cells, corners: Array, window: Window) -> tuple[int, int, int, int]:
+    """Free the cells of a window whose centres lie in a convex polygon, given in cells, of either sense.
+
+    Return the smallest window of those that were not free.
+    """
     n = corners.shape[0]
+    x0, y0, x1, y1 = window.x1, window.y1, 0, 0
     for y in range(window.y0, window.y1):
         for x in range(window.x0, window.x1):
+            if cells[y, x] == 0:
+                continue
             left, right = False, False
             for k in range(n):
                 m = (k + 1) % n
@@ -80,3 +84,5 @@ def _fill_convex(cells: Cells, corners: Array, window: Window) -> None:
                 right = right or side < 0.0
             if not (left and right):
                 cells[y, x] = 0
+                x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x + 1), max(y1, y + 1)
+    return (x0, y0, x1, y1) if y1 > y0 else (0, 0, 0, 0)
