@@ -51,8 +51,8 @@ class JointReading(NamedTuple):
 
 
 def _reading(position: Array, velocity: Array, effort: Array) -> JointReading:
-    # who asks twice at one time is given the same
-    position.flags.writeable = velocity.flags.writeable = effort.flags.writeable = False
+    for values in (position, velocity, effort):
+        values.setflags(write=False)  # who asks twice at one time is given the same
     return JointReading(position, velocity, effort)
 
 

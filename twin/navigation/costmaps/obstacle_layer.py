@@ -11,7 +11,7 @@ from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE
 from twin.navigation.costmaps.kernels import Cells, Triple, trace_scan
 from twin.navigation.costmaps.layer import SensedLayer
-from twin.navigation.costmaps.window import NOTHING, Window, differing, everything
+from twin.navigation.costmaps.window import Window, differing, everything
 
 
 class ObstacleLayer(SensedLayer):
@@ -54,24 +54,28 @@ class ObstacleLayer(SensedLayer):
 
         Nav2's footprint clearing: where the robot stands nothing else is.
         """
-        cells = (corners - frame[:2]) / frame[2]
-        low, high = np.floor(cells.min(axis=0)).astype(int), np.ceil(cells.max(axis=0)).astype(int)
-        around = Window(*low.tolist(), *(high + 1).tolist()).clipped(self.cells.shape)
-        if around.empty:
-            return NOTHING
-        return Window(*_fill_convex(self.cells, np.ascontiguousarray(cells), around))
+        return Window(*_free_convex(self.cells, corners, frame))
 
 
 @jit
-def _fill_convex(cells: Cells, corners: Array, window: Window) -> tuple[int, int, int, int]:
-    """Free the cells of a window whose centres lie in a convex polygon, given in cells, of either sense.
+def _free_convex(cells: Cells, polygon: Array, frame: Triple) -> tuple[int, int, int, int]:
+    """Free the cells whose centres lie in a convex polygon, shape (n, 2), of either sense.
 
     Return the smallest window of those that were not free.
     """
-    n = corners.shape[0]
-    x0, y0, x1, y1 = window.x1, window.y1, 0, 0
-    for y in range(window.y0, window.y1):
-        for x in range(window.x0, window.x1):
+    (height, width), n = cells.shape, polygon.shape[0]
+    corners = np.empty((n, 2))  # in cells
+    low_x = low_y = math.inf
+    high_x = high_y = -math.inf
+    for k in range(n):
+        corners[k, 0] = x = (polygon[k, 0] - frame[0]) / frame[2]
+        corners[k, 1] = y = (polygon[k, 1] - frame[1]) / frame[2]
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        low_y, high_y = min(low_y, y), max(high_y, y)
+    first, last = max(0, math.floor(low_x)), min(width, math.ceil(high_x) + 1)
+    x0, y0, x1, y1 = width, height, 0, 0
+    for y in range(max(0, math.floor(low_y)), min(height, math.ceil(high_y) + 1)):
+        for x in range(first, last):
             if cells[y, x] == 0:
                 continue
             left, right = False, False
