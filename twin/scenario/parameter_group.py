@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -17,6 +17,7 @@ from twin.parameters.declaration import Declaration, fields_of
 from twin.parameters.placed import overridden
 from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
+from twin.strict_yaml.later import later
 
 C = TypeVar("C")
 G = TypeVar("G", bound="ParameterGroup")
@@ -109,9 +110,9 @@ def _keyed(config: type) -> Iterator[Declaration]:
 
 def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | None:
     """Return the type of a key, and its default."""
-    if declaration.config is not None:
-        inner = group_of(declaration.config)
-        return (inner, inner.model_construct()) if inner.model_fields else None
+    if (config := declaration.config) is not None:
+        has_keys = any(_key(one) is not None for one in _keyed(config))
+        return (later(partial(group_of, config)), None) if has_keys else None
     domain = declaration.domain
     if domain is None:
         return None
