@@ -99,6 +99,12 @@ def group_of(config: type) -> type[ParameterGroup]:
     return keys_of(config)(type(name, (ParameterGroup,), body))
 
 
+@cache
+def key_names(config: type) -> tuple[str, ...]:
+    """Return the keys of a config's group, which is not made for that."""
+    return tuple(one.name for one in _keyed(config) if _key(one) is not None)
+
+
 def _keyed(config: type) -> Iterator[Declaration]:
     """Yield the fields of a config that scenarios have keys for, and those of configs without a section."""
     for declaration in fields_of(config).values():
@@ -111,8 +117,7 @@ def _keyed(config: type) -> Iterator[Declaration]:
 def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | None:
     """Return the type of a key, and its default."""
     if (config := declaration.config) is not None:
-        has_keys = any(_key(one) is not None for one in _keyed(config))
-        return (later(partial(group_of, config)), None) if has_keys else None
+        return (later(partial(group_of, config)), None) if key_names(config) else None
     domain = declaration.domain
     if domain is None:
         return None
