@@ -10,7 +10,7 @@ from pydantic import model_validator
 from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
 from twin.navigation.plugins import PLANNERS, SMOOTHERS, configs_of
 from twin.nodes.navigation.planning.config import PlannerServerConfig
-from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
+from twin.scenario.parameter_group import ParameterGroup, key_names, keys_of
 from twin.scenario.plugin_groups import PluginGroup, plugin_name
 
 
@@ -23,7 +23,7 @@ class PlannerServerParameters(ParameterGroup):
     circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
 
 
-_KEYS = {plugin: group_of(config).model_fields for plugin, config in configs_of(PLANNERS).items()}
+_KEYS = {plugin: key_names(config) for plugin, config in configs_of(PLANNERS).items()}
 
 
 @keys_of(*configs_of(PLANNERS).values())
