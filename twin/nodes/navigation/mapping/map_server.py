@@ -15,7 +15,7 @@ from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import GetMap, LoadMap
 from twin.errors import MapError
 from twin.geometry import Pose2
-from twin.navigation.maps.map_io import load_image
+from twin.navigation.maps.map_image import load_image
 from twin.navigation.maps.map_yaml import read_metadata
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
