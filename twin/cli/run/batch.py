@@ -5,7 +5,6 @@ Each run is in a process of its own: a crash or a leftover of one run cannot tou
 
 from __future__ import annotations
 
-import json
 import json as json_module
 import os
 import subprocess
@@ -39,8 +38,8 @@ def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
     if child.returncode == 130:
         raise KeyboardInterrupt
     try:
-        verdict: dict[str, Any] = json.loads(child.stdout)
-    except json.JSONDecodeError:
+        verdict: dict[str, Any] = json_module.loads(child.stdout)
+    except json_module.JSONDecodeError:
         from twin.scenario.verdict import Verdict
 
         out.mkdir(parents=True, exist_ok=True)
@@ -77,9 +76,6 @@ def run_batch(
 
     Exit code 0: all pass; 1: one fails; 2: one could not be run.
     """
-    from twin.cli.console import stderr, stdout
-    from twin.cli.run.folders import results_folder
-    from twin.cli.run.options import RunOptions
     from twin.cli.run.verdict_table import many_report
     from twin.files.writing import check_file, write_whole
 
@@ -100,7 +96,7 @@ def run_batch(
         sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")
     else:
         stdout().print(many_report(verdicts))
-    raise typer.Exit(max({"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]] for verdict in verdicts))
+    raise typer.Exit(max(map(_exit_code, verdicts)))
 
 
 def own_scenarios() -> Path:
@@ -143,13 +139,16 @@ def run_repeatedly(options: RunOptions) -> int:
             status.update(f"run {number} of {runs}")
             verdicts.append(run_in_child(options, parent / str(number)))
     digests = sorted({verdict["digest"] or "none" for verdict in verdicts})
-    codes = [{"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]] for verdict in verdicts]
     if options.json:
-        sys.stdout.write(json.dumps({"runs": verdicts, "digests": digests}, indent=2) + "\n")
+        sys.stdout.write(json_module.dumps({"runs": verdicts, "digests": digests}, indent=2) + "\n")
     else:
         _report(verdicts, digests)
     differ = options.expect_one_hash and (len(digests) > 1 or digests == ["none"])
-    return max(*codes, 1 if differ else 0)
+    return max(*map(_exit_code, verdicts), int(differ))
+
+
+def _exit_code(verdict: dict[str, Any]) -> int:
+    return {"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]]
 
 
 def _report(verdicts: list[dict[str, Any]], digests: list[str]) -> None:
