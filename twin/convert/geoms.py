@@ -17,7 +17,7 @@ from twin.convert.contact_roles import Roles
 from twin.convert.tyres import stiff, wheel_contact
 from twin.files.reading import read_bytes
 from twin.geometry import Array, Pose3
-from twin.models.checks.discs import disc_of
+from twin.models.checks.wheels import disc_of
 from twin.models.description import Link
 from twin.models.mesh.mesh_formats import TriangleMesh, write_msh, write_stl
 from twin.models.mesh.meshes import read_mesh

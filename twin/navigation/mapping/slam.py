@@ -18,7 +18,7 @@ from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.config import SlamConfig as SlamConfig
 from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
-from twin.navigation.mapping.mapped_scans import MappedScans
+from twin.navigation.mapping.mapped_scans import MappedScans, SavedGraph, pack, unpack
 from twin.navigation.mapping.matcher import Match
 from twin.navigation.mapping.registration import (
     START_COVARIANCE,
@@ -29,7 +29,6 @@ from twin.navigation.mapping.registration import (
 )
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
-from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
