@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
+from twin.savings import ALL, Savings
 
 _FLAT = 1e-12
 """Out of their plane, rays of unit length reach no farther than that."""
@@ -29,10 +30,10 @@ class RayBounds:
     every attitude. Collisions need the volumes as they are: there a larger one costs time.
     """
 
-    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8]) -> None:
+    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8], savings: Savings = ALL) -> None:
         """Bind to a model; `groups` of the shapes that rays see, shape (mjNGROUP,)."""
         seen = np.bincount(model.geom_bodyid, weights=_are_seen(model, groups), minlength=model.nbody)
-        self._unseen = np.flatnonzero(seen == 0)
+        self._unseen = np.flatnonzero((seen == 0) & savings.plane_of_rays)
         self._counts = model.body_geomnum
         self._all = self._counts[self._unseen]
         roots = model.body_bvhadr[model.body_bvhadr >= 0]
@@ -60,7 +61,12 @@ class BodiesInReach:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, directions: Array, groups: NDArray[np.uint8], reach: float
+        self,
+        model: mujoco.MjModel,
+        directions: Array,
+        groups: NDArray[np.uint8],
+        reach: float,
+        savings: Savings,
     ) -> None:
         """Bind to a model.
 
@@ -69,9 +75,12 @@ class BodiesInReach:
             directions: As of `FanSlice`.
             groups: Of the shapes that rays see, shape (mjNGROUP,).
             reach: Of the rays [m].
+            savings: What is not done over again.
         """
         self._normal = _normal(directions)
-        self._geoms = np.flatnonzero(_are_seen(model, groups) & (model.geom_bodyid > 0))
+        self._geoms = np.flatnonzero(
+            _are_seen(model, groups) & (model.geom_bodyid > 0) & savings.plane_of_rays
+        )
         is_plane = model.geom_type[self._geoms] == mujoco.mjtGeom.mjGEOM_PLANE
         self._radius = np.where(is_plane, math.inf, model.geom_rbound[self._geoms])
         self._reach = reach + self._radius
@@ -103,20 +112,27 @@ class FanSlice:
     It tests every ray against every shape; most of a scene lies above or below a lidar.
     """
 
-    def __init__(self, model: mujoco.MjModel, directions: Array, groups: NDArray[np.uint8]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        directions: Array,
+        groups: NDArray[np.uint8],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to a model.
 
         Args:
             model: The compiled world.
             directions: Unit vectors in the link's frame, shape (n, 3); where they fill no plane, all is seen.
             groups: Of the shapes that rays see, shape (mjNGROUP,).
+            savings: What is not done over again.
         """
         normal = _normal(directions)
         self._normal = np.zeros(3) if normal is None else normal
         """Of the plane, in the link's frame."""
         self._groups = model.geom_group
         bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-        sliced = normal is not None and not groups[_HIDDEN]
+        sliced = normal is not None and not groups[_HIDDEN] and savings.plane_of_rays
         self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & sliced)
         self._centre, self._half = _boxes(model, self._geoms)
         self._radius = float(np.linalg.norm(np.abs(self._centre) + self._half, axis=1).max(initial=0.0))
