@@ -35,6 +35,8 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
     "twin/runtime/pacing.py": {"perf_counter", "sleep"},  # how a paced run waits
     "twin/runtime/open_run.py": {"perf_counter", "process_time"},  # how long the run took
+    "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
+    "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
     "twin/bridge/graph.py": {"monotonic", "sleep"},  # waits for other processes to say who they are

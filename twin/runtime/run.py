@@ -18,7 +18,7 @@ from twin.scenario.schema import Scenario
 if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
-    from twin.runtime.workers import Workers
+    from twin.runtime.workers.workers import Workers
 
 _OBSERVED_TICKS = 5
 """Checks see one observation in so many control ticks; the contacts of the others are in it."""
@@ -76,7 +76,7 @@ class Run:
         Raises:
             ScenarioError: This run, or this system, cannot have any.
         """
-        from twin.runtime.workers import Workers
+        from twin.runtime.workers.workers import Workers
 
         self.workers = Workers(self, count)
         return self.workers
