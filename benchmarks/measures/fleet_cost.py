@@ -59,7 +59,10 @@ def picture(title: str, costs: dict[int, float]) -> str:
     """Return the cost of a robot over their number as SVG; `costs` in CPU seconds per simulated second."""
     left, wide, high = 60, 420, 190
     most, top = max(costs), 1.15 * max(cost / n for n, cost in costs.items())
-    points = [(left + wide * n / most, 34 + high * (1.0 - cost / n / top)) for n, cost in costs.items()]
+    points = [
+        (left + 10 + wide * math.log(n) / math.log(max(2, most)), 34 + high * (1.0 - cost / n / top))
+        for n, cost in costs.items()
+    ]
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     marks = [
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="#1f6f8b"/>'
@@ -75,7 +78,7 @@ def picture(title: str, costs: dict[int, float]) -> str:
 <path d="M{left} 34 V{34 + high} H{left + wide + 20}" fill="none" stroke="#888"/>
 <polyline points="{line}" fill="none" stroke="#1f6f8b" stroke-width="2"/>
 {body}
-<text x="{left + wide / 2}" y="{34 + high + 34}" text-anchor="middle">robots</text>
+<text x="{left + wide / 2}" y="{34 + high + 34}" text-anchor="middle">robots (logarithmic)</text>
 </svg>
 """
 
