@@ -13,6 +13,8 @@ class Savings:
     """Nodes run only when something has come, or is due; otherwise all of them in every spin."""
     services_in_process: bool = True
     """Requests and responses go through Zenoh only if another process may have a part in it."""
+    in_process: bool = True
+    """What nobody else can hear goes from inbox to inbox, without any Zenoh session; otherwise all by it."""
     by_reference: bool = True
     """Within a process a message that nobody changes any more is handed over as it is, not as bytes."""
 

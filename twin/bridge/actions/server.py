@@ -7,8 +7,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
-from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
-from twin.bridge.actions.states import GoalEvent, is_cancelable, transition
+from twin.bridge.actions.goal import Execute, GoalEvent, GoalHandle, is_cancelable, transition, uuid_msg
 from twin.bridge.msgs import GoalStatus, GoalStatusArray, ns, stamp
 from twin.bridge.node import tasks
 from twin.bridge.qos import LATCHED, as_qos

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from twin.bridge import names
-from twin.bridge.node.logger_levels import LEVELS
+from twin.bridge.node.logger import LEVELS
 from twin.bridge.parameters import files as parameter_files
 from twin.errors import BridgeError, nearest
 

@@ -93,7 +93,7 @@ def monitor(
     """Report delay and rate of every frame and broadcaster, or of a chain; the words are tf2_monitor's."""
     if (source_frame is None) != (target_frame is None):
         raise BridgeError("tf monitor takes two frames, or none for all")
-    from twin.bridge.tf.monitor import TransformStatistics, net_delay
+    from twin.bridge.tf.report import TransformStatistics, net_delay
 
     with joining.open() as process:
         clock, statistics = process.bus.clock, TransformStatistics()

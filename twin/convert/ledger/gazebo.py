@@ -11,8 +11,7 @@ from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.urdf.document import Element
 from twin.models.urdf.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
-from twin.models.urdf.gazebo import MU1, MU2, SELF_COLLIDE, flag_in, number_in
-from twin.models.urdf.gazebo_materials import colour_of
+from twin.models.urdf.gazebo import MU1, MU2, SELF_COLLIDE, colour_of, flag_in, number_in
 from twin.models.urdf.sensors import PLUGIN_IMU
 
 ONE_FRICTION = "friction is the same in every direction"

@@ -9,10 +9,9 @@ from twin.convert.ledger.fates import Fate, container_fate
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
-from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
 from twin.models.urdf.gazebo import value_of
-from twin.models.urdf.sensors import kind_of
+from twin.models.urdf.sensors import CAMERA, kind_of
 
 ELSEWHERE = "not in robot.xml; report.json has it"
 TAGS: Mapping[str, Fate] = MappingProxyType(

@@ -11,7 +11,7 @@ from twin.models.description import RobotDescription
 __all__ = ["CHECKS", "ERRORS", "WARNINGS", "Diagnostic", "check", "from_problems", "in_file_order"]
 
 CHECKS = (
-    "masses:masses",
+    "inertia:masses",
     "meshes:meshes",
     "wheels:wheel_axis",
     "wheels:wheel_fixed",

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from twin.geometry import Pose3, rotate_wxyz
-from twin.models.checks.source import read_source
+from twin.models.checks.diagnostic import read_source
 from twin.models.checks.wheels import LEVEL, wheels_of
 from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -21,14 +23,7 @@ class SurfaceDistance:
             max_dist: Distances are cut off here [m].
         """
         occupied = occupancy.data >= OCCUPIED
-        signed = np.full(occupied.shape, max_dist)
-        if occupied.any():
-            # The border runs half a cell off the centres on both sides of it.
-            outside = ndimage.distance_transform_edt(~occupied) - 0.5
-            inside = ndimage.distance_transform_edt(occupied) - 0.5
-            cells = np.where(occupied, -inside, outside)
-            signed = np.clip(cells * occupancy.resolution, -max_dist, max_dist)
-        self.signed: NDArray[np.float32] = signed.astype(np.float32)
+        self.signed = _signed(occupied.tobytes(), occupied.shape, occupancy.resolution, max_dist)
         """At the centres of the cells, shape (height, width) [m]."""
         self.max_dist = max_dist
         self.resolution = occupancy.resolution
@@ -67,3 +62,23 @@ class SurfaceDistance:
         slope = (around[:2] - around[2:]).T
         length = np.hypot(slope[:, 0], slope[:, 1])
         return np.asarray(slope / np.maximum(length, 1e-9)[:, None])
+
+
+@lru_cache(maxsize=4)
+def _signed(
+    occupied: bytes, shape: tuple[int, int], resolution: float, max_dist: float
+) -> NDArray[np.float32]:
+    """Return the distances of a map, read-only: runs in one process often share theirs."""
+    inside = np.frombuffer(occupied, dtype=bool).reshape(shape)
+    signed = np.full(shape, max_dist)
+    if inside.any():
+        # The border runs half a cell off the centres on both sides of it.
+        cells = np.where(
+            inside,
+            0.5 - ndimage.distance_transform_edt(inside),
+            ndimage.distance_transform_edt(~inside) - 0.5,
+        )
+        signed = np.clip(cells * resolution, -max_dist, max_dist)
+    made = signed.astype(np.float32)
+    made.flags.writeable = False
+    return made

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from twin.geometry import Pose3, matrix_from_quat_wxyz
+from twin.geometry import Pose2, Pose3, matrix_from_quat_wxyz
 from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
 from twin.scenario.observation import CheckContext, Observation, Zone
@@ -87,7 +87,8 @@ class Delivered(Check):
 
 def outside_distance(zone: Zone, pose: Pose3) -> float:
     """Return how far the origin of `pose` is outside of the zone's rectangle [m]; 0 inside."""
-    local = zone.centre.inverse() @ pose.to_pose2()
+    x, y, _ = pose.xyz.tolist()
+    local = zone.T_zone_world @ Pose2(x, y, 0.0)
     dx = max(0.0, abs(local.x) - zone.size[0] / 2.0)
     dy = max(0.0, abs(local.y) - zone.size[1] / 2.0)
     return math.hypot(dx, dy)

@@ -87,7 +87,7 @@ def _follow(
     feedback: list[Any],
 ) -> None:
     """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
-    from twin.bridge.actions.states import NAMES
+    from twin.bridge.actions.goal import NAMES
     from twin.bridge.messages.as_yaml import message_to_yaml
 
     def is_over() -> bool:
