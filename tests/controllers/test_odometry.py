@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.controllers.odometry import Odometry, OdometryConfig
-from twin.controllers.odometry_noise import OdometryNoise
+from twin.controllers.odometry import Odometry, OdometryConfig, OdometryNoise
 from twin.geometry import Pose2
 
 CONFIG = OdometryConfig(wheel_radius=0.05, track=0.3)

@@ -17,8 +17,7 @@ from twin.bridge.msgs import Odometry as OdometryMsg
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
-from twin.controllers.odometry import Odometry, OdometryConfig
-from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
+from twin.controllers.odometry import DIFF_DRIVE, Odometry, OdometryConfig, OdometryNoise
 from twin.geometry import Array, Pose2
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config

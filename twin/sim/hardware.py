@@ -17,6 +17,7 @@ from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.models.kinematics import ONE_DOF
+from twin.savings import ALL, Savings
 from twin.sim.indices import Indices, indices
 from twin.sim.noise import NoiseStream
 from twin.sim.servos import EffortServos, PositionServos
@@ -72,6 +73,7 @@ class Hardware:
         seed: int,
         config: HardwareConfig | None = None,
         command_latency: float = 0.0,
+        savings: Savings = ALL,
     ) -> None:
         """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
@@ -118,7 +120,7 @@ class Hardware:
         self._wheels = _WheelServos(
             model, data, self._actuators, np.isin(names, list(wheels)), self.config.wheel_integral_gain
         )
-        self._positions = PositionServos(model, data, self._actuators)
+        self._positions = PositionServos(model, data, self._actuators, savings)
         by_effort = [
             command
             for name, command in description.commands.items()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
+from twin.savings import ALL, Savings
 from twin.sim.indices import indices
 
 _SPARE = 1.25
@@ -68,9 +69,15 @@ class PositionServos:
     as that allows: one that ran ahead of a blocked joint would let it shoot off when it is free again.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        actuators: NDArray[np.intp],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to those of `actuators` that `keep_velocity_limit` made; changes `slewmax` in `model`."""
-        self._data = data
+        self._data, self._always = data, not savings.unchanged_drives
         is_kept = model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID
         kept = actuators[is_kept]
         joints = model.actuator_trnid[kept, 0]
@@ -109,9 +116,9 @@ class PositionServos:
                 speed = abs(command - target) / elapsed
                 speeds[i] = fastest if fastest < speed else speed
         # An arm is at rest most of the time: what is as it was is not written again.
-        if targets != before:
+        if targets != before or self._always:
             data.act[self._target] = targets
-        if speeds != self._speeds:
+        if speeds != self._speeds or self._always:
             self._slewmax[self._kept], self._speeds = speeds, speeds
 
 
