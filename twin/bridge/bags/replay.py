@@ -40,7 +40,7 @@ class Replayed:
 
     @property
     def difference(self) -> str | None:
-        """The first difference as a clause: of topics, times, if the bag tells turns, and bytes; None: none."""
+        """The first difference, of topics, times, if the bag tells turns, and bytes: a clause, or None."""
         again, before = _plain(self.published), _plain(self.recorded)
         if not self.in_turns:
             again, before = _by_topic(again), _by_topic(before)

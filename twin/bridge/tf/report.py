@@ -1,4 +1,8 @@
-"""What a buffer holds, for people: tf2's lists of frames, a text tree, and tf2_monitor's delays and rates."""
+"""What a buffer holds, for people: lists of frames, a text tree, a drawing, and delays and rates.
+
+Lists are tf2's, delays and rates in the words of tf2_monitor. Drawings are Graphviz text as view_frames
+writes it, and SVG without Graphviz.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,11 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from twin import tree_drawing
 from twin.bridge.msgs import TFMessage, ns
 from twin.bridge.tf.core import BufferCore
 from twin.bridge.tf.errors import seconds
+from twin.tree_drawing import Node, escaped
 
 _SHORTEST_NS = 100_000
 """tf2's lower bound of a buffer's length when it computes a rate."""
@@ -204,3 +210,49 @@ def net_delay(delays_ns: Sequence[int]) -> str:
     """Return tf2_monitor's line about a chain."""
     average = sum(delays_ns) / max(1, len(delays_ns))
     return f"Net delay     avg = {average * 1e-9:.6g}: max = {max(delays_ns, default=0) * 1e-9:.6g}"
+
+
+def graphviz(infos: Sequence[FrameInfo], now_ns: int) -> str:
+    """Return the tree as a .gv file with the labels of view_frames."""
+    if not infos:
+        return 'digraph G { "No tf data received" }\n'
+    lines = ["digraph G {"]
+    for info in infos:
+        label = "\\n".join(escaped(text) for text in _label(info))
+        lines.append(f'"{escaped(info.parent)}" -> "{escaped(info.frame)}"[label=" {label}\\n"];')
+    lines += [
+        "edge [style=invis];",
+        ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";',
+        f'"Recorded at time: {now_ns * 1e-9:.6f}"[ shape=plaintext ] ;',
+    ]
+    lines += [f'}}->"{escaped(roots(infos)[0])}";', "}"]
+    return "\n".join(lines) + "\n"
+
+
+def svg(infos: Sequence[FrameInfo], now_ns: int) -> str:
+    """Return the tree as SVG: roots at the left, a column for each generation."""
+    if not infos:
+        return tree_drawing.svg({"": Node(lines=["No tf data received"])}, (), [""], title="frames")
+    tops, children = roots(infos), children_of(infos)
+    nodes = {frame: Node(lines=[frame]) for frame in tops}
+    for info in infos:
+        if info.frame not in nodes:
+            nodes[info.frame] = Node(lines=[info.frame, *_box(info)])
+    arrows = [(info.parent, info.frame) for below in children.values() for info in below]
+    note = f"Recorded at time: {now_ns * 1e-9:.6f}"
+    return tree_drawing.svg(nodes, arrows, tops, title="frames", note=note)
+
+
+def _label(info: FrameInfo) -> list[str]:
+    return [
+        f"Broadcaster: {info.broadcaster}",
+        f"Average rate: {info.rate_hz:.3f}",
+        f"Buffer length: {info.length_ns * 1e-9:.3f}",
+        f"Most recent transform: {info.newest_ns * 1e-9:.6f}",
+        f"Oldest transform: {info.oldest_ns * 1e-9:.6f}",
+    ]
+
+
+def _box(info: FrameInfo) -> list[str]:
+    rate = "static" if info.is_static else f"{info.rate_hz:.1f} Hz, latest {info.newest_ns * 1e-9:.3f} s"
+    return [info.broadcaster, rate]

@@ -97,7 +97,7 @@ def proto(
     interfaces: Interfaces = None,
 ) -> None:
     """Show a message, a request or a goal with all its fields as YAML, to copy and fill in."""
-    from twin.bridge.messages.as_yaml import prototype
+    from twin.bridge.messages.as_text import prototype
 
     add_interfaces(interfaces)
     text = prototype(_given(typename))

@@ -83,8 +83,7 @@ def echo(
 ) -> None:
     """Print messages."""
     from twin.cli.ros.topic.filter import compile_filter
-    from twin.cli.ros.topic.listen import Listener
-    from twin.cli.ros.topic.process import open_topics
+    from twin.cli.ros.topic.process import Listener, open_topics
 
     accepts = compile_filter(filter_expr) if filter_expr else None
     with open_topics(joining, node_name=node_name) as process:
@@ -187,7 +186,7 @@ class EchoPrinter:
         return value, None if _is_message(value) else field
 
     def _text(self, sample: RawSample, value: Any, field: Field | None) -> str:
-        from twin.bridge.messages.as_yaml import message_to_csv, message_to_yaml, to_yaml
+        from twin.bridge.messages.as_text import message_to_csv, message_to_yaml, to_yaml
         from twin.cli.ros.topic.values import value_text
 
         style = self._style

@@ -109,7 +109,7 @@ def _listen(
 ) -> Any:
     """Call back for every message of a topic, as soon as it exists; return its class."""
     from twin.bridge.qos import SENSOR_DATA
-    from twin.cli.ros.topic.listen import Listener
+    from twin.cli.ros.topic.process import Listener
 
     endpoints = process.wait_for_topic(name)
     cls = process.message_class(endpoints) if decode else None
