@@ -156,17 +156,16 @@ class OpenRun:
                 run.tick()
                 if until is not None and until():
                     return True
-                simulated = run.world.time_ns * 1e-9
                 if self._pace is not None:
-                    self._pace.keep(simulated)
-                now = time.perf_counter()
-                if progress is not None and now - shown > _SHOWN_S:
-                    shown = now
+                    self._pace.keep(run.world.time_ns * 1e-9)
+                if progress is not None and time.perf_counter() - shown > _SHOWN_S:
+                    shown = time.perf_counter()
+                    simulated = run.world.time_ns * 1e-9
                     progress(
                         Progress(
                             time_s=simulated,
                             duration_s=run.scenario.duration,
-                            real_time_factor=simulated / (now - began),
+                            real_time_factor=simulated / (shown - began),
                             mission_state=run.parts.mission.state,
                         )
                     )
