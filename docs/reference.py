@@ -24,7 +24,7 @@ from twin.bridge.node import Node
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types.jazzy import TABLE as JAZZY
-from twin.bridge.types.known_hashes import TABLE as HASHES
+from twin.bridge.types.type_hash import TABLE as HASHES
 from twin.bridge.types.type_hash import rihs01_of
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig

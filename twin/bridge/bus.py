@@ -66,7 +66,8 @@ class Bus:
         self._nodes: list[Node] = []
         self._ids = 0
         self._spun_ns = 0
-        self._thread = threading.get_ident()
+        self.thread = threading.get_ident()
+        """That opened the bus, by its identifier."""
         self._closed = False
         self._starting: Any = None
         self._process = os.getpid()
@@ -240,7 +241,7 @@ class Bus:
 
     def in_own_thread(self) -> bool:
         """Whether the caller is the thread that opened the bus, not one of Zenoh's."""
-        return threading.get_ident() == self._thread
+        return threading.get_ident() == self.thread
 
     def next_id(self) -> int:
         """Return a number for a node or endpoint, unique in the session."""

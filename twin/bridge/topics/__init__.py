@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import zenoh
@@ -83,6 +84,7 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
+        self.msgtype = self.codec.msgtype
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.wire, self.key, qos)
@@ -120,18 +122,22 @@ class Publisher(Endpoint, Generic[M]):
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         bus, listeners = self._bus, self._listeners
+        frozen = frozen and self._by_reference
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
-        if bus.taps:
-            sample.settle(frozen and self._by_reference)
-            for tap in bus.taps:
-                tap(sample)
-        if listeners is not None and listeners.is_direct and bus.in_own_thread():
-            if listeners.receivers or self._latched:
-                sample.settle(frozen and self._by_reference)
-                if self._latched:
-                    self._retained.append(sample)
-                for receiver in listeners.receivers:
-                    receiver.enqueue(sample, False)
+        receivers = None
+        if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
+            receivers = listeners.receivers
+        latched = self._latched and receivers is not None
+        # What stays as it is, and nobody is given, need not be settled.
+        if receivers or latched or (bus.taps and not frozen):
+            sample.settle(frozen)
+        for tap in bus.taps:
+            tap(sample)
+        if receivers is not None:
+            if latched:
+                self._retained.append(sample)
+            for receiver in receivers:
+                receiver.enqueue(sample, False)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         elif bus.taps or self.has_subscribers:
             self._put(sample)

@@ -21,10 +21,10 @@ class Latched(Protocol):
 class Listeners:
     """Who hears one key."""
 
-    __slots__ = ("_all", "latched", "receivers")
+    __slots__ = ("every", "latched", "receivers")
 
     def __init__(self, every: InProcess) -> None:
-        self._all = every
+        self.every = every
         self.receivers: list[Receiver] = []
         """Those who can be given a message directly; Zenoh reaches them too."""
         self.latched: list[Latched] = []
@@ -33,7 +33,7 @@ class Listeners:
     @property
     def is_direct(self) -> bool:
         """Whether the receivers are all who hear the key."""
-        return self._all.is_private
+        return self.every.is_private
 
     def retained(self, most: int) -> Iterator[Any]:
         """Yield what is for a receiver that comes now: of each publisher at most so many samples."""

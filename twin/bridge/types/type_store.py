@@ -12,11 +12,10 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
-from twin.bridge.types.bounds import BASE_TYPES
 from twin.bridge.types.folders import find_definitions
 from twin.bridge.types.jazzy import jazzy
 from twin.bridge.types.lazy_store import LazyTypestore
-from twin.bridge.types.literals import Value
+from twin.bridge.types.literals import BASE_TYPES, Value
 from twin.bridge.types.parser import Definition, Reference, Structure
 from twin.bridge.types.text import PADDING, definition_text
 from twin.bridge.types.type_hash import FieldDefs

@@ -1,6 +1,6 @@
-"""Messages as `ros2 topic echo` prints them: YAML, comma-separated values, plain dicts.
+"""Messages as text: YAML, comma-separated values and plain dicts of `ros2 topic echo`, and one line.
 
-The forms are those of rosidl_runtime_py (convert.py); the way back is `from_values.message_from_dict`.
+One line is as of `ros2 service call`: `std_msgs.msg.String(data='')`.
 """
 
 from __future__ import annotations
@@ -159,3 +159,37 @@ def _abbreviated(value: Any, field: Field) -> str:
         return f"<array type: {name}[{field.size}]>"
     bound = f"[{field.size}]" if field.many == "bounded" else ""
     return f"<sequence type: {name}{bound}, length: {len(value)}>"
+
+
+def message_repr(message: Any) -> str:
+    """Return a message as Python's repr of rclpy's message classes (rosidl_generator_py, _msg.py.em).
+
+    >>> from twin.bridge.msgs import String
+    >>> message_repr(String("Hello"))
+    "std_msgs.msg.String(data='Hello')"
+    """
+    typename: str = message.__msgtype__
+    fields = [
+        f"{field.name}={_field(getattr(message, field.attribute), field)}" for field in fields_of(typename)
+    ]
+    return f"{typename.replace('/', '.')}({', '.join(fields)})"
+
+
+def _field(value: Any, field: Field) -> str:
+    if not field.many:
+        return _item(value, field)
+    if (
+        field.many == "array"
+        and isinstance(value, np.ndarray)
+        and field.base not in ("bool", "byte", "octet")
+    ):
+        return repr(value)  # arrays of fixed length are numpy's in rclpy too
+    return f"[{', '.join(_item(item, field) for item in value)}]"
+
+
+def _item(value: Any, field: Field) -> str:
+    if field.message:
+        return message_repr(value)
+    if field.base in ("byte", "octet"):
+        return repr(bytes([int(value) & 255]))
+    return repr(value.item() if isinstance(value, np.generic) else value)
