@@ -6,7 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,12 @@ def open_recording(
     recording.set_log_time_enabled(False)
     recording.save(path, default_blueprint=blueprint)
     return recording
+
+
+def begin_flush(recording: rr.RecordingStream) -> None:
+    """Have everything so far written, meanwhile; what goes wrong is told by the next `flush`."""
+    with suppress(RuntimeError):
+        recording.flush(timeout_sec=0.0)
 
 
 def flush(recording: rr.RecordingStream, path: Path) -> None:

@@ -12,7 +12,7 @@ import rerun as rr
 from twin.geometry import Pose3
 from twin.periods import Period
 from twin.recording.frames import Frames
-from twin.recording.writer import Row, Rows
+from twin.recording.rows import Row, Rows
 
 if TYPE_CHECKING:
     from twin.bridge.topics import Sample
