@@ -178,6 +178,7 @@ class GridChannel(_SpatialChannel[Raster]):
         colormap = rr.components.Colormap
         self._colormap = (colormap.RvizMap if is_map else colormap.RvizCostmap).value
         self._last: Raster | None = None
+        context.grids[topic] = self
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep the raster."""
@@ -193,6 +194,21 @@ class GridChannel(_SpatialChannel[Raster]):
             grid.header.frame_id,
             data.reshape(info.height, info.width)[::-1].tobytes(),
         )
+        self._show(sample, raster)
+
+    def take_update(self, sample: Sample[Any]) -> None:
+        """Keep the raster with what a map_msgs/OccupancyGridUpdate changes of it."""
+        if self._last is None:
+            return
+        update, (width, height) = sample.message, self._last.size
+        cells = np.frombuffer(bytearray(self._last.cells), np.int8).reshape(height, width)
+        window = cells[::-1][update.y : update.y + update.height, update.x : update.x + update.width]
+        if window.size != len(update.data):
+            return  # of another grid
+        window[...] = np.asarray(update.data, dtype=np.int8).reshape(window.shape)
+        self._show(sample, self._last._replace(cells=cells.tobytes()))
+
+    def _show(self, sample: Sample[Any], raster: Raster) -> None:
         changed = raster != self._last and bool(raster.cells)
         if changed:
             self._last = raster
@@ -212,6 +228,20 @@ class GridChannel(_SpatialChannel[Raster]):
             _OPACITY.column([self._opacity] * len(rows)),
         )
         yield self.entity, sim_time(times), columns
+
+
+class GridUpdateChannel(Channel[Any]):
+    """map_msgs/OccupancyGridUpdate on `<topic>_updates`: changes what is shown of `<topic>`."""
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Hand it to the channel of the whole grids, if there is one."""
+        grids = self.context.grids.get(self.topic.removesuffix("_updates"))
+        if grids is not None:
+            grids.take_update(sample)
+
+    def chunks(self, rows: list[Any]) -> tuple[()]:
+        """Yield nothing: there are no rows."""
+        return ()
 
 
 class PathChannel(_SpatialChannel[Floats]):
