@@ -174,7 +174,7 @@ class RerunSink:
             self._wait()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
-        """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored.
+        """Write what waits, the verdict (as in `verdict.json`) and the last screen; the rest is ignored.
 
         Raises:
             RecordingError: The file is not whole.
