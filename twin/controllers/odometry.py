@@ -9,9 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-
-from twin.geometry import Array, Pose2, wrap_angle
+from twin.geometry import Pose2, wrap_angle
 from twin.parameters import (
     Le,
     Metres,
@@ -73,6 +71,9 @@ class OdometryConfig:
     noise: OdometryNoise = DIFF_DRIVE
     """How wrong it is."""
 
+
+Rows = tuple[float, ...]
+"""A (3, 3) matrix, row by row."""
 
 _AT_REST = 1e-5
 """Variance of each velocity while the wheels stand [m²/s², rad²/s²]."""
@@ -152,17 +153,17 @@ class Odometry:
         )
 
     @property
-    def velocity_covariance(self) -> Array:
-        """Of the linear, sideways and angular velocity of the last interval, shape (3, 3).
+    def velocity_covariance(self) -> Rows:
+        """Of the linear, sideways and angular velocity of the last interval.
 
         Integrated as white noise it makes the pose as unsure as `covariance` says.
         """
-        place, turn = (grown / self._dt**2 for grown in self._grown)
-        place, turn = place + _AT_REST, turn + _AT_REST
-        return np.array((place, 0.0, 0.0, 0.0, place, 0.0, 0.0, 0.0, turn)).reshape(3, 3)
+        (place, turn), squared = self._grown, self._dt**2
+        place, turn = place / squared + _AT_REST, turn / squared + _AT_REST
+        return place, 0.0, 0.0, 0.0, place, 0.0, 0.0, 0.0, turn
 
     @property
-    def covariance(self) -> Array:
-        """Of (x, y, yaw) in `odom`, shape (3, 3)."""
+    def covariance(self) -> Rows:
+        """Of (x, y, yaw) in `odom`."""
         xx, xy, yy, xt, yt, tt = self._variances
-        return np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
+        return xx, xy, xt, xy, yy, yt, xt, yt, tt

@@ -103,7 +103,7 @@ class Observer:
     def _note_moved(self) -> frozenset[str]:
         xyz, quat_wxyz = self._world.body_poses()
         poses = xyz[self._still].tobytes() + quat_wxyz[self._still].tobytes()
-        if poses == self._still_poses:
+        if poses == self._still_poses and self._world.savings.unchanged_truth:
             return self._moved
         self._still_poses = poses
         xyz -= self._start[0]

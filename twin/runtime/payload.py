@@ -51,7 +51,7 @@ class Payload:
                 robot = contact.body1.partition("/")[0]
                 # What nothing but the robot touches, as in the air, hits nothing.
                 others = [it for it in self._world.neighbours(good) if not it.startswith(f"{robot}/")]
-                if others or good in stood_at:
+                if others or good in stood_at or not self._world.savings.unchanged_truth:
                     near.setdefault(robot, []).append(good)
         return [
             ContactObservation(robot=robot, body=good, other=other, force_N=force, carried=True)

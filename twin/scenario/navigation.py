@@ -21,7 +21,7 @@ from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
-from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
+from twin.scenario.parameter_group import ParameterGroup, key_names, keys_of
 from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_name
 from twin.strict_yaml import StrictModel
 
@@ -35,7 +35,7 @@ class PlannerServerParameters(ParameterGroup):
     circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
 
 
-_KEYS = {plugin: group_of(config).model_fields for plugin, config in configs_of(PLANNERS).items()}
+_KEYS = {plugin: key_names(config) for plugin, config in configs_of(PLANNERS).items()}
 
 
 @keys_of(*configs_of(PLANNERS).values())

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from twin.savings import ALL, Savings
+
 Vector = tuple[float, float, float]
 
 
@@ -40,15 +42,22 @@ _FLOOR = -2
 class ContactReader:
     """Finds the few contacts that matter among all contacts of a world, by masks over geoms."""
 
-    def __init__(self, model: mujoco.MjModel, owners: Sequence[str], robot_of_geom: Sequence[int]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        owners: Sequence[str],
+        robot_of_geom: Sequence[int],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to a model.
 
         Args:
             model: The compiled world.
             owners: Name of the body or static that each geom belongs to.
             robot_of_geom: Index of the robot that each geom belongs to, -1 for none, -2 for the floor.
+            savings: What is not done over again.
         """
-        self._model = model
+        self._model, self._savings = model, savings
         self._owners = tuple(owners)
         self._names = tuple(model.geom(i).name or f"geom {i}" for i in range(model.ngeom))
         self._robot = np.array(robot_of_geom, dtype=np.int32)
@@ -102,7 +111,7 @@ class ContactReader:
         self._forces = None
         geoms = data.contact.geom
         touching = geoms.tobytes()
-        if touching == self._touching:
+        if touching == self._touching and self._savings.unchanged_truth:
             return
         self._touching, self._of_body, self._pairs = touching, {}, []
         if not touching:

@@ -13,6 +13,7 @@ import numpy as np
 from twin.errors import ScenarioError, nearest
 from twin.files.writing import write_whole
 from twin.geometry import Array, Pose3
+from twin.savings import ALL, Savings
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
 from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
@@ -42,10 +43,13 @@ class World:
         *,
         crash_folder: Path | None,
         visuals: bool,
+        savings: Savings,
     ) -> None:
         self._spec = build_spec(scene, robots, physics)
         self._placements = tuple(robots)
         self.scene, self.physics, self.seed, self.crash_folder = scene, physics, seed, crash_folder
+        self.savings = savings
+        """What is not done over again."""
         self.model = (self._spec if visuals else without_visuals(self._spec)).compile()
         self.data = mujoco.MjData(self.model)
         self.timestep_ns = physics.timestep_ns
@@ -59,7 +63,7 @@ class World:
         self._guard = DivergenceGuard(self.model, self.data)
         self._statics = {static.name: static.T_world_body for static in scene.statics}
         self._bind_bodies()
-        self._contact_reader = ContactReader(self.model, *self._geom_owners())
+        self._contact_reader = ContactReader(self.model, *self._geom_owners(), savings)
         self.robots: Mapping[str, RobotHandle] = MappingProxyType(
             {placement.name: self._bind_robot(placement) for placement in robots}
         )
@@ -74,6 +78,7 @@ class World:
         *,
         crash_folder: Path | None = None,
         visuals: bool = False,
+        savings: Savings = ALL,
     ) -> World:
         """Build and compile.
 
@@ -85,13 +90,14 @@ class World:
             crash_folder: Where to write the last states if the physics diverges; None writes nothing.
             visuals: Compile the robots' visual geoms too, for rendering; they cost a tenth of each step, as
                 they are part of the bounding trees that collisions are found with.
+            savings: What is not done over again.
 
         Raises:
             ScenarioError: Two things have the same name.
             ModelError: A sensor is faster than the physics.
         """
         physics = physics or Physics()
-        return cls(scene, robots, physics, seed, crash_folder=crash_folder, visuals=visuals)
+        return cls(scene, robots, physics, seed, crash_folder=crash_folder, visuals=visuals, savings=savings)
 
     # -- time ------------------------------------------------------------------------------------------------
 
@@ -259,6 +265,7 @@ class World:
             description=description,
             seed=self.seed,
             command_latency=placement.command_latency,
+            savings=self.savings,
         )
         root = self.model.body(f"{name}/{description.root}")
         return RobotHandle(

@@ -102,8 +102,10 @@ def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, flo
     if not may_be.any():
         return None
     normals, offsets = normals[may_be], offsets[may_be]
-    squared = (normals @ some.T - offsets[:, None]) ** 2
-    best = int(np.argmin(np.minimum(squared, _ON_LINE**2).sum(axis=1)))
+    squared = normals @ some.T
+    squared -= offsets[:, None]
+    squared *= squared
+    best = int(np.argmin(np.minimum(squared, _ON_LINE**2, out=squared).sum(axis=1)))
     return normals[best], float(offsets[best])
 
 

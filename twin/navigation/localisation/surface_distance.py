@@ -33,14 +33,22 @@ class SurfaceDistance:
         """Return the interpolated distance at points of the map frame, shape (n, 2) -> (n,) [m]."""
         height, width = self.signed.shape
         cells = self.origin.inverse().apply(points) / self.resolution - 0.5
-        inside = ((cells >= 0.0) & (cells < (width - 1, height - 1))).all(axis=1)
-        result = np.full(len(points), self.max_dist)
-        u, v = cells[inside].T
+        u, v = cells.T
+        inside = (u >= 0.0) & (v >= 0.0) & (u < width - 1) & (v < height - 1)
+        all_inside = inside.all()
+        if not all_inside:
+            u, v = u[inside], v[inside]
         iu, iv = u.astype(np.int64), v.astype(np.int64)
         fu, fv = u - iu, v - iv
-        low = (1.0 - fu) * self.signed[iv, iu] + fu * self.signed[iv, iu + 1]
-        high = (1.0 - fu) * self.signed[iv + 1, iu] + fu * self.signed[iv + 1, iu + 1]
-        result[inside] = (1.0 - fv) * low + fv * high
+        flat, at = self.signed.ravel(), iv * width + iu
+        low = (1.0 - fu) * flat[at] + fu * flat[at + 1]
+        at += width
+        high = (1.0 - fu) * flat[at] + fu * flat[at + 1]
+        distance: Array = (1.0 - fv) * low + fv * high
+        if all_inside:
+            return distance
+        result = np.full(len(points), self.max_dist)
+        result[inside] = distance
         return result
 
     def normals(self, points: Array) -> Array:
@@ -49,9 +57,9 @@ class SurfaceDistance:
         Of length 1; 0 where the distance has no slope. Points are in the map frame [m].
         """
         half = 0.5 * self.resolution
-        slope = np.empty((len(points), 2))
-        for axis, step in enumerate(((half, 0.0), (0.0, half))):
-            slope[:, axis] = self.at(points + step) - self.at(points - np.array(step))
+        steps = np.array([[half, 0.0], [0.0, half], [-half, 0.0], [0.0, -half]])
+        around = self.at((points + steps[:, None]).reshape(-1, 2)).reshape(4, -1)
+        slope = (around[:2] - around[2:]).T
         length = np.hypot(slope[:, 0], slope[:, 1])
         return np.asarray(slope / np.maximum(length, 1e-9)[:, None])
 

@@ -2,8 +2,8 @@
 
 Every pair of speeds that can be reached within `sim_time` is driven ahead with the drive's accelerations; the
 critics score where that ends, and the best pair is the command. Distances to the path and to its end are
-exact ones, not counted in cells as by Nav2, so that small errors are steered out too. To change sign again and
-again on the spot is forbidden, as by DWB's OscillationCritic.
+exact ones, not counted in cells as by Nav2, so that small errors are steered out too. To change sign
+again and again on the spot is forbidden, as by DWB's OscillationCritic.
 """
 
 from __future__ import annotations

@@ -61,9 +61,9 @@ class Progress:
             return 0.0
         to_go = self._to_go
         behind = int(to_go.searchsorted(_SEARCH_WINDOW + to_go[self._nearest], side="right"))
-        ahead_xy = self._points[self._nearest : behind, :2]
-        aside = ahead_xy - (pose.x, pose.y)
-        self._nearest += int(np.einsum("ij,ij->i", aside, aside).argmin())
+        ahead_xy = self._points[self._nearest : behind]
+        dx, dy = ahead_xy[:, 0] - pose.x, ahead_xy[:, 1] - pose.y
+        self._nearest += int((dx * dx + dy * dy).argmin())
         return -float(to_go[self._nearest])
 
 
