@@ -24,6 +24,8 @@ from twin.runtime.open_run import OpenRun
 from twin.scenario.verdict import Verdict
 
 BLOCK_S = 1.0
+WARM_UP_S = 2.0
+"""What is done once, such as fields of distances of the map, is not what a robot costs as it drives."""
 
 
 def round_of(folder: Path, robots: Sequence[int], blocks: int, seconds: float) -> dict[int, list[float]]:
@@ -32,14 +34,15 @@ def round_of(folder: Path, robots: Sequence[int], blocks: int, seconds: float) -
     with ExitStack() as ending:
         runs: dict[int, OpenRun] = {}
         for n in robots:
-            runs[n] = OpenRun(fleet(folder, n, blocks=blocks, duration=seconds), record=False)
+            runs[n] = OpenRun(fleet(folder, n, blocks=blocks, duration=WARM_UP_S + seconds), record=False)
             ending.callback(runs[n].close)
+            advance(runs[n], WARM_UP_S)
         gc.freeze()  # as a run does
         ending.callback(gc.unfreeze)
         for block in range(math.ceil(seconds / BLOCK_S)):
             for n, run in runs.items():
                 began = time.process_time()
-                advance(run, (block + 1) * BLOCK_S)
+                advance(run, WARM_UP_S + (block + 1) * BLOCK_S)
                 taken[n].append(time.process_time() - began)
         for n, run in runs.items():
             _judge(n, run.finish())

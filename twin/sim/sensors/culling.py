@@ -66,7 +66,7 @@ class BodiesInReach:
         directions: Array,
         groups: NDArray[np.uint8],
         reach: float,
-        savings: Savings = ALL,
+        savings: Savings,
     ) -> None:
         """Bind to a model.
 
@@ -132,8 +132,8 @@ class FanSlice:
         """Of the plane, in the link's frame."""
         self._groups = model.geom_group
         bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-        sliced = normal is not None and not groups[_HIDDEN]
-        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & sliced & savings.plane_of_rays)
+        sliced = normal is not None and not groups[_HIDDEN] and savings.plane_of_rays
+        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & sliced)
         self._centre, self._half = _boxes(model, self._geoms)
         self._radius = float(np.linalg.norm(np.abs(self._centre) + self._half, axis=1).max(initial=0.0))
         self._shown = self._groups[self._geoms]
