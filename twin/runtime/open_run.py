@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
+from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
@@ -107,11 +108,13 @@ class OpenRun:
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
         taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
-        with execution() as self._executed, ExitStack() as ending:
+        network = network or SessionConfig(listen=outside.endpoints(listen))
+        keeps_time = pace is not None or network.networked
+        with execution() as self._executed, ExitStack() as ending, kernels_ahead(keeps_time):
             parts = build(
                 scenario,
                 taps=[self._digest.on_sample, *taps],
-                network=network or SessionConfig(listen=outside.endpoints(listen)),
+                network=network,
                 outside=outside,
                 crash_folder=out,
                 savings=savings,
@@ -160,17 +163,16 @@ class OpenRun:
                 run.tick()
                 if until is not None and until():
                     return True
-                simulated = run.world.time_ns * 1e-9
                 if self._pace is not None:
-                    self._pace.keep(simulated)
-                now = time.perf_counter()
-                if progress is not None and now - shown > _SHOWN_S:
-                    shown = now
+                    self._pace.keep(run.world.time_ns * 1e-9)
+                if progress is not None and time.perf_counter() - shown > _SHOWN_S:
+                    shown = time.perf_counter()
+                    simulated = run.world.time_ns * 1e-9
                     progress(
                         Progress(
                             time_s=simulated,
                             duration_s=run.scenario.duration,
-                            real_time_factor=simulated / (now - began),
+                            real_time_factor=simulated / (shown - began),
                             mission_state=run.parts.mission.state,
                         )
                     )

@@ -89,6 +89,7 @@ class Publisher(Endpoint, Generic[M]):
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
         self.msgtype = self.codec.msgtype
+        self._cls: type[M] | None = None
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.wire, self.key, qos)
@@ -120,7 +121,9 @@ class Publisher(Endpoint, Generic[M]):
             TypeError: a message of another type.
             BridgeError: the publisher is destroyed.
         """
-        if type(message) is not self.codec.cls:
+        if type(message) is not self._cls:
+            self._cls = self.codec.cls  # made for the first message
+        if type(message) is not self._cls:
             raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
         if not self._declared:
             raise BridgeError(f"the publisher of {self.name} is destroyed")
