@@ -1,8 +1,8 @@
 """Writes the tables of docs/scenarios.md, arenas.md, navigation.md and api.md: `python docs/reference.py`.
 
-Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The table of the
-hashes of message types is written, too. With `--check` nothing is written; the exit code is 1 if something is
-not up to date.
+Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
+the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
+is 1 if something is not up to date.
 """
 
 from __future__ import annotations
@@ -16,13 +16,15 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from api_reference import api
+from rosbags.typesys.stores.ros2_jazzy import FIELDDEFS
 
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.node import Node
 from twin.bridge.services import Client, Service
 from twin.bridge.topics import Publisher, Subscription
-from twin.bridge.types.known_hashes import TABLE as HASHES
+from twin.bridge.types.jazzy import TABLE as JAZZY
+from twin.bridge.types.type_hash import TABLE as HASHES
 from twin.bridge.types.type_hash import rihs01_of
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
@@ -330,6 +332,7 @@ def pages() -> dict[Path, str]:
         arenas: updated(
             arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)
         ),
+        JAZZY: "{\n" + ",\n".join(f'"{name}": {json.dumps(of)}' for name, of in FIELDDEFS.items()) + "\n}\n",
         HASHES: json.dumps({"note": "written by docs/reference.py", "hashes": hashes()}, indent=0) + "\n",
     }
 

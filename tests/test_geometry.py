@@ -89,3 +89,13 @@ def test_an_origin_that_is_not_written_is_that_of_its_parent() -> None:
         assert [*pose.xyz, *pose.quat_wxyz] == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     assert Pose3.from_xyz_rpy(rpy=(0.0, 0.0, math.pi)).xyz.tolist() == [0.0, 0.0, 0.0]
     assert Pose3.from_xyz_rpy((1.0, 2.0, 3.0)).quat_wxyz.tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_points_are_moved_by_the_numbers_of_the_matrix() -> None:
+    rng, pose = np.random.default_rng(1), Pose2(3.0, -2.0, 0.7)
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    for count in (0, 1, 7, 360):
+        points = rng.normal(size=(count, 2))
+        expected = points @ np.array([[c, s], [-s, c]]) + np.array([pose.x, pose.y])
+        np.testing.assert_array_equal(pose.apply(points), expected)  # to the last bit
+        np.testing.assert_array_equal(pose.apply(np.asfortranarray(points)), expected)

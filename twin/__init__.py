@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from twin.errors import TwinError
     from twin.geometry import Pose2, Pose3
     from twin.recording.read_back import Recording
+    from twin.runtime.threads import end_threads
     from twin.scenario.schema import Scenario
     from twin.scenario.verdict import Verdict
     from twin.warehouse.arena import Arena
@@ -39,6 +40,7 @@ __all__ = [
     "Verdict",
     "World",
     "actions",
+    "end_threads",
     "load_arena",
     "load_robot",
     "load_scenario",
@@ -64,6 +66,7 @@ _HOMES = {
     "TwinError": "twin.errors",
     "Verdict": "twin.scenario.verdict",
     "World": "twin.api.world",
+    "end_threads": "twin.runtime.threads",
     "load_arena": "twin.api.files",
     "load_robot": "twin.api.robot",
     "load_scenario": "twin.api.files",

@@ -20,7 +20,8 @@ def period_of(rate_hz: float) -> Period:
 
 def next_due(period: Period, now_ns: int) -> int:
     """Return the first multiple of a period that is later than `now_ns`, rounded up to whole [ns]."""
-    return math.ceil((now_ns // period + 1) * period)
+    due = (now_ns // period + 1) * period
+    return due if isinstance(due, int) else math.ceil(due)
 
 
 def latest(period: Period, step_ns: int) -> float:

@@ -13,8 +13,17 @@ class Savings:
     """Nodes run only when something has come, or is due; otherwise all of them in every spin."""
     services_in_process: bool = True
     """Requests and responses go through Zenoh only if another process may have a part in it."""
+    in_process: bool = True
+    """What nobody else can hear goes from inbox to inbox, without any Zenoh session; otherwise all by it."""
     by_reference: bool = True
     """Within a process a message that nobody changes any more is handed over as it is, not as bytes."""
+    unchanged_drives: bool = True
+    """Bounds of servos are written into the physics only if they are others than before."""
+    unchanged_truth: bool = True
+    """Checks and bumpers look closely only where something is new: other shapes touch than before, a load
+    touches more than its robot, something lies elsewhere."""
+    plane_of_rays: bool = True
+    """Rays pass over bodies that they do not see, those of a flat fan over scenery beside its plane, too."""
 
 
 ALL = Savings()

@@ -46,14 +46,15 @@ def tell(*more):
     os._exit(0)
 """
 _FIRST_TICK = f"""{_TOLD}
+from twin.api.simulation import Simulation
 from twin.cli import main
-from twin.runtime.run import Run
 
-def stop(run, tick=Run.tick):
-    tick(run)
+def stop(simulation, start=Simulation._start):
+    start(simulation)
+    simulation._run.run.tick()
     tell([name for name in {LIBRARIES} if name in sys.modules])
 
-Run.tick = stop
+Simulation._start = stop  # imports come when twin would have them
 main()
 """
 _AGAIN = f"""{_TOLD}

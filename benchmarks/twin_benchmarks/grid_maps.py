@@ -13,13 +13,14 @@ import numpy as np
 
 from twin.errors import MapError, Problem
 from twin.geometry import Array, Pose2
+from twin.navigation.behavior_trees.paths import length as path_length
 from twin.navigation.costmaps.costmap import INSCRIBED_INFLATED_OBSTACLE, LETHAL_OBSTACLE, Costmap
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.failures import NoValidPath
-from twin.navigation.maps.map_io import load_map
+from twin.navigation.maps.map_image import load_map
 from twin.navigation.planning.config import PlannerConfig, ThetaStarConfig
 from twin.navigation.planning.grid_search import GridSearch
-from twin.navigation.planning.planner import Planner, path_length
+from twin.navigation.planning.planner import Planner
 from twin_benchmarks.grid import TOLERANCE, Tick, binary_prices, nano_astar
 
 MAX_RATIO = 1.5

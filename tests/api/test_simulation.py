@@ -37,7 +37,7 @@ def nothing_stays_open(monkeypatch: pytest.MonkeyPatch) -> object:
     monkeypatch.setattr(Bus, "of", classmethod(opened))
     handler = signal.getsignal(signal.SIGINT)
     yield
-    assert all(bus is None or bus.zenoh.is_closed() for bus in (ref() for ref in buses))
+    assert all(bus is None or bus.wire.is_closed for bus in (ref() for ref in buses))
     assert (guard._users, signal.getsignal(signal.SIGINT)) == (0, handler)
 
 

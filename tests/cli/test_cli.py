@@ -24,8 +24,8 @@ from typer.testing import CliRunner
 from twin.cli import app as app_module
 from twin.cli.own_commands import TABLE
 from twin.cli.play import find_recording
-from twin.cli.run import batch, repeat
-from twin.cli.run.child import run_in_child
+from twin.cli.run import batch
+from twin.cli.run.batch import run_in_child
 from twin.cli.run.options import RunOptions, parse_overrides
 from twin.errors import RecordingError, ScenarioError, SimulationError
 from twin.files.writing import written_alone
@@ -368,8 +368,7 @@ def _no_run(*_: object) -> None:
 def test_two_commands_do_not_write_into_one_folder(
     demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
-    for place in ("twin.cli.run.child.run_in_child", "twin.cli.run.repeat.run_in_child"):
-        monkeypatch.setattr(place, _no_run)
+    monkeypatch.setattr("twin.cli.run.batch.run_in_child", _no_run)
     held = demo.parent / "held"
     held.mkdir()
     (held / "verdict.json").write_text("the other's", encoding="utf-8")
@@ -415,7 +414,7 @@ def test_where_nothing_can_be_written_is_told_before_any_work(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str], option: str, place: str
 ) -> None:
     for work in (
-        "twin.cli.run.child.run_in_child",
+        "twin.cli.run.batch.run_in_child",
         "twin.models.loader.load",
         "twin.cli.ros.joining.Joining.open",
         "twin.scenario.schema.json_schema",
@@ -523,7 +522,7 @@ def test_repeat_compares_digests(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch,
     digests: list[str | None], flags: list[str], code: int, says: str,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(repeat, "run_in_child", child(iter(digests)))
+    monkeypatch.setattr(batch, "run_in_child", child(iter(digests)))
     got, out, _ = invoke("run", str(demo), "--repeat", "3", *flags)
     assert got == code
     assert says in out
@@ -533,7 +532,7 @@ def test_test_runs_all_and_writes_one_junit(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (demo.parent / "second.yaml").write_text(SCENARIO, encoding="utf-8")
-    monkeypatch.setattr("twin.cli.run.child.run_in_child", child(iter("ab"), passed=False))
+    monkeypatch.setattr("twin.cli.run.batch.run_in_child", child(iter("ab"), passed=False))
     code, out, _ = invoke("test", str(demo.parent), "--junit", "reports/all.xml")
     assert code == 1
     assert "0 of 2 passed" in out
@@ -565,7 +564,7 @@ def test_a_child_that_crashes_says_its_last_line_and_keeps_the_rest(
 ) -> None:
     crash = "import sys; sys.exit('Traceback\\n  many lines\\nTypeError: no')"
     monkeypatch.setattr(RunOptions, "arguments", lambda *_: [])
-    monkeypatch.setattr("twin.cli.run.child.COMMAND", (sys.executable, "-c", crash))
+    monkeypatch.setattr("twin.cli.run.batch.COMMAND", (sys.executable, "-c", crash))
     verdict = run_in_child(RunOptions(scenario=Path("demo.yaml")), tmp_path / "new")
     assert verdict["verdict"] == "error"
     assert verdict["error"].startswith("the run's process ended with code 1: TypeError: no (all of it: ")

@@ -10,7 +10,7 @@ from twin.navigation.control.collision_monitor_config import MonitorPolygon
 from twin.navigation.costmaps.costmap_config import CostmapConfig, RangeSensorConfig
 from twin.navigation.docking.config import DockEstimateConfig, LineApproachConfig
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.nodes.navigation.mapping.map_saver import MapSaverConfig
+from twin.nodes.navigation.mapping.map_server import MapSaverConfig
 
 
 @pytest.mark.parametrize(

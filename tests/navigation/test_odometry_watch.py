@@ -12,7 +12,7 @@ import pytest
 
 from tests.navigation.conftest import Hall
 from twin.geometry import Pose2
-from twin.navigation.odometry_watch import OdometryWatch
+from twin.navigation.odometry_watch import OdometryWatch, _share
 
 TRACK = 0.4
 STEP_S = 0.5
@@ -148,3 +148,13 @@ def test_scans_that_are_far_apart_are_not_compared(apart_s: float, noticed: bool
     for i in range(21):
         watch.take(lambda: walls, Pose2(0.3 * i, 0.0, 0.0), round(i * apart_s * 1e9))
     assert bool(watch.fault) == noticed
+
+
+def test_what_explains_a_scan_is_found_wherever_it_is() -> None:
+    rng = np.random.default_rng(3)
+    for before, after in ((1, 5), (2, 40), (80, 120)):
+        old, points = rng.uniform(-1.0, 1.0, (before, 2)), rng.uniform(-1.0, 1.0, (after, 2))
+        moved = Pose2(0.1, -0.2, 0.3)
+        away = np.hypot(*(moved.apply(points)[:, None] - old).T).min(axis=0)
+        near = 0.1 + 0.02 * np.hypot(*points.T)
+        assert _share(old, points, moved) == np.count_nonzero(away < near) / after

@@ -13,6 +13,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Float64MultiArray, JointState, MultiArrayLayout, Odometry, Twist
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
+from twin.nodes.diff_drive_controller import planar_covariance
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.missions.simple import VelocityProfileNode
 from twin.nodes.navigation.velocity.twist_mux import TwistMuxNode
@@ -182,3 +183,12 @@ def test_a_velocity_profile_keeps_its_durations_to_the_control_period(bench: Ben
     for speed, at in due.items():
         assert -1e-9 <= begins[speed] - start - at < 0.02, "at the first control period at or after"
     assert all(later - earlier <= 0.1 + 1e-9 for (earlier, _), (later, _) in pairwise(sent)), "10 Hz or more"
+
+
+def test_a_covariance_in_the_plane_is_part_of_one_in_space() -> None:
+    planar = np.random.default_rng(1).normal(size=(3, 3))
+    full = planar_covariance(planar.flat).reshape(6, 6)
+    np.testing.assert_array_equal(full[np.ix_([0, 1, 5], [0, 1, 5])], planar)
+    assert full[2:5, 2:5].tolist() == np.diag([1e6] * 3).tolist()
+    assert np.count_nonzero(full) == 12
+    assert not full.flags.writeable, "messages may share it"

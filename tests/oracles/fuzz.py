@@ -26,8 +26,7 @@ from twin.convert.export import export
 from twin.convert.inspection import inspect_file
 from twin.errors import TwinError
 from twin.models import ReadOptions, load
-from twin.models.graph import graphviz, svg
-from twin.models.tree import tree_text
+from twin.models.graph import graphviz, svg, tree_text
 
 SLOWEST_S = 15.0
 BATCH = 200

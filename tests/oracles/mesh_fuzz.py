@@ -20,8 +20,8 @@ import mujoco
 import numpy as np
 
 from twin.convert.export import export
+from twin.convert.geoms import _content
 from twin.convert.inspection import inspect_file
-from twin.convert.mesh_assets import _content
 from twin.geometry import Array
 from twin.models.mesh.hulls import _hull_of
 from twin.models.mesh.mesh_formats import write_msh, write_stl

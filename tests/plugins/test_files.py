@@ -99,7 +99,7 @@ def test_an_arena_of_a_package_is_found_by_a_scenario(site: Path) -> None:
 )
 def test_what_a_detector_finds_is_looked_at(returned: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "eye.py").write_text(
-        "from twin.geometry import Pose2\nfrom twin.navigation.docking.detectors import Detector\n\n"
+        "from twin.geometry import Pose2\nfrom twin.navigation.docking.faces import Detector\n\n"
         f"class Eye(Detector):\n    def detect(self, points):\n        return {returned}\n"
     )
     entry = DetectorEntry.model_validate({f"{tmp_path}/eye.py:Eye": None})

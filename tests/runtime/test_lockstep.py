@@ -14,8 +14,10 @@ from typing import Any
 
 import pytest
 
+from tests.savings import OFF
 from twin import runtime
 from twin.errors import BridgeError, ScenarioError, TwinError
+from twin.savings import ALL, Savings
 from twin.scenario.outside import Outside
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
@@ -87,9 +89,11 @@ def answer(endpoint: str) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
         child.wait()
 
 
-def stepped(scenario: Scenario, endpoint: str, *names: str, timeout_s: float = 30.0) -> Verdict:
+def stepped(
+    scenario: Scenario, endpoint: str, *names: str, timeout_s: float = 30.0, savings: Savings = ALL
+) -> Verdict:
     outside = Outside(wait_for=names, wait_timeout_s=timeout_s)
-    return runtime.run(scenario, record=False, listen=[endpoint], outside=outside)
+    return runtime.run(scenario, record=False, listen=[endpoint], outside=outside, savings=savings)
 
 
 def in_process(scenario: Scenario, *factories: str) -> Verdict:
@@ -103,9 +107,9 @@ def test_a_node_gives_the_same_digest_in_another_process(
     what = scenario(DRIVE)
     expected = in_process(what, "controller")
     assert expected.clock == "inproc"
-    for _ in range(3):
+    for savings in (ALL, OFF):
         child = start("controller", sleep_s=0.004)
-        verdict = stepped(what, endpoint, "/controller")
+        verdict = stepped(what, endpoint, "/controller", savings=savings)
         assert verdict.digest == expected.digest
         assert (verdict.verdict, verdict.clock, verdict.deterministic) == ("pass", "lockstep", True)
         assert child.wait(20) == 0, "the end of the run ends the process"
@@ -131,10 +135,11 @@ def test_services_and_actions_between_two_processes(
     what = scenario(DRIVE)
     expected = in_process(what, "server", "client")
     assert expected.verdict == "pass", "the feedback drives the robot"
-    for order in (("client", "server"), ("server", "client")):
+    for order, savings in ((("client", "server"), ALL), (("server", "client"), OFF)):
         for factory in order:  # who comes first does not matter
             start(factory, sleep_s=0.002)
-        assert stepped(what, endpoint, "/server", "/client").digest == expected.digest
+        verdict = stepped(what, endpoint, "/server", "/client", savings=savings)
+        assert verdict.digest == expected.digest
 
 
 def test_the_names_of_two_nodes_of_one_process_step_it_once(

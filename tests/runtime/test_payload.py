@@ -11,12 +11,14 @@ from typing import Any
 import mujoco
 import pytest
 
+from tests.savings import OFF
 from tests.sim.conftest import box, tote
 from twin.convert.conversion import Conversion
 from twin.geometry import Pose3
 from twin.models.description import Joint, Link, RobotDescription
 from twin.models.shapes import Box
 from twin.runtime.observe import Observer
+from twin.savings import ALL, Savings
 from twin.scenario.checks import CheckEntry, CheckResult
 from twin.scenario.observation import CheckContext
 from twin.sim.robot import RobotPlacement
@@ -86,7 +88,12 @@ def crane() -> RobotPlacement:
 class Handling:
     """A tote of 2.5 kg on a table, a machine 20 cm before it, and a gripper about it."""
 
-    def __init__(self, *more: FreeBody | StaticBody, allowed: Sequence[dict[str, str]] = ()) -> None:
+    def __init__(
+        self,
+        *more: FreeBody | StaticBody,
+        allowed: Sequence[dict[str, str]] = (),
+        savings: Savings = ALL,
+    ) -> None:
         scene = Scene(
             name="handling",
             statics=(
@@ -99,7 +106,7 @@ class Handling:
                 *(part for part in more if isinstance(part, FreeBody)),
             ),
         )
-        self.world = World.compose(scene, [crane()])
+        self.world = World.compose(scene, [crane()], savings=savings)
         mission: Any = SimpleNamespace(state="", done=False, succeeded=None, reason="")
         self.observer = Observer(self.world, (), mission, [good.name for good in scene.goods])
         rules = [{"other": "tote", "body": "*finger"}, *allowed]
@@ -168,6 +175,25 @@ def test_a_carried_tote_that_is_pressed_against_a_machine_is_a_collision() -> No
     assert not result.passed
     assert 60.0 < result.value < 300.0  # type: ignore[operator]
     assert result.reason.startswith("tote, carried by crane, hit machine with ")
+
+
+def test_where_nothing_is_new_nothing_is_missed() -> None:
+    observations = []
+    for savings in (ALL, OFF):
+        handling = Handling(goods("box", (-0.3, 0.0, 0.48), (0.1, 0.1, 0.16), mass=1.0), savings=savings)
+        for targets in (
+            {"left": GRIP, "right": GRIP}, {"z": 0.1}, {"x": AGAINST_THE_MACHINE}, {"x": 0.0}, {"z": 0.03},
+            {"x": -0.12}, {"z": 0.0}, {"left": -5.0, "right": -5.0},
+        ):  # fmt: skip
+            handling.go(0.3, **targets)
+            seen = handling.observer.observe()
+            observations.append((savings, seen.contacts, seen.moved))
+    half = len(observations) // 2
+    saved, oracle = ([seen[1:] for seen in each] for each in (observations[:half], observations[half:]))
+    assert saved == oracle
+    hit = {contact.other for contacts, _ in saved for contact in contacts if contact.carried}
+    assert hit >= {"machine", "box"}
+    assert saved[-1][1] == {"crane", "tote", "box"}
 
 
 def test_what_carried_goods_may_touch_can_be_allowed() -> None:

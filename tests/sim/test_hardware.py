@@ -9,6 +9,7 @@ import pytest
 
 from tests.sim.conftest import placed
 from twin.errors import SimulationError
+from twin.sim.indices import indices
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import Scene
 from twin.sim.world import World
@@ -159,3 +160,10 @@ def test_a_reading_is_what_sensors_measure_of_all_joints_at_once(world: World) -
         np.testing.assert_array_equal(reading.velocity, velocity)
         np.testing.assert_array_equal(reading.effort, data.qfrc_actuator[dof])
         before = counts
+
+
+def test_indices_that_follow_each_other_are_a_slice() -> None:
+    values = np.arange(10.0)
+    for some in ([], [4], [2, 3, 4], [2, 4], [4, 3], [3, 3]):
+        np.testing.assert_array_equal(values[indices(some)], values[np.array(some, dtype=np.intp)])
+    assert indices([2, 3, 4]) == slice(2, 5)

@@ -81,7 +81,6 @@ def test_adding_up_later_is_adding_up_at_once(world: World) -> None:
             meter.note()
             forces.append(data.qfrc_actuator.copy())
             velocities.append(data.qvel.copy())
-        meter.end()
         speeds = np.array(velocities)[:, dofs]
         powers = np.array(forces)[:, dofs] * (speeds[:-1] + speeds[1:])
         work += half_step * np.maximum(powers, 0.0).sum(axis=0)

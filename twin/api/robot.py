@@ -152,8 +152,7 @@ class Robot:
             raise ModelError(
                 Problem("urdf() needs the package yourdfpy, which is not installed: pip install yourdfpy")
             ) from fault
-        from twin.models.urdf.packages import PackagePath, Packages
-        from twin.models.urdf.resources import locate
+        from twin.models.urdf.packages import PackagePath, Packages, locate
 
         source = self.description.source
         packages = Packages(PackagePath.of(source, self.options))

@@ -1,4 +1,4 @@
-"""The bus: one Zenoh session, its nodes, and the border to other processes."""
+"""The bus: its nodes, their Zenoh session if there is one, and the border to other processes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import atexit
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any, Self
 
 import zenoh
@@ -21,9 +23,10 @@ from twin.bridge.topics.in_process import InProcess
 from twin.bridge.wire import Wire
 from twin.bridge.wire.external import Arrival, ExternalQueue
 from twin.bridge.wire.interrupts import guard
+from twin.bridge.wire.late_session import LateSession
 from twin.bridge.wire.naming import Naming
 from twin.bridge.wire.ros2dds import bridge_token
-from twin.bridge.wire.session import SessionConfig, open_session
+from twin.bridge.wire.session import SessionConfig, open_session, session_id
 from twin.errors import BridgeError
 from twin.savings import ALL, Savings
 
@@ -38,18 +41,17 @@ class Bus:
     Callbacks run only in `spin`; what other processes send waits until `admit`. Use it as a context manager.
     """
 
-    def __init__(
-        self, session: zenoh.Session, clock: Clock, naming: Naming, networked: bool, savings: Savings = ALL
-    ) -> None:
-        self.zenoh = session
-        """The session, for those who hear no topic by it, or tell `in_process`."""
-        self.in_process = InProcess(is_private=not networked)
+    def __init__(self, config: SessionConfig, clock: Clock, naming: Naming, savings: Savings = ALL) -> None:
+        self.networked = networked = config.networked
+        """Whether other processes may take part."""
+        self.wire = LateSession(partial(open_session, config))
+        """Where endpoints are declared; the session is opened now only if others may take part."""
+        private = savings.in_process and not networked
+        self.session_id = session_id(config.name) if private else str(self.wire.open().zid())
+        self.in_process = InProcess(is_private=private)
         self.clock = clock
         self.naming = naming
         self.domain_id = naming.domain_id
-        self.session_id = str(session.zid())
-        self.networked = networked
-        """Whether other processes may take part."""
         self.savings = savings
         """What is not done over again."""
         self.use_sim_time = True
@@ -64,12 +66,13 @@ class Bus:
         self._nodes: list[Node] = []
         self._ids = 0
         self._spun_ns = 0
-        self._thread = threading.get_ident()
+        self.thread = threading.get_ident()
+        """That opened the bus, by its identifier."""
         self._closed = False
         self._starting: Any = None
         self._process = os.getpid()
         if networked and naming.wire == "ros2dds":
-            self._bridge = session.liveliness().declare_token(bridge_token(self.session_id))
+            self._bridge = self.wire.declare_token(bridge_token(self.session_id))
         atexit.register(self.close)
         self._guarded = guard.enter()
 
@@ -98,8 +101,7 @@ class Bus:
         Raises:
             BridgeError: an endpoint cannot be used.
         """
-        name = session or ("" if listen or connect else "twin")
-        config = SessionConfig(listen=tuple(listen), connect=tuple(connect), name=name, wire=wire)
+        config = SessionConfig(listen=tuple(listen), connect=tuple(connect), name=session, wire=wire)
         return cls.of(config, clock, domain_id=domain_id)
 
     @classmethod
@@ -117,7 +119,9 @@ class Bus:
             BridgeError: an endpoint or the configuration's file cannot be used.
         """
         naming = Naming(config.wire, config.domain_id if domain_id is None else domain_id)
-        return cls(open_session(config), clock, naming, config.networked, savings)
+        if not config.networked and not config.name:
+            config = replace(config, name="twin")  # nobody meets it
+        return cls(config, clock, naming, savings)
 
     def create_node(
         self,
@@ -152,8 +156,13 @@ class Bus:
     @property
     def session(self) -> zenoh.Session:
         """The Zenoh session. Who takes it may hear topics: from then on all messages go through it."""
-        self.in_process.is_private = False
-        return self.zenoh
+        self.in_process.go_public()
+        return self.wire.open()
+
+    @property
+    def zenoh(self) -> zenoh.Session:
+        """The session, for those who hear no topic by it."""
+        return self.wire.open()
 
     @property
     def nodes(self) -> tuple[Node, ...]:
@@ -178,7 +187,7 @@ class Bus:
         """Tell others that nodes are being made, until `started`: who lists the graph waits for it."""
         if self.networked and self._starting is None:
             key = starting_key(self.domain_id, self.session_id)
-            self._starting = self.zenoh.liveliness().declare_token(key)
+            self._starting = self.wire.declare_token(key)
 
     def started(self) -> None:
         """Tell others that all nodes are made. Harmless when repeated."""
@@ -225,14 +234,14 @@ class Bus:
                 for node in reversed(self.nodes):
                     node.destroy()
                 self.external.report()
-                self.zenoh.close()  # type: ignore[no-untyped-call]
+                self.wire.close()
         finally:
             if self._guarded:
                 guard.leave()
 
     def in_own_thread(self) -> bool:
         """Whether the caller is the thread that opened the bus, not one of Zenoh's."""
-        return threading.get_ident() == self._thread
+        return threading.get_ident() == self.thread
 
     def next_id(self) -> int:
         """Return a number for a node or endpoint, unique in the session."""

@@ -143,6 +143,9 @@ def alive(bus: Bus, key: str) -> list[str]:
 
 def _look(bus: Bus, key: str) -> tuple[list[str], bool]:
     """Return the tokens that match a key expression now, and whether these are all."""
+    if not bus.wire.is_open:
+        expression = zenoh.KeyExpr(key)
+        return [token for token in bus.wire.waiting_tokens if expression.includes(zenoh.KeyExpr(token))], True
     found: list[str] = []
     late: list[bool] = []
     done = threading.Event()

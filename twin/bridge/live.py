@@ -19,8 +19,8 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import ns
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs import ros_args
-from twin.bridge.programs.arguments import parser_of, split
 from twin.bridge.programs.console_log import show_log
+from twin.bridge.programs.ros_args import parser_of, split
 from twin.bridge.wire import Wire
 from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.interrupts import noted_signals

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.controllers.limiter import AxisLimits
-from twin.controllers.odometry_noise import DIFF_DRIVE, SKID_STEER, OdometryNoise
+from twin.controllers.odometry import DIFF_DRIVE, SKID_STEER, OdometryNoise
 from twin.controllers.skid_steer import cornering_slip, track_ratio, weight_shares
 from twin.geometry import Array
 from twin.models.description import RobotDescription

@@ -37,7 +37,8 @@ class SpeedLimiter:
     def limit(self, target: float, dt: float) -> float:
         """Return the velocity nearest to `target` that is reachable within `dt` [s]."""
         target, step = self._bounds(target, dt)
-        self.value += min(max(target - self.value, -step), step)
+        change = target - self.value
+        self.value += -step if change < -step else step if change > step else change
         return self.value
 
     def share(self, target: float, dt: float) -> float:
@@ -49,6 +50,7 @@ class SpeedLimiter:
     def _bounds(self, target: float, dt: float) -> tuple[float, float]:
         """Return `target` within the greatest velocity, and the largest change within `dt` [s]."""
         limits, value = self.limits, self.value
-        target = min(max(target, -limits.max_velocity), limits.max_velocity)
+        most = limits.max_velocity
+        target = -most if target < -most else most if target > most else target
         braking = abs(target) < abs(value) or target * value < 0.0
         return target, (limits.braking if braking else limits.max_acceleration) * dt

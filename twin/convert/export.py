@@ -1,4 +1,7 @@
-"""Writing a robot as a folder that plain MuJoCo loads: `robot.xml`, `assets/`, `report.json`."""
+"""Writing a robot as a folder that plain MuJoCo loads: `robot.xml`, `assets/`, `report.json`.
+
+The MJCF has every number in full: MuJoCo writes six digits, which loses a robot's exact geometry.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,20 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
+from lxml import etree
 
 from twin.convert.bodies import Base, natural_base
 from twin.convert.contact_roles import roles_of
 from twin.convert.conversion import Conversion, Guess
 from twin.convert.convert import convert
-from twin.convert.exact_xml import exact_xml
 from twin.convert.inspection import inspect_robot
 from twin.convert.ledger.tags import counts, tag_ledger
 from twin.convert.mujoco_log import without_warnings
@@ -193,3 +197,68 @@ def _report(
 def diagnostic_json(diagnostic: Diagnostic) -> dict[str, Any]:
     """Return a diagnostic as `twin check --json` prints it, with the file's name alone."""
     return {**asdict(diagnostic), "file": diagnostic.file.name}
+
+
+SAME = 1e-5
+"""Relative difference up to which a number is taken for the rounded form of another."""
+WRITTEN_AS_ZERO = 2e-12
+"""MuJoCo writes smaller numbers as 0 [SI]."""
+POSE = {"pos": "pos", "quat": "quat"}
+INERTIAL = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
+GEOM = {**POSE, "size": "size"}
+_ALIKE = ("axis", "range", "damping", "frictionloss", "armature", "stiffness", "springref")
+JOINT = {"actuatorfrcrange": "actfrcrange", **{name: name for name in _ALIKE}}
+CAMERA = {**POSE, "fovy": "fovy"}
+SENSOR = {"cutoff": "cutoff", "noise": "noise"}
+EQUALITY = {"polycoef": "data"}
+ACTUATOR = {name: name for name in ("ctrlrange", "forcerange", "gainprm", "biasprm")}
+
+
+def exact_xml(spec: mujoco.MjSpec) -> str:
+    """Return `spec` as MJCF in which positions, sizes, masses and limits keep all their bits.
+
+    Args:
+        spec: It is compiled in place.
+    """
+    model = spec.compile()
+    root = etree.fromstring(spec.to_xml(), etree.XMLParser(remove_blank_text=True, huge_tree=True))
+    for element, values, names in _sources(root, spec, model):
+        for attribute, name in names.items():
+            text = element.get(attribute)
+            if text is not None:
+                element.set(attribute, _exact(text, getattr(values, name)))
+    etree.indent(root, "  ")
+    return etree.tostring(root, encoding="unicode") + "\n"
+
+
+def _sources(
+    root: Any, spec: mujoco.MjSpec, model: mujoco.MjModel
+) -> Iterator[tuple[Any, Any, Mapping[str, str]]]:
+    """Yield each element with the object that has its numbers, and what they are called there."""
+    for element in root.iterfind("worldbody//body"):
+        body = spec.body(element.get("name"))
+        yield element, body, POSE
+        for inertial in element.iterfind("inertial"):
+            yield inertial, model.body(element.get("name")), INERTIAL
+        for geom, source in zip(element.findall("geom"), body.geoms, strict=True):
+            yield geom, source, GEOM
+    for path, named, names in (
+        ("worldbody//body/joint", spec.joint, JOINT),
+        ("worldbody//body/site", spec.site, POSE),
+        ("worldbody//body/camera", spec.camera, CAMERA),
+        ("equality/joint", spec.equality, EQUALITY),
+        ("sensor/*", spec.sensor, SENSOR),
+        ("actuator/general", spec.actuator, ACTUATOR),
+    ):
+        for element in root.iterfind(path):
+            yield element, named(element.get("name")), names
+
+
+def _exact(text: str, value: Any) -> str:
+    rounded = np.array(text.split(), dtype=np.float64)
+    exact = np.ravel(value)[: len(rounded)]
+    # A component that is nearly zero beside others, or by itself, is written as zero.
+    slack = max(WRITTEN_AS_ZERO, SAME * float(np.max(np.abs(rounded), initial=0.0)))
+    if len(exact) != len(rounded) or not np.allclose(rounded, exact, rtol=SAME, atol=slack):
+        return text
+    return " ".join(repr(number).removesuffix(".0") for number in exact.tolist())

@@ -1,18 +1,25 @@
-"""Visual and collision shapes as MuJoCo geoms."""
+"""Visual and collision shapes as MuJoCo geoms, and mesh files as what MuJoCo reads.
+
+Binary STL, OBJ and MSH mostly stay, others become binary STL.
+"""
 
 from __future__ import annotations
 
+import hashlib
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from twin.convert.contact_roles import Roles
-from twin.convert.mesh_assets import mesh_asset, plain_stem
 from twin.convert.tyres import stiff, wheel_contact
+from twin.files.reading import read_bytes
 from twin.geometry import Array, Pose3
-from twin.models.checks.discs import disc_of
+from twin.models.checks.wheels import disc_of
 from twin.models.description import Link
+from twin.models.mesh.mesh_formats import TriangleMesh, write_msh, write_stl
 from twin.models.mesh.meshes import read_mesh
 from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, Sphere, Visual
 
@@ -156,3 +163,39 @@ def primitive(geometry: Geometry) -> tuple[mujoco.mjtGeom, list[float]]:
         return _TYPE.mjGEOM_CAPSULE, [geometry.radius, geometry.length / 2.0, 0.0]
     assert isinstance(geometry, Cylinder)
     return _TYPE.mjGEOM_CYLINDER, [geometry.radius, geometry.length / 2.0, 0.0]
+
+
+MOST_STL_FACES = 200_000
+"""MuJoCo reads no STL file with more (its stl_decoder); its own format, MSH, has no such limit."""
+MOST_FACE_BYTES = 1000
+"""Of a triangle, on average, in a file that stays as it is; an OBJ file may hold anything beside them."""
+MOST_KEPT = 10 * 1024 * 1024
+"""Bytes of a file that stays as it is; MuJoCo takes many times as much to read an OBJ file."""
+_KEPT = {"stl": ".stl", "obj": ".obj", "msh": ".msh"}
+
+
+def mesh_asset(mesh: Mesh) -> tuple[str, bytes]:
+    """Return a name made of the content, and the content, the same bytes each time.
+
+    Raises:
+        ModelError: As by `read_mesh`.
+    """
+    triangles = read_mesh(mesh.path, apply_up_axis=mesh.apply_up_axis)
+    suffix, content = _content(mesh.path, triangles)
+    return f"{plain_stem(mesh.path)}-{hashlib.sha256(content).hexdigest()[:8]}{suffix}", content
+
+
+def plain_stem(path: Path) -> str:
+    """Return a file's name without suffix, with `_` for line breaks and the like: XML changes them."""
+    return "".join(char if char.isprintable() else "_" for char in path.stem)
+
+
+@lru_cache(maxsize=128)
+def _content(path: Path, triangles: TriangleMesh) -> tuple[str, bytes]:
+    few = len(triangles.faces) <= MOST_STL_FACES
+    lean = path.stat().st_size <= min(MOST_KEPT, MOST_FACE_BYTES * (len(triangles.faces) + 4))
+    if triangles.format in _KEPT and triangles.is_verbatim and lean and (few or triangles.format != "stl"):
+        return _KEPT[triangles.format], read_bytes(path)
+    if few:
+        return ".stl", write_stl(triangles.points, triangles.faces)
+    return ".msh", write_msh(triangles.points, triangles.faces)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from twin.convert.bodies import natural_base
+from twin.convert.contacts import overlaps
 from twin.convert.convert import convert
-from twin.convert.overlaps import overlaps
 from twin.errors import ConversionError, ModelError
 from twin.models import load
 from twin.models.checks import Diagnostic, check, from_problems, in_file_order

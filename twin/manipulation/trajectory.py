@@ -44,9 +44,10 @@ class Trajectory:
             return np.array(self.positions[0])
         if time >= self.times[-1]:
             return np.array(self.positions[-1])
-        i = int(np.searchsorted(self.times, time, side="right")) - 1
-        h = self.times[i + 1] - self.times[i]
-        s = (time - self.times[i]) / h
+        i = int(self.times.searchsorted(time, side="right")) - 1
+        begin, end = self.times[i : i + 2].tolist()
+        h = end - begin
+        s = (time - begin) / h
         p0, p1 = self.positions[i], self.positions[i + 1]
         v0, v1 = self.velocities[i], self.velocities[i + 1]
         s2, s3 = s * s, s * s * s

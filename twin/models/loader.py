@@ -12,18 +12,21 @@ from twin.models.expansion.expand import expand
 from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
-from twin.models.urdf.cameras import read_cameras
-from twin.models.urdf.commands import read_commands, read_states
+from twin.models.urdf.commands import read_commands, read_states, read_transmissions
 from twin.models.urdf.document import Element, Report, parse
 from twin.models.urdf.drives import read_drive
-from twin.models.urdf.gazebo import read_self_collide, read_springs, read_static, read_surfaces
-from twin.models.urdf.gazebo_materials import colour_visuals
+from twin.models.urdf.gazebo import (
+    colour_visuals,
+    read_self_collide,
+    read_springs,
+    read_static,
+    read_surfaces,
+)
 from twin.models.urdf.joints import check_tree, read_joint, unique, without_idle_mimics
 from twin.models.urdf.line_table import LineTable
 from twin.models.urdf.links import LinkContext, read_link, read_materials
 from twin.models.urdf.packages import PackagePath, Packages
-from twin.models.urdf.sensors import read_sensors
-from twin.models.urdf.transmissions import read_transmissions
+from twin.models.urdf.sensors import read_cameras, read_sensors
 from twin.models.urdf.xml_text import as_utf8, read_utf8
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation._jit import jit
 from twin.navigation.mapping.correlation import CorrelationGrid, Window
 
 _RAYS = 120
@@ -95,9 +95,8 @@ class OdometryWatch:
         )
 
     def _compare(self, before: Array, points: Array, odometry: Pose2) -> _Comparison:
-        points = points[:: max(1, len(points) // _RAYS)]
-        tree = cKDTree(before)
-        explained = _share(tree, points, odometry)
+        points = np.ascontiguousarray(points[:: max(1, len(points) // _RAYS)])
+        explained = _share(before, points, odometry)
         agreed = _Comparison(odometry, odometry, contradicts=False)
         needed = max(_FIT, explained + _GAIN)
         if needed > 1.0:
@@ -105,7 +104,7 @@ class OdometryWatch:
         grid = CorrelationGrid(before, _CELL, _SMEAR, _LEVELS)
         window = Window(half_width=_FARTHEST, half_angle=_WIDEST)
         match = grid.search(points, Pose2(0.0, 0.0, 0.0), window)
-        if match is None or _share(tree, points, match.pose) < needed:
+        if match is None or _share(before, points, match.pose) < needed:
             return agreed
         scans = match.pose
         apart = Pose2(odometry.x - scans.x, odometry.y - scans.y, odometry.yaw - scans.yaw)
@@ -113,10 +112,27 @@ class OdometryWatch:
         return _Comparison(odometry, scans, contradicts=_extent(apart) > allowed)
 
 
-def _share(before: cKDTree, points: Array, moved: Pose2) -> float:
+def _share(before: Array, points: Array, moved: Pose2) -> float:
     """Return the share of a scan that the scan before explains if the robot moved so in between."""
-    near = _NEAR + _NEAR_PER_METRE * np.hypot(*points.T)
-    return float((before.query(moved.apply(points))[0] < near).mean())
+    return _explained(before, points, moved.apply(points)) / len(points)
+
+
+@jit
+def _explained(before: Array, points: Array, moved: Array) -> int:
+    """Return how many points lie, where they are moved to, near one of the scan before; of shape (n, 2) [m].
+
+    Both scans are in the order of their rays, so what explains a ray is mostly beside what explains the last.
+    """
+    count, at, total = 0, 0, before.shape[0]
+    for i in range(points.shape[0]):
+        near = _NEAR + _NEAR_PER_METRE * math.hypot(points[i, 0], points[i, 1])
+        for k in range(total):
+            # at, and in turns the next and the one before
+            j = (at + ((k + 1) // 2 if k % 2 else total - k // 2)) % total
+            if math.hypot(before[j, 0] - moved[i, 0], before[j, 1] - moved[i, 1]) < near:
+                count, at = count + 1, j
+                break
+    return count
 
 
 def _extent(motion: Pose2) -> float:

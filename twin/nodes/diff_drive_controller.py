@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -15,8 +17,7 @@ from twin.bridge.msgs import Odometry as OdometryMsg
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig, DiffDriveController
-from twin.controllers.odometry import Odometry, OdometryConfig
-from twin.controllers.odometry_noise import DIFF_DRIVE, OdometryNoise
+from twin.controllers.odometry import DIFF_DRIVE, Odometry, OdometryConfig, OdometryNoise
 from twin.geometry import Array, Pose2
 from twin.nodes.hardware import HardwareInterface
 from twin.nodes.node_parameters import declare_config
@@ -100,8 +101,8 @@ class DiffDriveControllerNode:
     def _update(self) -> None:
         dt = self.config.period_ns * 1e-9
         position = self._hardware.read().position.tolist()
-        left = sum(position[i] for i in self._left) / len(self._left)
-        right = sum(position[i] for i in self._right) / len(self._right)
+        left = sum([position[i] for i in self._left]) / len(self._left)
+        right = sum([position[i] for i in self._right]) / len(self._right)
         pose = self.odometry.update(left, right, dt, yaw_rate=self._yaw_rate())
         wheels = self.controller.update(dt)
         for joint in self.config.left_joints:
@@ -135,13 +136,12 @@ _UNUSED_AXIS = 1e6
 """Variance that tells filters not to use an axis that a planar drive does not measure."""
 
 
-def planar_covariance(covariance: Array) -> Array:
-    """Return a (3, 3) covariance of (x, y, yaw) as the row-major (36,) one of a ROS pose, read-only."""
-    full = _UNUSED_AXES.copy()
-    full.put(_PLANAR, covariance)
-    full.flags.writeable = False
-    return full
+def planar_covariance(rows: Iterable[float]) -> Array:
+    """Return a (3, 3) covariance of (x, y, yaw), row by row, as the (36,) one of a ROS pose, read-only."""
+    xx, xy, xt, yx, yy, yt, tx, ty, tt = rows
+    unused = _UNUSED_AXIS
+    return np.frombuffer(_PACK(xx, xy, xt, yx, yy, yt, unused, unused, unused, tx, ty, tt))
 
 
-_UNUSED_AXES = np.diag([0.0, 0.0, _UNUSED_AXIS, _UNUSED_AXIS, _UNUSED_AXIS, 0.0]).ravel()
-_PLANAR = np.array([6 * row + column for row in (0, 1, 5) for column in (0, 1, 5)])
+_PACK = struct.Struct("=2d24x3d24xd16xd48xd48xd8x2d24xd").pack
+"""Rows and columns 0, 1 and 5 of (6, 6), and the rest of the diagonal; 8x is a zero."""

@@ -19,7 +19,8 @@ def pose_stamped(pose: Pose2, frame: str, time_ns: int) -> PoseStamped:
 def path_msg(poses: Sequence[Pose2] | Array, frame: str, time_ns: int) -> Path:
     """Return poses, shape (n, 3) or a list of them, as a path message."""
     shared = header(time_ns, frame)
-    stamped = [PoseStamped(header=shared, pose=pose_from_pose2(Pose2(*pose))) for pose in poses]
+    rows = poses.tolist() if isinstance(poses, np.ndarray) else poses
+    stamped = [PoseStamped(header=shared, pose=pose_from_pose2(Pose2(*pose))) for pose in rows]
     return Path(header=shared, poses=stamped)
 
 

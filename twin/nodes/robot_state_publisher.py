@@ -37,26 +37,28 @@ class _MovingFrame:
         self.parent, self.child = joint.parent, joint.child
         self._slides = joint.type == "prismatic"
         self._xyz: tuple[float, float, float] = tuple(joint.T_parent_joint.xyz.tolist())
+        self._place = Vector3(*self._xyz)
         self._quat: tuple[float, ...] = tuple(joint.T_parent_joint.quat_wxyz.tolist())
         self._axis = joint.axis
         self._direction = rotate_wxyz(joint.T_parent_joint.quat_wxyz, joint.axis).tolist()
 
     def at(self, position: float) -> TransformMsg:
         """Return the frame in its parent's at `position` [rad or m]."""
-        (x, y, z), (w, i, j, k) = self._xyz, self._quat
+        w, i, j, k = self._quat
         if self._slides:
-            dx, dy, dz = self._direction
+            (x, y, z), (dx, dy, dz) = self._xyz, self._direction
             moved = Vector3(x + position * dx, y + position * dy, z + position * dz)
             return TransformMsg(moved, Quaternion(i, j, k, w))
         c, s = math.cos(position / 2.0), math.sin(position / 2.0)
-        ai, aj, ak = (s * component for component in self._axis)
+        ai, aj, ak = self._axis
+        ai, aj, ak = s * ai, s * aj, s * ak
         turned = Quaternion(
             w * ai + i * c + j * ak - k * aj,
             w * aj - i * ak + j * c + k * ai,
             w * ak + i * aj - j * ai + k * c,
             w * c - i * ai - j * aj - k * ak,
         )
-        return TransformMsg(Vector3(x, y, z), turned)
+        return TransformMsg(self._place, turned)
 
 
 class _Joints:

@@ -43,7 +43,7 @@ class SensorPublisher:
             reading = self.sensor.sample(time_ns)
             if reading is None:
                 return
-            message = self._to_message(spec, Header(stamp=stamp(time_ns), frame_id=spec.link), reading)
+            message = self._to_message(spec, Header(stamp(time_ns), spec.link), reading)
             if type(message) is self._message:
                 # A user's may say the same object again, with other values.
                 self._publisher.publish(message, frozen=self._plugin.ships)

@@ -10,7 +10,7 @@ from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import LaserScan, PoseArray, header, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
-from twin.navigation.docking.detectors import BoxFaces, Detector
+from twin.navigation.docking.faces import BoxFaces, Detector
 from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
 

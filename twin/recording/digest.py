@@ -33,13 +33,15 @@ class RunDigest:
             self._add()
 
     def _add(self) -> None:
+        parts: list[bytes] = []
         for sample in self._waiting:
             key = (sample.topic, sample.msgtype)
             names = self._names.get(key)
             if names is None:
                 names = self._names[key] = f"{sample.topic}\0{sample.msgtype}\0".encode()
             payload = sample.payload
-            self._hash.update(names + _HEAD.pack(sample.time_ns, len(payload)) + payload)
+            parts += (names, _HEAD.pack(sample.time_ns, len(payload)), payload)
+        self._hash.update(b"".join(parts))
         self._waiting.clear()
 
     def finish(self, state: bytes) -> str:

@@ -182,7 +182,7 @@ class RerunSink:
         if self._world is None or self._closed:
             return
         from twin.recording.blueprint import layout
-        from twin.recording.stream import end_recording, log_verdict
+        from twin.recording.stream import end_recording, handed_over, log_verdict
 
         self._closed = True
         self._takers.clear()
@@ -194,7 +194,9 @@ class RerunSink:
             self._stage.fit()
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            self._recording.send_blueprint(layout(self._stage, self._robots, self._world.time_ns))
+            blueprint = layout(self._stage, self._robots, self._world.time_ns)
+            with handed_over(blueprint):
+                self._recording.send_blueprint(blueprint)
         finally:
             end_recording(self._recording, self._path)
 

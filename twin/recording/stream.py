@@ -11,6 +11,7 @@ from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
+import rerun_bindings
 
 from twin.errors import RecordingError
 from twin.files.writing import replaced
@@ -53,8 +54,34 @@ def open_recording(
     )
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
-    recording.save(path, default_blueprint=blueprint, write_footer=False)
+    with handed_over(blueprint):
+        recording.save(path, default_blueprint=blueprint, write_footer=False)
     return recording
+
+
+@contextmanager
+def handed_over(blueprint: rrb.Blueprint) -> Iterator[None]:
+    """End the stream by which Rerun hands a blueprint over in the block: it would stay, with two threads."""
+    streams: list[rr.RecordingStream] = []
+    log = blueprint._log_to_stream
+
+    def noted(stream: rr.RecordingStream) -> None:
+        streams.append(stream)
+        log(stream)
+
+    blueprint._log_to_stream = noted  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        del blueprint._log_to_stream
+        for stream in streams:
+            stream.disconnect()
+
+
+def end_threads() -> None:
+    """End the threads of recordings that nobody holds any more."""
+    for _ in range(2):  # the first look finds what the second ends
+        rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def begin_flush(recording: rr.RecordingStream) -> None:

@@ -120,7 +120,12 @@ def build(
     scene = _scene(scenario, _as_it_is(scenario, arena))
     maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
     world = World.compose(
-        scene, placements, Physics(timestep=timestep), seed=scenario.seed, crash_folder=crash_folder
+        scene,
+        placements,
+        Physics(timestep=timestep),
+        seed=scenario.seed,
+        crash_folder=crash_folder,
+        savings=savings,
     )
     clock = Clock()
     name = outside.session if network.networked else "twin"

@@ -19,6 +19,7 @@ from twin.sim.world import World
 
 _MOVED, _TURNED = 0.01, 0.05
 """What has settled on the floor has come less far than this [m] and turned by less [rad]."""
+_COS_HALF_TURNED = math.cos(_TURNED / 2.0)
 
 
 class Observer:
@@ -37,10 +38,12 @@ class Observer:
         self._goods = tuple(goods)
         self._last: dict[str, tuple[int, Pose3]] = {}
         self._payload = Payload(world, self._goods)
-        self._contacts: dict[tuple[str, str, str], ContactObservation] = {}
+        self._contacts: dict[tuple[str, str], Contact | ContactObservation] = {}
+        """The hardest since the last observation of each pair that touches, those of what is carried too."""
         self._start = world.body_poses()
         self._roots = [name.partition("/")[0] for name in world.body_names]
         self._still = np.ones(len(self._roots), dtype=bool)
+        self._still_poses = b""
         self._moved: frozenset[str] = frozenset()
         self._fingers = {
             f"{stack.name}/{link}": stack.name
@@ -51,10 +54,15 @@ class Observer:
 
     def gather(self) -> None:
         """Note the contacts of the present control tick."""
-        for contact in (*map(_observed, self._world.contacts()), *self._payload.contacts()):
-            pair = contact.robot, contact.body, contact.other
-            if pair not in self._contacts or contact.force_N > self._contacts[pair].force_N:
-                self._contacts[pair] = contact
+        hardest = self._contacts
+        for contact in self._world.contacts():
+            pair = contact.body1, contact.body2
+            if pair not in hardest or contact.force_N > hardest[pair].force_N:
+                hardest[pair] = contact
+        for carried in self._payload.contacts():
+            pair = f"{carried.robot}/{carried.body}", carried.other
+            if pair not in hardest or carried.force_N > hardest[pair].force_N:
+                hardest[pair] = carried
 
     def observe(self) -> Observation:
         """Return the present state, with the contacts since the last observation."""
@@ -65,7 +73,7 @@ class Observer:
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
             held=self._held(world.contacts(), goods),
-            contacts=tuple(self._contacts.values()),
+            contacts=tuple(map(_observed, self._contacts.values())),
             moved=self._note_moved(),
             mission_state=mission.state,
             mission_done=mission.done,
@@ -80,7 +88,7 @@ class Observer:
         then, before = self._last.get(stack.name, (now, pose))
         self._last[stack.name] = (now, pose)
         elapsed = (now - then) * 1e-9
-        speed = float(np.hypot(*(pose.xyz - before.xyz)[:2])) / elapsed if elapsed else 0.0
+        speed = math.dist(pose.xyz[:2].tolist(), before.xyz[:2].tolist()) / elapsed if elapsed else 0.0
         return RobotObservation(
             pose=pose,
             estimate=stack.robot_pose.in_map(),
@@ -94,8 +102,13 @@ class Observer:
 
     def _note_moved(self) -> frozenset[str]:
         xyz, quat_wxyz = self._world.body_poses()
-        came = np.linalg.norm(xyz - self._start[0], axis=1) > _MOVED
-        turned = np.abs((quat_wxyz * self._start[1]).sum(axis=1)) < math.cos(_TURNED / 2.0)
+        poses = xyz[self._still].tobytes() + quat_wxyz[self._still].tobytes()
+        if poses == self._still_poses and self._world.savings.unchanged_truth:
+            return self._moved
+        self._still_poses = poses
+        xyz -= self._start[0]
+        came = np.einsum("ij,ij->i", xyz, xyz) > _MOVED**2
+        turned = np.abs(np.einsum("ij,ij->i", quat_wxyz, self._start[1])) < _COS_HALF_TURNED
         new = (came | turned) & self._still
         if new.any():
             self._still &= ~new
@@ -117,6 +130,8 @@ class Observer:
         return held
 
 
-def _observed(contact: Contact) -> ContactObservation:
+def _observed(contact: Contact | ContactObservation) -> ContactObservation:
+    if isinstance(contact, ContactObservation):
+        return contact
     robot, _, body = contact.body1.partition("/")
     return ContactObservation(robot=robot, body=body, other=contact.body2, force_N=contact.force_N)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import gc
 import time
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
@@ -20,6 +21,7 @@ from twin.runtime.defaults import from_description as derive
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
 from twin.runtime.stacks.robot import RobotStack
+from twin.runtime.threads import end_threads
 from twin.savings import ALL, Savings
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import cpu_class, versions
@@ -29,6 +31,8 @@ from twin.scenario.verdict import Verdict
 if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
 
+_MOST_ENDED = 4
+"""Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -48,8 +52,8 @@ class Progress:
 class OpenRun:
     """A run that is under way. Whatever happens, it has to be closed; `finish` does it, too."""
 
-    _have_ended = False
-    """Whether runs of this process have, since it was last rid of them."""
+    _ended: ClassVar[list[weakref.ref[Run]]] = []
+    """Closed runs of this process; some may still be in memory."""
 
     def __init__(
         self,
@@ -87,9 +91,9 @@ class OpenRun:
         Raises:
             TwinError: The run cannot be made.
         """
-        if OpenRun._have_ended:
-            gc.collect()  # such a run is of the oldest generation, which is hardly ever looked at
-            OpenRun._have_ended = False
+        OpenRun._ended[:] = [ended for ended in OpenRun._ended if ended() is not None]
+        if len(OpenRun._ended) >= _MOST_ENDED:
+            end_threads()
         self._digest = RunDigest()
         self._out = out
         self._outside = outside
@@ -127,7 +131,7 @@ class OpenRun:
                 self._sink.declare(parts.world, wheels)
             self._pace = None if pace is None else Pace(pace)
             self._ending = ending.pop_all()
-            OpenRun._have_ended = True  # sooner or later
+            self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
 
     def advance(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph
-from twin.bridge.lockstep.admission import admit_questions
+from twin.bridge.lockstep.protocol import admit_questions
 from twin.bridge.lockstep.stepper import Attendance, Stepper, await_node
 from twin.bridge.lockstep.topic import AnswerConfig, AnswerTopic
 from twin.errors import ScenarioError

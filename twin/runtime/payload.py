@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from itertools import combinations
+from itertools import combinations, starmap
 
 from twin.geometry import Array
 from twin.scenario.observation import ContactObservation
@@ -44,10 +44,15 @@ class Payload:
         To be called at every control tick.
         """
         near: dict[str, list[str]] = {}
-        for contact in self._world.contacts():
-            if contact.body2 in self._weights:
-                near.setdefault(contact.body1.partition("/")[0], []).append(contact.body2)
         stood_at, self._stood_at = self._stood_at, {}
+        for contact in self._world.contacts():
+            good = contact.body2
+            if good in self._weights:
+                robot = contact.body1.partition("/")[0]
+                # What nothing but the robot touches, as in the air, hits nothing.
+                others = [it for it in self._world.neighbours(good) if not it.startswith(f"{robot}/")]
+                if others or good in stood_at or not self._world.savings.unchanged_truth:
+                    near.setdefault(robot, []).append(good)
         return [
             ContactObservation(robot=robot, body=good, other=other, force_N=force, carried=True)
             for robot in sorted(near)
@@ -61,25 +66,27 @@ class Payload:
         What rests on its load belongs to the load.
         """
         load: dict[str, list[Touch]] = {}
-
-        def parted(touches: list[Touch]) -> tuple[list[Touch], list[Touch]]:
-            return _parted(touches, lambda touch: touch.other in load or touch.other.startswith(f"{robot}/"))
-
-        waiting = sorted(goods)
+        links, waiting = f"{robot}/", sorted(goods)
         while waiting:
             good = waiting.pop(0)
             if good in load:
                 continue
             touches = self._world.touches(good)
-            if _is_held(parted(touches)[0], self._weights[good]):
+            own = [push for other, push in touches if other.startswith(links) or other in load]
+            if _is_held(own, self._weights[good]):
                 load[good] = touches
-                waiting += sorted({touch.other for touch in touches} & self._weights.keys())
-        return {good: parted(touches) for good, touches in load.items()}
+                waiting += sorted({other for other, _ in touches if other in self._weights})
+        return {
+            good: _parted(touches, lambda touch: touch.other.startswith(links) or touch.other in load)
+            for good, touches in load.items()
+        }
 
     def _hit(
         self, good: str, own: list[Touch], others: list[Touch], stood_at: Array | None
     ) -> dict[str, float]:
         """Return the forces [N] of what a held good hits."""
+        if not others and stood_at is None:
+            return {}
         weight, here = self._weights[good], self._world.pose(good).xyz
         below, hit = _parted(others, lambda touch: touch.push[2] >= _UPWARDS * _force([touch]))
         if below and stood_at is None:
@@ -99,17 +106,17 @@ def _parted(touches: Iterable[Touch], belongs: Callable[[Touch], bool]) -> tuple
     return parts
 
 
-def _is_held(pushes: Iterable[Touch], weight: float) -> bool:
+def _is_held(pushes: list[Vector], weight: float) -> bool:
     """Whether the pushes of a robot squeeze a good or bear it."""
-    forces = [touch.push for touch in pushes]
-    if not forces or math.fsum(force[2] for force in forces) >= _BORNE * weight:
-        return len(forces) > 0
-    return any(_cosine(a, b) < _OPPOSED for a, b in combinations(forces, 2))
+    if not pushes or math.fsum([push[2] for push in pushes]) >= _BORNE * weight:
+        return len(pushes) > 0
+    return any(starmap(_are_opposed, combinations(pushes, 2)))
 
 
-def _cosine(one: Vector, other: Vector) -> float:
-    sizes = math.hypot(*one) * math.hypot(*other)
-    return math.fsum(a * b for a, b in zip(one, other, strict=True)) / sizes if sizes else 1.0
+def _are_opposed(one: Vector, other: Vector) -> bool:
+    (a, b, c), (x, y, z) = one, other
+    product = a * x + b * y + c * z
+    return product < 0.0 and product < _OPPOSED * (math.hypot(a, b, c) * math.hypot(x, y, z))
 
 
 def _force(touches: Iterable[Touch]) -> float:

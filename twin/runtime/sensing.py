@@ -20,6 +20,8 @@ class SensorSchedule:
         self._sensors = tuple(sensors)
         self._timestep_ns = timestep_ns
         self._periods = [sensor.sensor.spec.period for sensor in self._sensors]
+        self._strides = [period // timestep_ns if not period % timestep_ns else 0 for period in self._periods]
+        """Physics steps from one due time to the next; 0 where these differ."""
         self._steps = [self._step_after(period, 0) for period in self._periods]
         self.next_step = min(self._steps, default=sys.maxsize)
         """The physics step at which a sensor fires next."""
@@ -33,7 +35,10 @@ class SensorSchedule:
         for i, sensor in enumerate(self._sensors):
             if step >= self._steps[i]:
                 sensor.publish(time_ns)
-                self._steps[i] = self._step_after(self._periods[i], time_ns)
+                stride = self._strides[i]
+                self._steps[i] = (
+                    (step // stride + 1) * stride if stride else self._step_after(self._periods[i], time_ns)
+                )
         self.next_step = min(self._steps)
 
     def _step_after(self, period: Period, time_ns: int) -> int:

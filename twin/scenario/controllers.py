@@ -20,7 +20,7 @@ from twin.nodes.navigation.controller_server.config import ControllerServerConfi
 from twin.parameters.declaration import fields_of
 from twin.plugins import Kind
 from twin.scenario.fields import faultless
-from twin.scenario.parameter_group import ParameterGroup, group_of, keys_of
+from twin.scenario.parameter_group import ParameterGroup, key_names, keys_of
 from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_choice, plugin_name
 from twin.scenario.plugins import PluginUse
 from twin.strict_yaml import Fault
@@ -80,7 +80,7 @@ def _critic_names(controller: type, critic: type) -> list[str]:
     return [one.name for one in inside if one.config is not None and issubclass(one.config, critic)]
 
 
-_OF_PLUGIN = {name: group_of(config) for name, config in configs_of(CONTROLLERS).items()}
+_OF_PLUGIN = {name: key_names(config) for name, config in configs_of(CONTROLLERS).items()}
 _OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
 _CRITICS = {
     "mppi": _critic_names(MPPIConfig, CriticConfig),
@@ -91,8 +91,8 @@ _CRITICS = {
 
 def _valid_with(name: str) -> str:
     """Return what a key needs beside it."""
-    owners = [f"`plugin: {plugin}`" for plugin, group in _OF_PLUGIN.items() if name in group.model_fields]
-    if name in _OF_SHIM.model_fields:
+    owners = [f"`plugin: {plugin}`" for plugin, names in _OF_PLUGIN.items() if name in names]
+    if name in _OF_SHIM:
         owners.append("`rotation_shim: true`")
     return " or ".join(owners)
 
@@ -106,7 +106,7 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
     @classmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys of the server, the checkers, and the rotation shim if it is asked for."""
-        shim = _OF_SHIM.model_fields if data.get("rotation_shim") is True else {}
+        shim = _OF_SHIM if data.get("rotation_shim") is True else ()
         return {*ServerParameters.model_fields, *PluginParameters.model_fields, *shim}
 
     @classmethod
@@ -130,13 +130,8 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
         if self.chosen == "rotation_shim":
             yield Fault(("plugin",), "the rotation shim stands before a plugin: write 'rotation_shim: true'")
             return
-        groups: list[type[ParameterGroup]] = [
-            ServerParameters,
-            PluginParameters,
-            *([_OF_PLUGIN[self.chosen]] if self.users is None else []),
-            *([_OF_SHIM] if self.shim else []),
-        ]
-        valid = {name for group in groups for name in group.model_fields}
+        valid = {*ServerParameters.model_fields, *PluginParameters.model_fields}
+        valid.update(_OF_PLUGIN[self.chosen] if self.users is None else (), _OF_SHIM if self.shim else ())
         for name in type(self).model_fields:
             if name in self.model_fields_set and name not in valid:
                 told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
@@ -144,7 +139,7 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
 
         kinds: dict[str, Kind[Any]] = {"goal_checker": GOAL_CHECKERS, "progress_checker": PROGRESS_CHECKERS}
         for key, configs in kinds.items():
-            having = {kind: group_of(config).model_fields for kind, config in configs_of(configs).items()}
+            having = {kind: key_names(config) for kind, config in configs_of(configs).items()}
             chosen = getattr(self, key) or "simple"
             own = {} if isinstance(chosen, PluginUse) else having[chosen]
             for name in dict.fromkeys(name for names in having.values() for name in names):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twin.geometry import Array, Pose2
-from twin.navigation.docking.detectors import Detector
+from twin.navigation.docking.faces import Detector
 from twin.plugins import Kind, Plugin, require_finite
 from twin.scenario.plugins import OneOfKind, with_shipped
 
 DETECTORS: Kind[Detector] = Kind(
-    "detector", base="twin.navigation.docking.detectors:Detector", group="twin.detectors"
+    "detector", base="twin.navigation.docking.faces:Detector", group="twin.detectors"
 )
-DETECTORS.register("box_faces", "twin.navigation.docking.detectors:BoxFaces")
+DETECTORS.register("box_faces", "twin.navigation.docking.faces:BoxFaces")
 
 
 @with_shipped

@@ -2,69 +2,29 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.navigation.localisation.ekf import EkfConfig
-from twin.nodes.navigation.localisation.ekf_config import SOURCE, EkfNodeConfig, EkfSource
-from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.parameters import Metres, NotNegative, Radians
-from twin.parameters.placed import overridden
 from twin.scenario.fields import FileBeside, NameOrPath, PoseConfig
-from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.strict_yaml import StrictModel
+from twin.strict_yaml.later import found, later
+
+_AMCL, _EKF, _SLAM = (
+    f"twin.scenario.estimators.{name.lower()}:{name}Parameters" for name in ("Amcl", "Ekf", "Slam")
+)
+if TYPE_CHECKING:
+    from twin.scenario.estimators.amcl import AmclParameters
+    from twin.scenario.estimators.ekf import EkfParameters
+    from twin.scenario.estimators.slam import SlamParameters
+else:
+    AmclParameters, EkfParameters, SlamParameters = map(later, (_AMCL, _EKF, _SLAM))
 
 
-class _Checked(ParameterGroup):
-    """Parameters that must fit together, and to the defaults of a config."""
-
-    among: ClassVar[type]
-
-    @model_validator(mode="after")
-    def _can_be(self) -> Self:
-        overridden(self.among(), self.overrides())
-        return self
-
-
-@keys_of(AmclConfig)
-class AmclParameters(_Checked):
-    """Parameters of `/amcl`."""
-
-    among = AmclConfig
-
-
-@keys_of(SlamNodeConfig)
-class SlamParameters(_Checked):
-    """Parameters of `/slam_toolbox`."""
-
-    among = SlamNodeConfig
-
-
-@keys_of(EkfSource)
-class EkfSourceParameters(ParameterGroup):
-    """A source of `/ekf_filter_node`; of its keys those count that robot_localization has for its kind."""
-
-
-def _source_name(name: str) -> str:
-    if not re.fullmatch(SOURCE, name):
-        raise ValueError("a source is called odom0, pose0, twist0, imu0, odom1...")
-    return name
-
-
-SourceName = Annotated[str, AfterValidator(_source_name)]
-
-
-@keys_of(EkfNodeConfig)
-class EkfParameters(_Checked):
-    """Parameters of `/ekf_filter_node`."""
-
-    among = EkfConfig
-    sources: Mapping[SourceName, EkfSourceParameters] = {}
-    """What it listens to besides, or instead of, `odom0` (wheels) and `imu0`."""
+def _untouched(group: str) -> Any:
+    """Return the default of a group: no parameter is given."""
+    return Field(default_factory=lambda: found(group).model_construct())
 
 
 class InitialPoseError(StrictModel):
@@ -90,7 +50,7 @@ class EkfOdometry(StrictModel):
     """`ekf`"""
     params_file: FileBeside | None = None
     """A parameter file of robot_localization; absent: that of `navigation`, if it has a filter."""
-    parameters: EkfParameters = EkfParameters.model_construct()
+    parameters: EkfParameters = _untouched(_EKF)
     """Overrides of the filter's parameters, and of the file's."""
 
 
@@ -127,7 +87,7 @@ class AmclLocalisation(StrictModel):
     looks for itself on the whole map (nav2_amcl's `set_initial_pose: false`)."""
     initial_pose_error: InitialPoseError = InitialPoseError.model_construct()
     """How wrong the first guess is."""
-    parameters: AmclParameters = AmclParameters.model_construct()
+    parameters: AmclParameters = _untouched(_AMCL)
     """Overrides of the filter's parameters."""
 
 
@@ -146,7 +106,7 @@ class SlamLocalisation(StrictModel):
     """The robot's pose in `map` at the start; absent: that in the world, so that both frames are one."""
     initial_pose_error: InitialPoseError = InitialPoseError.model_construct()
     """How wrong that is."""
-    parameters: SlamParameters = SlamParameters.model_construct()
+    parameters: SlamParameters = _untouched(_SLAM)
     """Overrides of the node's parameters, and of the file's."""
 
     @model_validator(mode="after")

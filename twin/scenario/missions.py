@@ -14,7 +14,7 @@ from pydantic import (
     ValidationInfo,
     ValidatorFunctionWrapHandler,
 )
-from pydantic_core import CoreSchema, core_schema, to_json
+from pydantic_core import CoreSchema, core_schema
 
 from twin.nodes.missions.random_goals_config import RandomGoalsConfig
 from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
@@ -33,6 +33,7 @@ from twin.scenario.fields import OneOf
 from twin.scenario.parameter_group import ParameterGroup, keys_of
 from twin.scenario.plugins import PluginUse, use
 from twin.strict_yaml import StrictModel
+from twin.strict_yaml.later import later_schema
 
 if TYPE_CHECKING:
     from twin.nodes.missions.mission_node import MissionNode
@@ -235,33 +236,38 @@ class UserMission(StrictModel):
         return PluginUse(reference=self.type, params=self.model_extra or {})
 
 
+def _schema_of(model: type[StrictModel]) -> CoreSchema:
+    return later_schema(lambda: model)
+
+
 class _OrAUsers:
     """Metadata of `Mission`: a type that does not ship is a plugin's."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        shipped = handler.generate_schema(_Shipped)
+        each = {name: _schema_of(model) for name, model in _BY_NAME.items()}
+        shipped = core_schema.tagged_union_schema(each, "type")
         return core_schema.with_info_wrap_validator_function(self._validate, shipped)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [handler(core), UserMission.model_json_schema()]}
+        ships: TypeAdapter[Any] = TypeAdapter(Annotated[_Ships, Field(discriminator="type")])
+        return {"anyOf": [handler(ships.core_schema), UserMission.model_json_schema()]}
 
-    def _validate(self, data: Any, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+    def _validate(self, data: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if isinstance(data, StrictModel):
             return data
         named = data.get("type") if isinstance(data, Mapping) else None
         name = named if isinstance(named, str) else ""
         if name in MISSIONS.shipped or not (":" in name or name in MISSIONS.names()):
-            # Through JSON again: what comes to a validator is Python's, whose lists are strictly no tuples.
-            return _SHIPPED.validate_json(to_json(data), strict=True, context=info.context)
+            return handler(data)
         params = {key: value for key, value in data.items() if key not in ("type", "robot")}
         used = use(MISSIONS, name, params, info, named_at=("type",))
         return UserMission.model_validate({**data, "type": used.reference}, strict=True)
 
 
 _Ships = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle
-for _mission in get_args(_Ships):
-    (_name,) = get_args(_mission.model_fields["type"].annotation)
+_BY_NAME = {get_args(one.model_fields["type"].annotation)[0]: one for one in get_args(_Ships)}
+for _name in _BY_NAME:
     MISSIONS.register(_name, f"twin.runtime.stacks.missions:{_name}")
-_Shipped = Annotated[_Ships, Field(discriminator="type")]
-_SHIPPED: TypeAdapter[Any] = TypeAdapter(_Shipped)
+
+
 Mission = Annotated[_Ships | UserMission, _OrAUsers()]

@@ -1,4 +1,4 @@
-"""What a scenario may override of a robot's navigation; names are Nav2's.
+"""What a scenario may override of a robot's navigation; names are Nav2's, those of planners of its plugins.
 
 Every one is optional: `overrides()` holds only what the file gives, the rest keeps the node's default.
 """
@@ -8,21 +8,82 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from twin.navigation.costmaps.costmap_config import LAYERS as SHIPPED_LAYERS
-from twin.navigation.plugins import LAYERS, TREE_NODES
+from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
+from twin.navigation.plugins import LAYERS, PLANNERS, SMOOTHERS, TREE_NODES, configs_of
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
+from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
 from twin.scenario.fields import NameOrPath
-from twin.scenario.parameter_group import keys_of
-from twin.scenario.planners import PlannerParameters, SmootherParameters
-from twin.scenario.plugin_groups import PluginListGroup
+from twin.scenario.parameter_group import ParameterGroup, key_names, keys_of
+from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_name
 from twin.strict_yaml import StrictModel
+
+
+@keys_of(PlannerServerConfig, CommitmentConfig, GoalAccessConfig)
+class PlannerServerParameters(ParameterGroup):
+    """What holds for every planner."""
+
+    plugin: plugin_name(PLANNERS) = "theta_star"  # type: ignore[valid-type]
+    """8-connected A* (`grid_based`); any-angle Theta* (`theta_star`); Hybrid-A* for robots with a turning
+    circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
+
+
+_KEYS = {plugin: key_names(config) for plugin, config in configs_of(PLANNERS).items()}
+
+
+@keys_of(*configs_of(PLANNERS).values())
+class PlannerParameters(PluginGroup, PlannerServerParameters):
+    """Parameters of `/planner_server`: which planner `GridBased` is, and that planner's own."""
+
+    of = PLANNERS
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the keys of the server."""
+        return set(PlannerServerParameters.model_fields)
+
+    @classmethod
+    def _descriptions(cls) -> Mapping[str, str]:
+        """Return what is told of the keys, and which plugins have them."""
+        told = dict(super()._descriptions())
+        for name in told:
+            owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if name in own]
+            if 0 < len(owners) < len(_KEYS):
+                told[name] = f"{' and '.join(owners)}: {told[name]}"
+        return told
+
+    @model_validator(mode="after")
+    def _belongs_to_the_plugin(self) -> PlannerParameters:
+        if self.users is not None:
+            return self
+        valid = {*PlannerServerParameters.model_fields, *_KEYS[self.plugin]}
+        for name in sorted(self.model_fields_set - valid):
+            others = " or ".join(plugin for plugin, own in _KEYS.items() if name in own)
+            raise ValueError(
+                f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
+            )
+        return self
+
+
+@keys_of(*configs_of(SMOOTHERS).values())
+class SmootherParameters(PluginGroup):
+    """Parameters of `/smoother_server`: its first smoother, which also smooths what a planner has planned."""
+
+    of = SMOOTHERS
+    plugin: plugin_name(SMOOTHERS) = "simple_smoother"  # type: ignore[valid-type]
+    """`simple_smoother`, `savitzky_golay`, or a plugin of yours, whose parameters stand beside it."""
+
+    @classmethod
+    def beside(cls, data: Mapping[str, Any]) -> set[str]:
+        """Return the key that names the plugin."""
+        return {"plugin"}
 
 
 @keys_of(CostmapNodeConfig)

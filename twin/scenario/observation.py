@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 from twin.errors import ScenarioError, nearest
@@ -108,6 +109,11 @@ class Zone:
     """Extent along its own x and y [m]."""
     height: float = 0.0
     """Height of the surface [m]."""
+
+    @cached_property
+    def T_zone_world(self) -> Pose2:
+        """What maps the world to the zone."""
+        return self.centre.inverse()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -17,6 +17,7 @@ from twin.parameters.declaration import Declaration, fields_of
 from twin.parameters.placed import overridden
 from twin.scenario.fields import NameOrPath
 from twin.strict_yaml import StrictModel
+from twin.strict_yaml.later import later
 
 C = TypeVar("C")
 G = TypeVar("G", bound="ParameterGroup")
@@ -98,6 +99,12 @@ def group_of(config: type) -> type[ParameterGroup]:
     return keys_of(config)(type(name, (ParameterGroup,), body))
 
 
+@cache
+def key_names(config: type) -> tuple[str, ...]:
+    """Return the keys of a config's group, which is not made for that."""
+    return tuple(one.name for one in _keyed(config) if _key(one) is not None)
+
+
 def _keyed(config: type) -> Iterator[Declaration]:
     """Yield the fields of a config that scenarios have keys for, and those of configs without a section."""
     for declaration in fields_of(config).values():
@@ -109,9 +116,8 @@ def _keyed(config: type) -> Iterator[Declaration]:
 
 def _key(declaration: Declaration, *, whole: bool = False) -> tuple[Any, Any] | None:
     """Return the type of a key, and its default."""
-    if declaration.config is not None:
-        inner = group_of(declaration.config)
-        return (inner, inner.model_construct()) if inner.model_fields else None
+    if (config := declaration.config) is not None:
+        return (later(partial(group_of, config)), None) if key_names(config) else None
     domain = declaration.domain
     if domain is None:
         return None

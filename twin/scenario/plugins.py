@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import (
     AfterValidator,
     ConfigDict,
-    Field,
     GetJsonSchemaHandler,
     ValidationInfo,
     create_model,
@@ -23,6 +23,7 @@ from twin.parameters.texts import texts_of
 from twin.plugins import Kind, Plugin
 from twin.scenario.fields import OneOf
 from twin.strict_yaml import Fault, Faults, Loc, StrictModel, findings
+from twin.strict_yaml.later import later
 
 K = TypeVar("K", bound="OneOfKind")
 
@@ -147,6 +148,9 @@ class OneOfKind(OneOf):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         reference = super().__get_pydantic_json_schema__(core, handler)
         schema = handler.resolve_ref_schema(reference)
+        for name, model in _shipped(cls.of).items():
+            summary = (model().__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+            schema["properties"][name].setdefault("description", summary)
         params = {"type": ["object", "null"]}
         for name in cls.of.names():
             schema["properties"].setdefault(name, params)
@@ -186,11 +190,17 @@ class OneOfKind(OneOf):
 
 def with_shipped(base: type[K]) -> type[K]:
     """Return a `OneOfKind` with a key for each thing that ships, beside any other name."""
-    fields: dict[str, Any] = {}
-    for shipped in base.of.shipped:
-        config = base.of.find(shipped).config
-        assert config is not None
-        model = config if issubclass(config, StrictModel) else _schema(config)
-        summary = (config.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
-        fields[shipped] = (Annotated[model | None, Field(description=summary)], None)
+    fields: dict[str, Any] = {name: (later(model) | None, None) for name, model in _shipped(base.of).items()}
     return create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
+
+
+def _shipped(kind: Kind[Any]) -> dict[str, Callable[[], type[StrictModel]]]:
+    """Return what makes the model of each thing that ships, by name."""
+    return {name: partial(_model_of, kind, name) for name in kind.shipped}
+
+
+@cache
+def _model_of(kind: Kind[Any], shipped: str) -> type[StrictModel]:
+    config = kind.find(shipped).config
+    assert config is not None
+    return config if issubclass(config, StrictModel) else _schema(config)

@@ -53,7 +53,8 @@ class ContactSensor(Sensor):
 
     def sample(self, time_ns: int) -> ContactReading:
         """Feel."""
-        body, every = self.mount.body, self.mount.world.contacts()
+        every = self.mount.world.contacts()
+        body = self.mount.body if every else ""
         mine = [contact for contact in every if body in (contact.body1, contact.body2)]
         touched = tuple(other.body2 if other.body1 == body else other.body1 for other in mine)
         force = sum((contact.force_N for contact in mine), 0.0)

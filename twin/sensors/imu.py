@@ -23,7 +23,7 @@ from twin.models.urdf.sensors import Common, deviation
 from twin.sensors.sensor import Sensor
 from twin.sim.sensors import Mount
 
-_BODY = mujoco.mjtObj.mjOBJ_XBODY
+_BODY = int(mujoco.mjtObj.mjOBJ_XBODY)
 _NO_ORIENTATION = np.array([-1.0] + [0.0] * 8)
 _NO_ORIENTATION.flags.writeable = False
 """REP-145: this sensor gives no orientation."""
@@ -95,6 +95,7 @@ class Imu(Sensor):
         self._bias = spec.gyro_bias_stddev * mount.noise(spec.name, "gyro_bias").normal(0, 3)
         self._sigma = np.repeat([spec.gyro_noise_stddev, spec.accel_noise_stddev], 3)
         self._twist, self._acceleration = np.zeros(6), np.zeros(6)
+        self._rate, self._force = self._twist[:3], self._acceleration[3:]
 
     def sample(self, time_ns: int) -> ImuReading:
         """Measure."""
@@ -102,11 +103,12 @@ class Imu(Sensor):
         world.refresh_motion()
         mujoco.mj_objectVelocity(world.model, world.data, _BODY, self._body, self._twist, 1)
         mujoco.mj_objectAcceleration(world.model, world.data, _BODY, self._body, self._acceleration, 1)
-        noise = self._sigma * self._normal(time_ns, 6)
+        noise = self._normal(time_ns, 6)
+        noise *= self._sigma
         return ImuReading(
             time_ns=time_ns,
-            angular_velocity=self._twist[:3] + self._bias + noise[:3],
-            linear_acceleration=self._acceleration[3:] + noise[3:],
+            angular_velocity=self._rate + self._bias + noise[:3],
+            linear_acceleration=self._force + noise[3:],
         )
 
     @classmethod

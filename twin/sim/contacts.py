@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+
+from twin.savings import ALL, Savings
 
 Vector = tuple[float, float, float]
 
@@ -41,15 +42,22 @@ _FLOOR = -2
 class ContactReader:
     """Finds the few contacts that matter among all contacts of a world, by masks over geoms."""
 
-    def __init__(self, model: mujoco.MjModel, owners: Sequence[str], robot_of_geom: Sequence[int]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        owners: Sequence[str],
+        robot_of_geom: Sequence[int],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to a model.
 
         Args:
             model: The compiled world.
             owners: Name of the body or static that each geom belongs to.
             robot_of_geom: Index of the robot that each geom belongs to, -1 for none, -2 for the floor.
+            savings: What is not done over again.
         """
-        self._model = model
+        self._model, self._savings = model, savings
         self._owners = tuple(owners)
         self._names = tuple(model.geom(i).name or f"geom {i}" for i in range(model.ngeom))
         self._robot = np.array(robot_of_geom, dtype=np.int32)
@@ -59,6 +67,8 @@ class ContactReader:
         self._elliptic = bool(model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
         self._touching = b""
         """Geoms of all contacts; on most ticks those of the last one, such as wheels on the floor."""
+        self._forces: list[float | None] | None = None
+        """The normal force of each contact [N]; None where it does not act. None: not looked at yet."""
         self._pairs: list[tuple[int, tuple[str, str], tuple[str, str]]] = []
         """Of these the contacts that matter: index, names of the bodies and of the geoms."""
         self._of_body: dict[str, list[tuple[int, bool, str]]] = {}
@@ -66,9 +76,6 @@ class ContactReader:
 
     def read(self, data: mujoco.MjData) -> list[Contact]:
         """Return what robots touch except for themselves and the floor, one entry for each pair of bodies."""
-        if data.ncon == 0:
-            return []
-        self._look(data)
         if not self._pairs:
             return []
         forces = self._normal_forces(data)
@@ -82,28 +89,33 @@ class ContactReader:
 
     def touches(self, data: mujoco.MjData, body: str) -> list[Touch]:
         """Return what touches a body, point by point, whatever it is."""
-        if data.ncon == 0:
+        contacts = self._contacts_with(data, body)
+        if not contacts:
             return []
-        self._look(data)
-        if body not in self._of_body:
-            self._of_body[body] = list(self._contacts_of(body, data.contact.geom))
-        forces, normals = self._normal_forces(data), data.contact.frame
+        forces, normals = self._normal_forces(data), data.contact.frame[:, :3].tolist()
         touches = []
-        for index, is_first, other in self._of_body[body]:
+        for index, is_first, other in contacts:
             size = forces[index]
             if size is not None:
-                x, y, z, *_ = normals[index].tolist()
+                x, y, z = normals[index]
                 force = -size if is_first else size  # normals point from the first geom to the second
                 touches.append(Touch(other, (force * x, force * y, force * z)))
         return touches
 
-    def _look(self, data: mujoco.MjData) -> None:
-        """Find out which contacts matter, if other geoms touch than before."""
+    def neighbours(self, data: mujoco.MjData, body: str) -> list[str]:
+        """Return the names of what touches a body, or is about to, as often as there are points."""
+        return [other for _, _, other in self._contacts_with(data, body)]
+
+    def look(self, data: mujoco.MjData) -> None:
+        """Take in the contacts of another physics step: which matter, if other geoms touch than before."""
+        self._forces = None
         geoms = data.contact.geom
         touching = geoms.tobytes()
-        if touching == self._touching:
+        if touching == self._touching and self._savings.unchanged_truth:
             return
         self._touching, self._of_body, self._pairs = touching, {}, []
+        if not touching:
+            return
         robots = self._robot[geoms]
         for index in np.flatnonzero(self._matters[robots[:, 0], robots[:, 1]]).tolist():
             a, b = geoms[index].tolist()
@@ -112,21 +124,26 @@ class ContactReader:
             bodies, names = (self._owners[a], self._owners[b]), (self._names[a], self._names[b])
             self._pairs.append((index, bodies, names))
 
-    def _contacts_of(self, body: str, geoms: NDArray[np.int32]) -> Iterator[tuple[int, bool, str]]:
-        for index, pair in enumerate(geoms.tolist()):
-            first, second = (self._owners[geom] for geom in pair)
-            if (first == body) != (second == body):
-                yield index, first == body, second if first == body else first
+    def _contacts_with(self, data: mujoco.MjData, body: str) -> list[tuple[int, bool, str]]:
+        found = self._of_body.get(body)
+        if found is None:
+            found = self._of_body[body] = []
+            for index, pair in enumerate(data.contact.geom.tolist()):
+                first, second = (self._owners[geom] for geom in pair)
+                if (first == body) != (second == body):
+                    found.append((index, first == body, second if first == body else first))
+        return found
 
     def _normal_forces(self, data: mujoco.MjData) -> list[float | None]:
-        """Return the normal force of each contact [N]; None where it does not act."""
+        if self._forces is not None:
+            return self._forces
         addresses = data.contact.efc_address.tolist()
         if self._elliptic:
             rows = data.efc_force.tolist()  # the first of a contact; asking MuJoCo one by one takes longer
-            return [rows[address] if address >= 0 else None for address in addresses]
-        force = np.zeros(6)
-        found: list[float | None] = []
+            self._forces = [rows[address] if address >= 0 else None for address in addresses]
+            return self._forces
+        force, self._forces = np.zeros(6), []
         for index, address in enumerate(addresses):
             mujoco.mj_contactForce(self._model, data, index, force)
-            found.append(float(force[0]) if address >= 0 else None)
-        return found
+            self._forces.append(float(force[0]) if address >= 0 else None)
+        return self._forces

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from twin.convert import mujoco_log as mujoco_log
 from twin.errors import SimulationError
 from twin.geometry import Array
 
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # to convert an enum takes longer than to copy
 _BAD = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -29,7 +30,9 @@ class DivergenceGuard:
         self._model = model
         self._data = data
         self._warnings = [data.warning[kind] for kind in _BAD]
-        self._zeros = np.zeros(model.nv)
+        counts = data.warning.number
+        self._bad = counts[_BAD[0] : _BAD[-1] + 1]  # a view: to ask for each number takes longer
+        self._none, self._velocity = self._bad.tobytes(), data.qvel
         self._size = mujoco.mj_stateSize(model, _STATE)
         self._states = deque[Array](maxlen=capacity)
         """The states kept, oldest first."""
@@ -50,10 +53,8 @@ class DivergenceGuard:
         Raises:
             SimulationError: Names the joint or body at fault, the time, and the file.
         """
-        position, velocity, acceleration = self._warnings
-        warned = position.number or velocity.number or acceleration.number
-        # Nothing but a number that is not finite makes zeros times numbers other than zero.
-        if not warned and self._data.qvel.dot(self._zeros) == 0.0:
+        # A number that is not finite makes the sum one, too.
+        if self._bad.tobytes() == self._none and math.isfinite(sum(self._velocity.tolist())):
             return
         what, part = self._replay()
         time = self._data.time
@@ -62,7 +63,7 @@ class DivergenceGuard:
             folder.mkdir(parents=True, exist_ok=True)
             file = folder / "diverged.npz"
             states = np.array(self._states)
-            np.savez(file, states=states, times=states[:, 0], state_spec=int(_STATE))
+            np.savez(file, states=states, times=states[:, 0], state_spec=_STATE)
             message += f"; the last {len(states)} states are in {file}"
         hint = "check masses, inertias and commands there, or take a smaller physics step"
         raise SimulationError(f"{message}; {hint}")

@@ -14,7 +14,7 @@ from twin.convert import convert
 from twin.convert.conversion import Conversion
 from twin.errors import ModelError, Problem, SimulationError
 from twin.geometry import Array
-from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
+from twin.models.checks.drive import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.description import RobotDescription
 from twin.models.dynamics import STANDARD_GRAVITY
 from twin.models.specs import DriveSpec

@@ -17,6 +17,8 @@ from twin.errors import SimulationError, nearest
 from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.models.kinematics import ONE_DOF
+from twin.savings import ALL, Savings
+from twin.sim.indices import Indices, indices
 from twin.sim.noise import NoiseStream
 from twin.sim.servos import EffortServos, PositionServos
 
@@ -49,10 +51,10 @@ class JointReading(NamedTuple):
     """What the drives move each joint with; a drive moves those that mimic its joint as hard [Nm] or [N]."""
 
 
-def _reading(*measured: Array) -> JointReading:
-    for values in measured:
-        values.flags.writeable = False  # who asks twice at one time is given the same
-    return JointReading(*measured)
+def _reading(position: Array, velocity: Array, effort: Array) -> JointReading:
+    for values in (position, velocity, effort):
+        values.setflags(write=False)  # who asks twice at one time is given the same
+    return JointReading(position, velocity, effort)
 
 
 class Hardware:
@@ -71,6 +73,7 @@ class Hardware:
         seed: int,
         config: HardwareConfig | None = None,
         command_latency: float = 0.0,
+        savings: Savings = ALL,
     ) -> None:
         """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
@@ -78,8 +81,8 @@ class Hardware:
         self._timestep = float(model.opt.timestep)
         self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in ONE_DOF)
         joints = [model.joint(f"{robot}/{name}") for name in self.joint_names]
-        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
-        self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
+        self._qpos = indices(joint.qposadr[0] for joint in joints)
+        self._dof = indices(joint.dofadr[0] for joint in joints)
         kinds = [description.joints[name].type for name in self.joint_names]
         self._encoders = {
             i: int(joints[i].qposadr[0]) for i, kind in enumerate(kinds) if kind == "continuous"
@@ -107,6 +110,7 @@ class Hardware:
         self._actuators = np.array(
             [i for i in range(model.nu) if model.actuator(i).name.startswith(prefix)], dtype=np.intp
         )
+        self._ctrl = indices(self._actuators)
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
         self._commands: list[float] = data.ctrl[self._actuators].tolist()
@@ -116,7 +120,7 @@ class Hardware:
         self._wheels = _WheelServos(
             model, data, self._actuators, np.isin(names, list(wheels)), self.config.wheel_integral_gain
         )
-        self._positions = PositionServos(model, data, self._actuators)
+        self._positions = PositionServos(model, data, self._actuators, savings)
         by_effort = [
             command
             for name, command in description.commands.items()
@@ -146,14 +150,16 @@ class Hardware:
             return self._reading
         data, tick, n = self._data, self._tick, len(self.joint_names)
         elapsed = (step - self._step) * self._timestep
-        measured = self._noise_stddev * self._noise.normal(step, 2 * n)
-        measured += np.concatenate((data.qpos[self._qpos], data.qvel[self._dof]))
+        noise = self._noise_stddev * self._noise.normal(step, 2 * n)
+        position, velocity = noise[:n], noise[n:]
+        position += data.qpos[self._qpos]
+        velocity += data.qvel[self._dof]
         for i in self._encoders:  # one by one: for a few wheels arrays cost several times as much
             count = self._count(i)
-            measured[i], measured[n + i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
+            position[i], velocity[i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
             self._counts[i] = count
         effort = data.qfrc_actuator[self._drive_dof] * self._drive_share
-        self._step, self._reading = step, _reading(measured[:n], measured[n:], effort)
+        self._step, self._reading = step, _reading(position, velocity, effort)
         return self._reading
 
     def command(self, joint: str, value: float) -> None:
@@ -195,7 +201,7 @@ class Hardware:
         self._wheels.apply(commands)
         self._positions.apply(commands)
         self._efforts.apply(commands)
-        self._data.ctrl[self._actuators] = commands
+        self._data.ctrl[self._ctrl] = commands
 
     def miscount(self, joint: str, angle: float) -> None:
         """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
@@ -242,12 +248,12 @@ class Hardware:
 
     def _drives(
         self, model: mujoco.MjModel, robot: str, description: RobotDescription
-    ) -> tuple[NDArray[np.intp], Array]:
+    ) -> tuple[Indices, Array]:
         """Return for each joint the velocity address of the joint whose drive moves it, and its share."""
         found = [leader_of(description, name) for name in self.joint_names]
         dofs = [model.joint(f"{robot}/{leader}").dofadr[0] for leader, _ in found]
         shares = [np.sign(share) / drive_ratio(description, leader) for leader, share in found]
-        return np.array(dofs, dtype=np.intp), np.array(shares)
+        return indices(dofs), np.array(shares)
 
     def _arrived(self) -> list[float]:
         """Send the present commands on their way; return the newest ones that have arrived."""
@@ -288,7 +294,7 @@ class _WheelServos:
         self._which: list[int] = np.flatnonzero(turning).tolist()
         actuators = actuators[turning]
         joints = model.actuator_trnid[actuators, 0]
-        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._qpos, self._dof = indices(model.jnt_qposadr[joints]), indices(model.jnt_dofadr[joints])
         torques = [_torque_limit(model, i) for i in actuators]
         damping = (-model.actuator_biasprm[actuators, 2]).tolist()
         self._reach = [torque / slope for torque, slope in zip(torques, damping, strict=True)]
@@ -310,18 +316,20 @@ class _WheelServos:
         now = float(data.time)
         elapsed = now - self._time
         position, speed = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
-        # Numbers one by one: for a few wheels arrays cost five times as much.
-        for i, (actuator, reach, fastest) in enumerate(
-            zip(self._which, self._reach, self._fastest, strict=True)
-        ):
-            owed = self._owed[i] + self._command[i] * elapsed - (position[i] - self._position[i])
-            command = min(max(commands[actuator], -fastest), fastest)
-            low = max(speed[i] - reach, -fastest) - command
-            high = min(speed[i] + reach, fastest) - command
+        gain, last, owing, before = self._gain, self._command, self._owed, self._position
+        # Numbers one by one: for a few wheels arrays cost five times as much, and min and max as much again.
+        for i, actuator in enumerate(self._which):
+            reach, fastest, command = self._reach[i], self._fastest[i], commands[actuator]
+            owed = owing[i] + last[i] * elapsed - (position[i] - before[i])
+            command = -fastest if command < -fastest else fastest if command > fastest else command
+            low, high = speed[i] - reach, speed[i] + reach
+            low = (-fastest if low < -fastest else low) - command
+            high = (fastest if high > fastest else high) - command
             # Where the command alone is out of reach, nothing is owed.
-            self._owed[i] = min(max(owed, min(low, 0.0) / self._gain), max(high, 0.0) / self._gain)
-            self._command[i] = command
-            commands[actuator] = command + self._gain * self._owed[i]
+            least, most = (low / gain if low < 0.0 else 0.0), (high / gain if high > 0.0 else 0.0)
+            owing[i] = owed = least if owed < least else most if owed > most else owed
+            last[i] = command
+            commands[actuator] = command + gain * owed
         self._position, self._time = position, now
 
 

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
+from twin.savings import ALL, Savings
+from twin.sim.indices import indices
 
 _SPARE = 1.25
 """A servo's damping at the velocity limit, in effort limits: so that with the target as far ahead of a
@@ -67,15 +69,21 @@ class PositionServos:
     as that allows: one that ran ahead of a blocked joint would let it shoot off when it is free again.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, actuators: NDArray[np.intp]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        actuators: NDArray[np.intp],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to those of `actuators` that `keep_velocity_limit` made; changes `slewmax` in `model`."""
-        self._data = data
+        self._data, self._always = data, not savings.unchanged_drives
         is_kept = model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID
         kept = actuators[is_kept]
         joints = model.actuator_trnid[kept, 0]
         self._which: list[int] = np.flatnonzero(is_kept).tolist()
-        self._kept, self._target = kept, model.actuator_actadr[kept]
-        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._kept, self._target = kept, indices(model.actuator_actadr[kept])
+        self._qpos, self._dof = indices(model.jnt_qposadr[joints]), indices(model.jnt_dofadr[joints])
         self._slewmax = model.actuator_dynprm[:, _SLEWMAX]
         fastest = self._slewmax[kept]
         ahead = fastest * model.actuator_biasprm[kept, 2] / model.actuator_biasprm[kept, 1]
@@ -94,20 +102,23 @@ class PositionServos:
         position, velocity = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
         before = data.act[self._target].tolist()
         targets, speeds = before.copy(), self._speeds.copy()
-        # Numbers one by one: for a few joints arrays cost several times as much.
-        for i, (which, here, fastest, ahead) in enumerate(
-            zip(self._which, position, self._fastest, self._ahead, strict=True)
-        ):
-            targets[i] = min(max(targets[i], here - ahead), here + ahead)
+        # Numbers one by one: for a few joints arrays cost several times as much, and min and max again.
+        for i, which in enumerate(self._which):
+            here, fastest, ahead = position[i], self._fastest[i], self._ahead[i]
+            target, moves, command = before[i], velocity[i], commands[which]
+            least, most = here - ahead, here + ahead
+            targets[i] = target = least if target < least else most if target > most else target
             # where the joint will be at the end of the tick
-            there = here + elapsed * min(max(velocity[i], -fastest), fastest)
-            commands[which] = min(max(commands[which], there - ahead), there + ahead)
+            there = here + elapsed * (-fastest if moves < -fastest else fastest if moves > fastest else moves)
+            least, most = there - ahead, there + ahead
+            commands[which] = command = least if command < least else most if command > most else command
             if elapsed > 0.0:
-                speeds[i] = min(abs(commands[which] - targets[i]) / elapsed, fastest)
+                speed = abs(command - target) / elapsed
+                speeds[i] = fastest if fastest < speed else speed
         # An arm is at rest most of the time: what is as it was is not written again.
-        if targets != before:
+        if targets != before or self._always:
             data.act[self._target] = targets
-        if speeds != self._speeds:
+        if speeds != self._speeds or self._always:
             self._slewmax[self._kept], self._speeds = speeds, speeds
 
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-_ROWS = 128
-"""States that are noted before they are added up."""
+_MOST = 256
+"""Arrays that are noted before they are added up."""
 
 
 class WorkMeter:
@@ -28,39 +28,34 @@ class WorkMeter:
         self._dofs = model.jnt_dofadr[joints]
         self._of = {robot: np.array([owner == robot for owner in owners], dtype=bool) for robot in robots}
         self._work = np.zeros(len(joints))
-        # A row for the state before physics steps, then one for each; row, first row of these steps.
-        self._forces, self._velocities = np.zeros((_ROWS, model.nv)), np.zeros((_ROWS, model.nv))
-        self._row = self._first = 0
-        self._noted: list[tuple[int, int]] = []
+        # Force and velocity before physics steps, then after each: as bytes an array is copied for least.
+        self._noted: list[bytes] = []
+        self._steps, self._arrays = 0, 2
+        """Of each call whose states are noted."""
 
     def begin(self, steps: int) -> None:
         """Note the state before so many physics steps."""
-        if self._row + steps >= len(self._forces):
+        noted = len(self._noted)
+        if steps != self._steps or noted >= _MOST or noted % self._arrays:
             self._add_up()
-        if steps >= len(self._forces):
-            self._forces, self._velocities = (np.zeros((steps + 1, len(self._force))) for _ in range(2))
-        self._first = self._row
-        self._velocities[self._row] = self._velocity
+            self._steps, self._arrays = steps, 2 * (steps + 1)
+        self.note()
 
     def note(self) -> None:
-        """Note a physics step."""
-        self._row += 1
-        self._forces[self._row] = self._force
-        self._velocities[self._row] = self._velocity
-
-    def end(self) -> None:
-        """Note that these were all."""
-        self._noted.append((self._first, self._row))
-        self._row += 1
+        """Note the state after a physics step."""
+        self._noted += (self._force.tobytes(), self._velocity.tobytes())
 
     def _add_up(self) -> None:
         """Add up what was noted; that of several calls together costs little more than that of one."""
-        velocities = self._velocities[: self._row, self._dofs]
-        powers = self._forces[1 : self._row, self._dofs] * (velocities[:-1] + velocities[1:])
+        whole = len(self._noted) - len(self._noted) % self._arrays  # without a call that was interrupted
+        states = np.frombuffer(b"".join(self._noted[:whole]))
+        states = states.reshape(whole // self._arrays, self._steps + 1, 2, len(self._force))
+        driven = states[..., self._dofs]  # shape (calls, states, 2, joints)
+        velocities = driven[:, :, 1]
+        powers = driven[:, 1:, 0] * (velocities[:, :-1] + velocities[:, 1:])
         np.maximum(powers, 0.0, out=powers)
-        for first, last in self._noted:
-            self._work += self._half_step * powers[first:last].sum(axis=0)
-        self._row = 0
+        for work in self._half_step * np.add.reduce(powers, axis=1):
+            self._work += work
         self._noted.clear()
 
     def work(self, robot: str) -> float:

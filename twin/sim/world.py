@@ -13,6 +13,7 @@ import numpy as np
 from twin.errors import ScenarioError, nearest
 from twin.files.writing import write_whole
 from twin.geometry import Array, Pose3
+from twin.savings import ALL, Savings
 from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
 from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
@@ -42,24 +43,27 @@ class World:
         *,
         crash_folder: Path | None,
         visuals: bool,
+        savings: Savings,
     ) -> None:
         self._spec = build_spec(scene, robots, physics)
         self._placements = tuple(robots)
         self.scene, self.physics, self.seed, self.crash_folder = scene, physics, seed, crash_folder
+        self.savings = savings
+        """What is not done over again."""
         self.model = (self._spec if visuals else without_visuals(self._spec)).compile()
         self.data = mujoco.MjData(self.model)
         self.timestep_ns = physics.timestep_ns
         self.step_count = 0
         """Physics steps since the start."""
         self._motion_step = self._contact_step = -1
-        self._contacts: list[Contact] = []
+        self._contacts: list[Contact] | None = None
         self._work_meter: WorkMeter | None = None
         mujoco.mj_forward(self.model, self.data)
 
         self._guard = DivergenceGuard(self.model, self.data)
         self._statics = {static.name: static.T_world_body for static in scene.statics}
         self._bind_bodies()
-        self._contact_reader = ContactReader(self.model, *self._geom_owners())
+        self._contact_reader = ContactReader(self.model, *self._geom_owners(), savings)
         self.robots: Mapping[str, RobotHandle] = MappingProxyType(
             {placement.name: self._bind_robot(placement) for placement in robots}
         )
@@ -74,6 +78,7 @@ class World:
         *,
         crash_folder: Path | None = None,
         visuals: bool = False,
+        savings: Savings = ALL,
     ) -> World:
         """Build and compile.
 
@@ -85,13 +90,14 @@ class World:
             crash_folder: Where to write the last states if the physics diverges; None writes nothing.
             visuals: Compile the robots' visual geoms too, for rendering; they cost a tenth of each step, as
                 they are part of the bounding trees that collisions are found with.
+            savings: What is not done over again.
 
         Raises:
             ScenarioError: Two things have the same name.
             ModelError: A sensor is faster than the physics.
         """
         physics = physics or Physics()
-        return cls(scene, robots, physics, seed, crash_folder=crash_folder, visuals=visuals)
+        return cls(scene, robots, physics, seed, crash_folder=crash_folder, visuals=visuals, savings=savings)
 
     # -- time ------------------------------------------------------------------------------------------------
 
@@ -106,18 +112,18 @@ class World:
         Raises:
             SimulationError: The physics diverged; names joint or body, time, and the file of the last states.
         """
+        model, data, step, meter = self.model, self.data, mujoco.mj_step, self._work_meter
         self._guard.remember()
-        if self._work_meter is None:
-            mujoco.mj_step(self.model, self.data, n)
+        if meter is None:
+            step(model, data, n)
         else:
-            self._work_meter.begin(n)
+            meter.begin(n)
             for _ in range(n):
-                mujoco.mj_step(self.model, self.data)
-                self._work_meter.note()
-            self._work_meter.end()
+                step(model, data)
+                meter.note()
         self.step_count += n
         self._guard.check(self.crash_folder)
-        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_kinematics(model, data)
 
     def refresh_motion(self) -> None:
         """Bring MuJoCo's body velocities and accelerations (cvel, cacc) to the present time, once a step."""
@@ -161,14 +167,25 @@ class World:
 
     def contacts(self) -> list[Contact]:
         """Return what robots touch except for the floor and themselves, as of the last physics step."""
-        if self._contact_step != self.step_count:
-            self._contact_step = self.step_count
-            self._contacts = self._contact_reader.read(self.data)
+        reader = self._reader()
+        if self._contacts is None:
+            self._contacts = reader.read(self.data)
         return self._contacts
 
     def touches(self, body: str) -> list[Touch]:
         """Return what touches goods or a link, the floor too, point by point, as of the last physics step."""
-        return self._contact_reader.touches(self.data, body)
+        return self._reader().touches(self.data, body)
+
+    def neighbours(self, body: str) -> list[str]:
+        """Return the names of what `touches` would tell of, or of more; it costs less."""
+        return self._reader().neighbours(self.data, body)
+
+    def _reader(self) -> ContactReader:
+        """Return who knows the contacts of the last physics step."""
+        if self._contact_step != self.step_count:
+            self._contact_step, self._contacts = self.step_count, None
+            self._contact_reader.look(self.data)
+        return self._contact_reader
 
     def weight(self, body: str) -> float:
         """Return the weight of goods or of a link with all that hangs on it [N]."""
@@ -248,6 +265,7 @@ class World:
             description=description,
             seed=self.seed,
             command_latency=placement.command_latency,
+            savings=self.savings,
         )
         root = self.model.body(f"{name}/{description.root}")
         return RobotHandle(

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.models.shapes import Box
-from twin.navigation.maps.occupancy_map import FREE, OCCUPIED, UNKNOWN, OccupancyMap
-from twin.navigation.maps.resampling import MOST_CELLS
+from twin.navigation.maps.occupancy_map import FREE, MOST_CELLS, OCCUPIED, UNKNOWN, OccupancyMap
 from twin.warehouse.arena import Arena
 from twin.warehouse.footprint import Rectangle
 

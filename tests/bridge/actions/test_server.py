@@ -18,8 +18,7 @@ from twin.bridge.actions import (
     GoalHandle,
     GoalResponse,
 )
-from twin.bridge.actions.goal import uuid_msg
-from twin.bridge.actions.states import ACTIVE, NAMES, GoalEvent, transition
+from twin.bridge.actions.goal import ACTIVE, NAMES, GoalEvent, transition, uuid_msg
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.msgs import GoalStatus, GoalStatusArray

@@ -31,8 +31,8 @@ from twin.bridge.msgs import (
     Twist,
     new,
 )
-from twin.bridge.types.bounds import INTEGERS, STRINGS
 from twin.bridge.types.fields import Field, fields_of
+from twin.bridge.types.literals import INTEGERS, STRINGS
 from twin.errors import BridgeError
 
 types.add_folder(Path(__file__).parents[1] / "data" / "test_msgs")

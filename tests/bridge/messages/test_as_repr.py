@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from twin.bridge import types
-from twin.bridge.messages.as_repr import message_repr
+from twin.bridge.messages.as_text import message_repr
 from twin.bridge.messages.from_values import message_from_dict
 from twin.bridge.types.default_values import new
 

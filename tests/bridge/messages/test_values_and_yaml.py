@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from twin.bridge import types
-from twin.bridge.messages.as_yaml import message_to_csv, message_to_dict, message_to_yaml
+from twin.bridge.messages.as_text import message_to_csv, message_to_dict, message_to_yaml
 from twin.bridge.messages.from_values import message_from_dict
 from twin.bridge.msgs import (
     DiagnosticStatus,

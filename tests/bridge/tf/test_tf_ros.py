@@ -26,8 +26,7 @@ from twin.bridge.tf import (
     UnknownFrameError,
     transform_stamped,
 )
-from twin.bridge.tf.drawing import graphviz, svg
-from twin.bridge.tf.report import frame_infos, text_tree
+from twin.bridge.tf.report import frame_infos, graphviz, svg, text_tree
 from twin.bridge.tf.rigid import Rigid
 from twin.bridge.tf.throttle import ThrottleConfig, TransformThrottle
 from twin.bridge.tf.walk import solve

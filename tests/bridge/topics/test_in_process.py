@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
+from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
-from twin.bridge.qos import LATCHED
+from twin.bridge.qos import LATCHED, QoS
+from twin.bridge.srvs import SetBool
 from twin.bridge.topics import Subscription
 from twin.bridge.topics.raw import RawSample, RawSubscription
-from twin.bridge.wire.session import direct
+from twin.bridge.wire.session import SessionConfig, direct
+from twin.errors import BridgeError
+from twin.savings import ALL, Savings
 
 
 def test_the_source_of_a_message_is_known(bus: Bus, clock: Clock) -> None:
@@ -75,3 +80,60 @@ def test_without_subscriptions_nobody_listens(bus: Bus) -> None:
     assert not publisher.has_subscribers
     publisher.publish(String("a"))
     bus.spin()
+
+
+def _latched_history(savings: Savings, *, join: bool) -> list[str]:
+    """Return who hears what of two latched publishers, whenever he comes."""
+    heard: list[str] = []
+    with Bus.of(SessionConfig(), Clock(), savings=savings) as bus:
+        node, deep = bus.create_node("node"), replace(LATCHED, depth=3)
+
+        def listen(name: str, qos: QoS) -> None:
+            node.create_subscription(String, "map", lambda m: heard.append(f"{name} {m.data}"), qos)
+
+        publishers = [node.create_publisher(String, "map", qos) for qos in (deep, LATCHED)]
+        for k in range(5):
+            listen(f"volatile{k}", QoS(depth=9))
+            listen(f"deep{k}", deep)
+            listen(f"last{k}", LATCHED)
+            if k == 2 and join:
+                raw = replace(LATCHED, depth=9)
+                RawSubscription(node, "map", lambda s: heard.append(f"raw {s.payload[8:10].decode()}"), raw)
+            for number, publisher in enumerate(publishers):
+                publisher.publish(String(f"{number}{k}"))
+            if k == 3:
+                node.destroy_publisher(publishers.pop())
+        bus.spin()
+        assert bus.wire.is_open is (join or not savings.in_process)
+    return sorted(heard)
+
+
+@pytest.mark.parametrize("join", [False, True])
+def test_what_was_latched_is_heard_as_through_zenoh(join: bool) -> None:
+    assert _latched_history(ALL, join=join) == _latched_history(replace(ALL, in_process=False), join=join)
+
+
+def test_a_bus_that_nobody_can_join_opens_no_session(bus: Bus) -> None:
+    node = bus.create_node("node")
+    node.create_publisher(String, "chatter", LATCHED).publish(String("a"))
+    node.create_service(SetBool, "switch", lambda request: SetBool.Response(request.data, ""))
+    future = node.create_client(SetBool, "switch").call_async(SetBool.Request(True))
+    bus.spin()
+    bus.spin()
+    assert future.result.success
+    assert node.count_publishers("chatter") == 1
+    assert node.get_service_names_and_types() == [("/switch", ["std_srvs/srv/SetBool"])]
+    before = Graph.snapshot(bus)
+    assert not bus.wire.is_open
+    assert str(bus.session.zid()) == bus.session_id
+    after = Graph.snapshot(bus)
+    assert (after.nodes, after.endpoints) == (before.nodes, before.endpoints)
+    bus.close()
+    node.destroy()
+
+
+def test_a_closed_bus_opens_no_session(clock: Clock) -> None:
+    bus = Bus.open(clock)
+    bus.close()
+    with pytest.raises(BridgeError, match="closed"):
+        _ = bus.session

@@ -10,7 +10,7 @@ import pytest
 from twin.bridge import types
 from twin.bridge.cdr.codec import codec
 from twin.bridge.msgs import PoseStamped, new
-from twin.bridge.types.show import show_lines
+from twin.bridge.types.text import show_lines
 from twin.errors import BridgeError
 
 Write = Callable[..., Path]

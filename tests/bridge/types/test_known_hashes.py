@@ -2,8 +2,7 @@ from __future__ import annotations
 
 from twin.bridge import types
 from twin.bridge.types import type_store
-from twin.bridge.types.known_hashes import known_hashes
-from twin.bridge.types.type_hash import rihs01_of
+from twin.bridge.types.type_hash import known_hashes, rihs01_of
 
 
 def test_every_hash_of_the_table_is_that_of_its_definition() -> None:

@@ -142,12 +142,13 @@ def test_an_interrupt_inside_a_callback_comes_with_the_next_spin() -> None:
 
 def test_a_bus_closes_before_it_is_interrupted() -> None:
     bus = Bus.open(Clock())
+    session = bus.session
     with guard.shield():
         signal.raise_signal(signal.SIGINT)
         time.sleep(0)
     with pytest.raises(KeyboardInterrupt):
         bus.close()
-    assert bus.session.is_closed()
+    assert session.is_closed()
 
 
 def test_the_handler_of_before_is_back_afterwards() -> None:

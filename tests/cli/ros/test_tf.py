@@ -121,7 +121,7 @@ def test_frames_as_gv_and_svg(twin: Twin, tmp_path: Path) -> None:
     )
     picture = tmp_path / "new" / "frames.svg"
     assert twin("tf", "frames", "-t", "0.4", "-o", str(picture)).returncode == 0
-    texts = {element.text for element in ElementTree.parse(picture).iter() if element.tag.endswith("tspan")}
+    texts = {element.text for element in ElementTree.parse(picture).iter() if element.tag.endswith("text")}
     assert {"odom", "base_link", "laser", "imu", "/driver", "/robot/mounts"} <= texts
     refused = twin("tf", "frames", "-o", str(tmp_path / "frames.pdf"))
     assert refused.returncode == 2

@@ -10,8 +10,7 @@ import pytest
 
 from twin.errors import ModelError
 from twin.models import load
-from twin.models.graph import graphviz
-from twin.models.tree import tree_text
+from twin.models.graph import graphviz, tree_text
 
 SEEDS = Path(__file__).parents[4] / "shared" / "seed_models"
 FILES = ["r2d2.urdf", "simple_robot.urdf.xacro", "sp1s_1.urdf", "sp1s_2.urdf"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from twin.models.checks.drive_guess import guess_drive
+from twin.models.checks.drive import guess_drive
 from twin.models.description import RobotDescription
 from twin.models.loader import parse_urdf
 

@@ -63,7 +63,7 @@ def test_numbers_that_many_instances_share_are_read_once(tmp_path: Path) -> None
 def test_a_scene_has_a_limit_of_pieces_which_the_error_tells(
     tmp_path: Path, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("twin.models.mesh.allowance.MOST_PIECES", 200)
+    monkeypatch.setattr("twin.models.mesh.dae_geometry.MOST_PIECES", 200)
     with pytest.raises(ModelError, match="more than 200 nodes, transforms and instances"):
         read(tmp_path, content)
 

@@ -10,8 +10,7 @@ from tests.oracles.installed import example_robots
 from twin.errors import ModelError
 from twin.models import ReadOptions, load
 from twin.models.urdf.document import Report, parse
-from twin.models.urdf.packages import PackagePath, Packages
-from twin.models.urdf.resources import locate
+from twin.models.urdf.packages import PackagePath, Packages, locate
 
 STL = b"\0" * 84
 LINK = "<link name='a'><visual><geometry><mesh filename='{}'/></geometry></visual></link>"

@@ -147,3 +147,19 @@ def test_of_several_polygons_the_slowest_holds_and_a_stop_ends_it() -> None:
     assert done.polygon_name == "Stop"
     standing = monitor(half, polygon("stop", "Stop")).process((0.0, 0.0), across(0.7))
     assert standing == Action((0.0, 0.0), "stop", "Stop"), "also of a robot that stands"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_points_that_cannot_be_reached_change_no_time(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    footprint, dt, horizon, least = rectangle(0.6, 0.4), 0.1, 2.0, 3
+    for _ in range(30):
+        points = rng.uniform(-3.0, 3.0, size=(60, 2))
+        v, w = rng.uniform(-0.8, 0.8), rng.uniform(-1.0, 1.0)
+        x, y, yaw, hit = 0.0, 0.0, 0.0, -1.0
+        for step in range(round(horizon / dt) + 2):
+            if count_inside(points, footprint, x, y, yaw) >= least:
+                hit = max(step - 1, 0) * dt  # when the step began
+                break
+            x, y, yaw = x + v * dt * math.cos(yaw), y + v * dt * math.sin(yaw), yaw + w * dt
+        assert time_to_collision(points, footprint, v, w, dt, horizon, least) == pytest.approx(hit)

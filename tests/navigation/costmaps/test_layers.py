@@ -23,6 +23,7 @@ from twin.navigation.costmaps.filters import (
 from twin.navigation.costmaps.footprint import padded, rectangle
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
+from twin.navigation.costmaps.obstacle_layer import ObstacleLayer
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
 from twin.navigation.costmaps.window import NOTHING, Window, differing
 from twin.navigation.maps.occupancy_map import OccupancyMap
@@ -59,6 +60,17 @@ def test_inflation_of_a_window_is_that_of_scipys_distance_transform(seed: int, u
     assert np.array_equal(costs[window.slices], want[window.slices])
     costs[window.slices] = 77
     assert (costs == 77).all(), "nothing outside of the window is written"
+
+
+def test_an_inflation_reaches_as_far_as_it_is_told() -> None:
+    master = np.zeros((1, 300), dtype=np.uint8)
+    master[0, 20] = 254
+    shape = {"inscribed_radius": 0.5, "inflation_radius": 10.0, "cost_scaling_factor": 0.1}
+    inflation, costs = Inflation(resolution=0.05, inflate_unknown=False, **shape), np.empty_like(master)
+    assert inflation.reach == 200
+    inflation.write(costs, master, Window(0, 0, 300, 1))
+    want = inflation_costs(np.abs(np.arange(300.0) - 20.0) * 0.05, **shape)
+    np.testing.assert_array_equal(costs[0], want)
 
 
 def test_nav2s_map_of_ten_by_ten_metres_has_20_lethal_and_28_inscribed_cells() -> None:
@@ -365,17 +377,30 @@ def test_of_a_map_with_other_cells_nothing_is_taken() -> None:
     assert not layered.costmap.costs.any()
 
 
+def test_freeing_a_polygon_tells_the_smallest_window_that_changed() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        layer = ObstacleLayer((20, 24))
+        layer.cells = rng.choice(np.array([0, 254], dtype=np.uint8), size=(20, 24), p=[0.9, 0.1])
+        before = layer.cells.copy()
+        at = Pose2(*rng.uniform((-0.2, -0.2, -3.0), (1.4, 1.2, 3.0)))
+        found = layer.clear_polygon(at.apply(rectangle(0.5, 0.3)), (0.0, 0.0, 0.05))
+        assert found == differing(before, layer.cells, Window(0, 0, 24, 20))
+        assert not layer.cells[before == 0].any()
+
+
 @pytest.mark.parametrize("changes", [0, 1, 2, 5])
 def test_what_differs_is_within_the_smallest_window(changes: int) -> None:
     rng = np.random.default_rng(changes)
     for _ in range(20):
-        before = rng.integers(0, 255, size=(9, 13), dtype=np.uint8)
+        before = rng.integers(0, 255, size=(20, 24), dtype=np.uint8)
         after = before.copy()
-        cells = np.column_stack([rng.integers(0, 9, size=changes), rng.integers(0, 13, size=changes)])
+        cells = np.column_stack([rng.integers(4, 13, size=changes), rng.integers(3, 16, size=changes)])
         after[cells[:, 0], cells[:, 1]] += 1
-        found = differing(before, after, Window(3, 4, 16, 13))
+        after[13:], after[:, :3] = 255, 255  # outside of the window
+        found = differing(before[4:13, 3:16].copy(), after, Window(3, 4, 16, 13))
         if not changes:
             assert found == NOTHING
         else:
             (y0, x0), (y1, x1) = cells.min(axis=0), cells.max(axis=0) + 1
-            assert found == (3 + x0, 4 + y0, 3 + x1, 4 + y1)
+            assert found == (x0, y0, x1, y1)

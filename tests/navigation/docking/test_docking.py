@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from twin.geometry import Pose2
 from twin.navigation.docking.config import DockEstimateConfig, LineApproachConfig
-from twin.navigation.docking.detectors import BoxFaces, BoxFacesConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
-from twin.navigation.docking.faces import BoxFace, find_box_faces, fit_wall
+from twin.navigation.docking.faces import BoxFace, BoxFaces, BoxFacesConfig, find_box_faces, fit_wall
 from twin.navigation.docking.line_approach import MISSED, LineApproach
 from twin.navigation.recovery import TIMEOUT
 

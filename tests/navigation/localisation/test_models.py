@@ -232,3 +232,13 @@ def test_hits_are_taken_as_wider_than_they_are_measured() -> None:
     for _ in range(400):
         hits.learn(-hits.depth + np.tile([0.05, -0.05], 20))
     assert hits.sigma == pytest.approx(1.4 * 1.4826 * 0.05, rel=0.01)
+
+
+def test_a_normal_is_the_slope_of_the_distance(surfaces: SurfaceDistance) -> None:
+    points = np.random.default_rng(2).uniform(-2.0, 12.0, size=(200, 2))  # some of them off the map
+    half = 0.5 * surfaces.resolution
+    slope = np.column_stack(
+        [surfaces.at(points + step) - surfaces.at(points - step) for step in half * np.eye(2)]
+    )
+    expected = slope / np.maximum(np.hypot(*slope.T), 1e-9)[:, None]
+    np.testing.assert_array_equal(surfaces.normals(points), expected)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from twin.geometry import Pose2
-from twin.navigation.mapping import localisation
 from twin.navigation.mapping.config import SlamConfig
-from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
+from twin.navigation.mapping.registration import START_COVARIANCE, START_WINDOW, at_start, while_driving
 
 GUESS = Pose2(1.0, 2.0, 0.5)
 
@@ -54,7 +53,7 @@ def test_how_far_a_robot_that_drives_is_looked_for(deviation: float, half_width:
 def test_who_is_said_to_be_somewhere_is_looked_for_within_two_metres_and_a_radian() -> None:
     mapped = Nowhere(SlamConfig())
     found = at_start(cast("Any", mapped), cast("Any", None), GUESS)
-    assert mapped.half_width == localisation.START_WINDOW[0] == 2.0
+    assert mapped.half_width == START_WINDOW[0] == 2.0
     assert mapped.asked[1:] == (GUESS, START_COVARIANCE, 1.0)
     assert found == (GUESS, START_COVARIANCE, None)
     assert np.diag(START_COVARIANCE).tolist() == [1.0, 1.0, 0.3]

@@ -14,9 +14,8 @@ from PIL import Image
 from twin.errors import MapError
 from twin.geometry import Pose2
 from twin.navigation.maps.map_saver import LOSSLESS_SCALE, SaveParameters, save_map
-from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.maps.occupancy_map import OccupancyMap, resampled
 from twin.navigation.maps.picture import characters, colours
-from twin.navigation.maps.resampling import resampled
 from twin.navigation.maps.zones import (
     KEEPOUT_FILE,
     SPEED_FILE,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from twin.geometry import Pose2
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.planning.config import CommitmentConfig, PlannerConfig
-from twin.navigation.planning.earlier_paths import committed
+from twin.navigation.planning.earlier_paths import _dearer, committed
 from twin.navigation.planning.planner import Planner
 
 START, GOAL = Pose2(0.5, 2.5, 0.0), Pose2(4.5, 2.5, 0.0)
@@ -53,3 +54,11 @@ def test_a_path_is_free_to_move_aside_by_the_width_and_no_farther() -> None:
     assert found.tolist() == want.tolist()
     corner = committed(costmap, np.array([[-0.95, 2.05]]), config).costs
     assert np.argwhere(corner == 7).tolist() == [[row, column] for row in range(4) for column in range(4)]
+
+
+@pytest.mark.parametrize("by", [0, 20, 200, 252])
+def test_costs_rise_where_cells_are_passable_and_no_higher_than_they_may(by: int) -> None:
+    costs = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    cells = np.random.default_rng(by).random((16, 16)) < 0.5
+    raised = np.where(cells & (costs <= 252), np.minimum(costs.astype(int) + by, 252), costs)
+    np.testing.assert_array_equal(_dearer(costs, cells, by), raised)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from twin.geometry import Pose2
+from twin.navigation.behavior_trees.paths import length as path_length
 from twin.navigation.costmaps.costmap import Costmap, footprint_cost
 from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap
 from twin.navigation.failures import (
@@ -18,7 +19,6 @@ from twin.navigation.failures import (
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.planning.config import HybridConfig
 from twin.navigation.planning.hybrid import HybridPlanner
-from twin.navigation.planning.planner import path_length
 
 pytestmark = pytest.mark.xdist_group("planning")
 

@@ -16,8 +16,6 @@ from twin.navigation.planning.hybrid_kernel import (
     UNREACHABLE,
     Drive,
     _curve_length,
-    _popped,
-    _pushed,
     curve_cost,
     expand,
     move_factor,
@@ -153,26 +151,6 @@ def test_how_far_it_is_to_the_goal_at_least() -> None:
 
     assert left(9.9) == pytest.approx(9.9 * 6.0)
     assert left(10.1) == 0.0, "ten radii away the turns hardly matter"
-
-
-def test_the_least_key_is_taken_first() -> None:
-    random, order, waiting = np.random.default_rng(0), [], 0
-    values = random.permutation(300).astype(np.float64)
-    keys, items = np.empty(300), np.empty(300, np.int32)
-    for number, key in enumerate(values):
-        waiting = _pushed(keys, items, waiting, key, number)
-        if number % 3 == 2:
-            least = values[items[:waiting]].min()
-            waiting, item = _popped(keys, items, waiting)
-            assert values[item] == least
-            order.append(item)
-    assert waiting == 200
-    rest = []
-    while waiting:
-        waiting, item = _popped(keys, items, waiting)
-        rest.append(values[item])
-    assert rest == sorted(rest)
-    assert len({*order}) == 100
 
 
 def searched(

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from scipy.signal import savgol_filter
 
 from twin.geometry import Pose2, wrap_angles
+from twin.navigation.behavior_trees.paths import length as path_length
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.failures import (
     GoalOccupied,
@@ -32,7 +33,7 @@ from twin.navigation.planning.config import (
 )
 from twin.navigation.planning.direction import cusps, one_way_pieces
 from twin.navigation.planning.grid_search import GridSearch
-from twin.navigation.planning.planner import Planner, filled, path_length, with_headings
+from twin.navigation.planning.planner import Planner, filled, with_headings
 from twin.navigation.planning.smoother import SavitzkyGolaySmoother, SimpleSmoother
 
 EXACT = PlannerConfig(tolerance=0.0)

@@ -48,8 +48,7 @@ from twin.nodes.navigation.controller_server.server import ControllerServerNode
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.costmaps.filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
-from twin.nodes.navigation.mapping.map_saver import MapSaverNode
-from twin.nodes.navigation.mapping.map_server import MapServerNode, grid_msg, occupancy_map
+from twin.nodes.navigation.mapping.map_server import MapSaverNode, MapServerNode, grid_msg, occupancy_map
 
 FOOTPRINT = ((0.15, 0.15), (-0.15, 0.15), (-0.15, -0.15), (0.15, -0.15))
 LAYERS = CostmapConfig(

@@ -16,7 +16,7 @@ from twin.bridge.msgs import GoalStatus, OccupancyGrid, Path, new
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import ClearEntireCostmap, GetMap
 from twin.geometry import Pose2
-from twin.navigation.planning.planner import path_length
+from twin.navigation.behavior_trees.paths import length as path_length
 from twin.nodes.messages import path_array, path_msg
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNode

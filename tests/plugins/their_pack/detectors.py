@@ -1,6 +1,6 @@
 from their_pack.used import USED
 from twin.geometry import Pose2
-from twin.navigation.docking.detectors import Detector
+from twin.navigation.docking.faces import Detector
 
 
 class Sure(Detector):

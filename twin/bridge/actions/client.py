@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xxhash
 
-from twin.bridge.actions.goal import uuid_msg
-from twin.bridge.actions.states import ACTIVE
+from twin.bridge.actions.goal import ACTIVE, uuid_msg
 from twin.bridge.msgs import GoalInfo, GoalStatus, GoalStatusArray, stamp
 from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.services import Future

@@ -7,8 +7,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
-from twin.bridge.actions.goal import Execute, GoalHandle, uuid_msg
-from twin.bridge.actions.states import GoalEvent, is_cancelable, transition
+from twin.bridge.actions.goal import Execute, GoalEvent, GoalHandle, is_cancelable, transition, uuid_msg
 from twin.bridge.msgs import GoalStatus, GoalStatusArray, ns, stamp
 from twin.bridge.node import tasks
 from twin.bridge.qos import LATCHED, as_qos
@@ -93,6 +92,8 @@ class ActionServer:
         self._running: list[_Run] = []
         self._queue: deque[tuple[GoalHandle, Execute]] = deque()
         self._ended: OrderedDict[bytes, _Ended] = OrderedDict()
+        self._forget_ns = tasks.NEVER_NS
+        """When the first of them can be forgotten [ns]."""
         self._waiting: dict[bytes, list[Respond]] = {}
         self._closed = False
         base = f"{self.name}/_action"
@@ -126,10 +127,8 @@ class ActionServer:
     def due_ns(self) -> int:
         """When `step` has something to do, if nothing arrives before [ns]."""
         if self._running:
-            return min(run.due_ns for run in self._running)
-        for ended in self._ended.values():
-            return ended.time_ns + self._result_timeout_ns + 1
-        return tasks.NEVER_NS
+            return min([run.due_ns for run in self._running])
+        return self._forget_ns
 
     def step(self) -> bool:
         """Advance every execution to its next yield; an exception in one is a bug and propagates.
@@ -141,11 +140,8 @@ class ActionServer:
             self._advance()
         if self._queue and not self._running:
             self._start(*self._queue.popleft())
-        while self._ended:
-            goal_id, ended = next(iter(self._ended.items()))
-            if self._clock.now_ns - ended.time_ns <= self._result_timeout_ns:
-                break
-            self._forget(goal_id)
+        while self._clock.now_ns >= self._forget_ns:
+            self._forget(next(iter(self._ended)))
         return False
 
     def _advance(self) -> None:
@@ -299,6 +295,7 @@ class ActionServer:
     def _end(self, handle: GoalHandle, result: Any) -> None:
         result = new(self._type.Result) if result is None else result
         self._ended[handle.goal_id] = _Ended(handle.status, result, self._node.now_ns)
+        self._note_oldest()
         self._node.wake()
         for respond in self._waiting.pop(handle.goal_id, ()):
             respond(self._type.GetResult.Response(handle.status, result))
@@ -307,6 +304,11 @@ class ActionServer:
 
     def _forget(self, goal_id: bytes) -> None:
         del self._ended[goal_id], self._handles[goal_id]
+        self._note_oldest()
+
+    def _note_oldest(self) -> None:
+        oldest = next(iter(self._ended.values()), None)
+        self._forget_ns = oldest.time_ns + self._result_timeout_ns + 1 if oldest else tasks.NEVER_NS
 
     def _publish_status(self) -> None:
         handles = self._handles.values()

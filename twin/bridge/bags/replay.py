@@ -39,13 +39,8 @@ class Replayed:
     """Whether the bag tells when it was whose turn; otherwise times of publishing are not compared."""
 
     @property
-    def identical(self) -> bool:
-        """Whether both are the same messages: topics, times, if the bag tells turns, and bytes."""
-        return self.difference is None
-
-    @property
     def difference(self) -> str | None:
-        """The first difference as one clause, None if there is none."""
+        """The first difference, of topics, times, if the bag tells turns, and bytes: a clause, or None."""
         again, before = _plain(self.published), _plain(self.recorded)
         if not self.in_turns:
             again, before = _by_topic(again), _by_topic(before)

@@ -5,12 +5,14 @@ What follows a message is ignored, as in ROS 2: its own serializer returns a buf
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from twin.bridge import types
 from twin.bridge.cdr.decoder import decoder
 from twin.bridge.cdr.encoder import encoder
+from twin.bridge.cdr.exact import exactness
 from twin.bridge.cdr.maker import MAGIC
 from twin.bridge.messages.from_values import checked
 
@@ -30,17 +32,25 @@ class Codec(Generic[M]):
         """The messages' class."""
         return types.get(self._given) if isinstance(self._given, str) else self._given
 
+    @cached_property
+    def is_exact(self) -> Callable[[Any], bool]:
+        """Tells whether a message is what would be decoded from its bytes; see `exactness`."""
+        return exactness(self.msgtype)
+
+    @cached_property
+    def _encoder(self) -> Callable[[Any], bytes]:
+        return encoder(self.msgtype)
+
     def encode(self, message: M) -> bytes:
         """Return a message as CDR; what can be repaired, such as a list of numbers, is.
 
         Raises:
             BridgeError: a field has a value that it cannot hold; names the field.
         """
-        encode = encoder(self.msgtype)
         try:
-            return encode(message)
+            return self._encoder(message)
         except Exception:
-            return encode(checked(message))
+            return self._encoder(checked(message))
 
     def read(self, payload: bytes) -> tuple[M, int]:
         """Return the message that a payload begins with, and where it ends.

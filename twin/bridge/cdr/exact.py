@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from twin.bridge import types
-from twin.bridge.types.bounds import INTEGERS, STRINGS
 from twin.bridge.types.fields import Field, fields_of
+from twin.bridge.types.literals import INTEGERS, STRINGS
 
 
 @cache

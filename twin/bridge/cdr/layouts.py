@@ -5,7 +5,7 @@ from __future__ import annotations
 from struct import Struct
 from typing import NamedTuple
 
-from twin.bridge.types.bounds import INTEGERS
+from twin.bridge.types.literals import INTEGERS
 
 CODES = {"bool": "?", "byte": "b", "char": "B", "float32": "f", "float64": "d"} | {
     base: {"8": "b", "16": "h", "32": "i", "64": "q"}[base.partition("int")[2]]

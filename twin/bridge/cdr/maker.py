@@ -12,8 +12,8 @@ from itertools import count
 from typing import Any
 
 from twin.bridge.cdr.layouts import CODES, Item
-from twin.bridge.types.bounds import STRINGS
 from twin.bridge.types.fields import Field, fields_of
+from twin.bridge.types.literals import STRINGS
 from twin.bridge.types.text import PADDING
 
 MAGIC = b"\x00\x01\x00\x00"

@@ -186,10 +186,11 @@ class Mirror:
             handler = direct(lambda query: self._on_query(query, service))
             return session.declare_queryable(key, handler, complete=True)
         if info.kind == "MP":
-            publisher = declare_publisher(session, key, info.qos)
+            publisher = declare_publisher(self._bus.wire, key, info.qos)
             self._publishers[number] = (mirrored_publisher(self._bus, info), publisher)
             return publisher
-        return declare_subscriber(session, key, lambda sample: self._on_sample(number, sample), info.qos)
+        wire = self._bus.wire
+        return declare_subscriber(wire, key, lambda sample: self._on_sample(number, sample), info.qos)
 
     def _undeclare(self, number: int) -> None:
         for entity in reversed(self._declared.pop(number, [])):

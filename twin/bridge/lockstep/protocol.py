@@ -1,19 +1,23 @@
 """What a run and a process in lock-step say to each other: `twin_msgs/srv/Step` and two kinds of tokens.
 
 The service travels as any other of rmw_zenoh. The tokens tell who takes part; the ROS graph has others.
+From those who take no part a run lets in questions, nothing that changes it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 import zenoh
 
 from twin.bridge import types
+from twin.bridge.bus import Bus
 from twin.bridge.cdr.codec import codec
+from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.types import ServiceType
+from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import demangle, mangle, topic_key
 from twin.bridge.wire.session import direct
 
@@ -103,3 +107,33 @@ class Questions:
 
 def _octets(data: bytes) -> Any:
     return np.frombuffer(data, np.uint8) if data else _EMPTY
+
+
+READING = frozenset(
+    f"rcl_interfaces::srv::dds_::{name}_"
+    for name in ("GetParameters", "GetParameterTypes", "ListParameters", "DescribeParameters")
+) | {"type_description_interfaces::srv::dds_::GetTypeDescription_"}
+"""Services that change nothing, by their names in keys."""
+
+
+def admit_questions(bus: Bus, answered: Collection[str]) -> None:
+    """Let requests of `READING` services into the inboxes; refuse, count and report once everything else.
+
+    Args:
+        bus: The run's.
+        answered: Topics that come in by another way.
+    """
+    for arrival in bus.external.drain():
+        if _reads(arrival):
+            arrival.receiver.enqueue(arrival.data, True)
+        elif arrival.receiver.name not in answered:
+            bus.external.refuse(
+                "lock-step", arrival.receiver.name, "such a run listens only to those for whom it waits"
+            )
+        if isinstance(arrival.data, ZenohQuestion) and not _reads(arrival):
+            arrival.data.drop()
+
+
+def _reads(arrival: Arrival) -> bool:
+    question = arrival.data
+    return isinstance(question, ZenohQuestion) and str(question.query.key_expr).split("/")[-2] in READING

@@ -13,9 +13,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from twin.bridge import types
-from twin.bridge.types.bounds import FLOATS, INTEGERS, STRINGS
 from twin.bridge.types.default_values import new
 from twin.bridge.types.fields import Field, fields_of
+from twin.bridge.types.literals import FLOATS, INTEGERS, STRINGS
 from twin.errors import BridgeError, nearest
 
 M = TypeVar("M")

@@ -64,7 +64,7 @@ class Node(NodeParameters, NodeGraph):
         self.is_destroyed = self._closing = False
         self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
-        self._liveliness: Any = bus.zenoh.liveliness().declare_token(str(self.token))
+        self._liveliness: Any = bus.wire.declare_token(str(self.token))
         self.action_clients = 0
         """How many there have been."""
         self._endpoints: list[OwnedEndpoint] = []
@@ -255,18 +255,22 @@ class Node(NodeParameters, NodeGraph):
             endpoint, data, external = inbox.popleft()
             if endpoint is not None:
                 endpoint.handle(data, external)
-        if not self._timers and not self._executions:
-            self.due_ns = NEVER_NS
-            return
-        now_ns = self.bus.clock.now_ns
-        for timer in tuple(self._timers):
-            timer.run(now_ns)
-        for execution in tuple(self._executions):
+        timers, executions = self._timers, self._executions
+        if timers:
+            now_ns = self.bus.clock.now_ns
+            for timer in tuple(timers):
+                timer.run(now_ns)
+        for execution in tuple(executions):
             if execution.step():
                 self.remove_execution(execution)
-        due = [timer.due_ns for timer in self._timers]
-        due += [execution.due_ns for execution in self._executions]
-        self.due_ns = min(due, default=NEVER_NS)
+        due_ns = NEVER_NS
+        for timer in timers:
+            if (its_ns := timer.due_ns) < due_ns:
+                due_ns = its_ns
+        for execution in executions:
+            if (its_ns := execution.due_ns) < due_ns:
+                due_ns = its_ns
+        self.due_ns = due_ns
 
     def wake(self) -> None:
         """Spin the next time: what is due has changed."""

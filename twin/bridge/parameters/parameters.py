@@ -15,8 +15,7 @@ from twin.bridge.msgs import (
     stamp,
 )
 from twin.bridge.parameters import errors
-from twin.bridge.parameters.listing import SEPARATOR, listed
-from twin.bridge.parameters.ranges import objection
+from twin.bridge.parameters.rules import SEPARATOR, listed, objection
 from twin.bridge.parameters.values import Parameter, Type, coerced
 from twin.bridge.types.default_values import new
 from twin.errors import BridgeError

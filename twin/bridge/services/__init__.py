@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import zenoh
@@ -50,8 +51,7 @@ class Service(Endpoint):
         bus = node.bus
         self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
-            queryable = bus.zenoh.declare_queryable(key, direct(self._on_query), complete=True)
-            self._declared.append(queryable)
+            self._declared.append(bus.wire.declare(partial(self._queryable, key)))
         self._listeners = bus.in_process.listeners(self.key)
         self._listeners.receivers.append(self)
         self.announce()
@@ -93,6 +93,9 @@ class Service(Endpoint):
         self._open.add(data)
         self._callback(request, respond)
 
+    def _queryable(self, key: str, session: zenoh.Session) -> Any:
+        return session.declare_queryable(key, direct(self._on_query), complete=True)
+
     def _on_query(self, query: zenoh.Query) -> None:
         bus, source = self.node.bus, self._admission.source(query)
         if source is None:
@@ -114,12 +117,14 @@ class Client(Endpoint):
         self._pending: dict[Future, None] = {}
         node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
-        self._querier = node.bus.zenoh.declare_querier(
-            self.key,
-            # The bridge's queryables do not say that they are complete.
-            target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=_FOREVER_S,
+        self._querier = node.bus.wire.declare(
+            lambda session: session.declare_querier(
+                self.key,
+                # The bridge's queryables do not say that they are complete.
+                target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=_FOREVER_S,
+            )
         )
         self._declared.append(self._querier)
         self._services = node.bus.in_process.listeners(self.key)
@@ -131,7 +136,7 @@ class Client(Endpoint):
         """Whether somebody offers the service now."""
         if self._short and self._services.is_direct:
             return bool(self._services.receivers)
-        return bool(self._querier.matching_status.matching)  # type: ignore[attr-defined]
+        return bool(self._querier.matching_status.matching)
 
     def wait_for_service(self, timeout_ns: int | None = None) -> Generator[None, None, bool]:
         """Wait in an execution: `ready = yield from client.wait_for_service()`.

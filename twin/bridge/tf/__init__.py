@@ -7,13 +7,13 @@ from twin.bridge.tf.broadcasting import TransformBroadcaster as TransformBroadca
 from twin.bridge.tf.broadcasting import TransformListener as TransformListener
 from twin.bridge.tf.broadcasting import transform_stamped as transform_stamped
 from twin.bridge.tf.buffer import TransformBuffer as TransformBuffer
+from twin.bridge.tf.buffer import TransformFuture as TransformFuture
 from twin.bridge.tf.errors import DisconnectedFramesError as DisconnectedFramesError
 from twin.bridge.tf.errors import ExtrapolationError as ExtrapolationError
 from twin.bridge.tf.errors import InvalidFrameError as InvalidFrameError
 from twin.bridge.tf.errors import TransformError as TransformError
 from twin.bridge.tf.errors import TransformTimeoutError as TransformTimeoutError
 from twin.bridge.tf.errors import UnknownFrameError as UnknownFrameError
-from twin.bridge.tf.wait import TransformFuture as TransformFuture
 
 # The names that programs for tf2_ros use.
 Buffer = TransformBuffer

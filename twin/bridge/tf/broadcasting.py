@@ -9,9 +9,8 @@ from twin.bridge.conversions import transform_from_pose2, transform_from_pose3
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import TFMessage, TransformStamped, header, ns
 from twin.bridge.qos import LATCHED, QoS
-from twin.bridge.tf.buffer import TransformBuffer
+from twin.bridge.tf.buffer import TransformBuffer, TransformFuture
 from twin.bridge.tf.cache import UNKNOWN_AUTHORITY
-from twin.bridge.tf.wait import TransformFuture
 from twin.geometry import Pose2, Pose3
 
 if TYPE_CHECKING:

@@ -44,7 +44,9 @@ class FrameCache:
             self.parents.append(parent)
             self.parent = parent
             if stamps[0] < time_ns - cache_ns:
-                outdated = bisect_left(stamps, time_ns - cache_ns)
+                outdated = 1  # mostly
+                while stamps[outdated] < time_ns - cache_ns:
+                    outdated += 1
                 del stamps[:outdated], self.values[:outdated], self.parents[:outdated]
             return True
         index = bisect_left(stamps, time_ns)

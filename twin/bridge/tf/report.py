@@ -1,12 +1,20 @@
-"""What a buffer holds, for people: tf2's lists of frames, and a text tree."""
+"""What a buffer holds, for people: lists of frames, a text tree, a drawing, and delays and rates.
+
+Lists are tf2's, delays and rates in the words of tf2_monitor. Drawings are Graphviz text as view_frames
+writes it, and SVG without Graphviz.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from twin import tree_drawing
+from twin.bridge.msgs import TFMessage, ns
 from twin.bridge.tf.core import BufferCore
 from twin.bridge.tf.errors import seconds
+from twin.tree_drawing import Node, escaped
 
 _SHORTEST_NS = 100_000
 """tf2's lower bound of a buffer's length when it computes a rate."""
@@ -132,3 +140,119 @@ def _branch(
 def _described(info: FrameInfo) -> str:
     how = "static" if info.is_static else f"{info.rate_hz:.1f} Hz, latest at {seconds(info.newest_ns)} s"
     return f"({how}, from {info.broadcaster})"
+
+
+_KEPT = 1000
+"""tf2_monitor's number of delays that it averages."""
+
+
+class _Series:
+    """Delays [ns] and times of arrival [ns] of one frame or broadcaster."""
+
+    def __init__(self) -> None:
+        self.delays: deque[float] = deque(maxlen=_KEPT)
+        self.arrivals: deque[int] = deque(maxlen=_KEPT)
+
+    def add(self, delay_ns: float, now_ns: int) -> None:
+        self.delays.append(delay_ns)
+        self.arrivals.append(now_ns)
+
+    @property
+    def delay_text(self) -> tuple[str, str]:
+        average = sum(self.delays) / len(self.delays)
+        return f"{average * 1e-9:.6g}", f"{max(0.0, *self.delays) * 1e-9:.6g}"
+
+    @property
+    def rate_hz(self) -> float:
+        """Arrivals after the first, over the time that they took; 0 of a single one."""
+        span = self.arrivals[-1] - self.arrivals[0]
+        return (len(self.arrivals) - 1) * 1e9 / span if span else 0.0
+
+
+class TransformStatistics:
+    """Adds up what comes on /tf and /tf_static."""
+
+    def __init__(self) -> None:
+        self._frames: dict[str, _Series] = {}
+        self._authorities: dict[str, str] = {}
+        self._nodes: dict[str, _Series] = {}
+
+    def add(self, message: TFMessage, authority: str, now_ns: int) -> None:
+        """Count a message that came at a time [ns] from a broadcaster."""
+        delays = [now_ns - ns(item.header.stamp) for item in message.transforms]
+        for item, delay in zip(message.transforms, delays, strict=True):
+            self._frames.setdefault(item.child_frame_id, _Series()).add(delay, now_ns)
+            self._authorities[item.child_frame_id] = authority
+        average = sum(delays) / max(1, len(delays))
+        self._nodes.setdefault(authority, _Series()).add(average, now_ns)
+
+    def report(self, only: Iterable[str] | None = None) -> str:
+        """Return lines about frames (all, or those of a chain) and broadcasters."""
+        wanted = set(self._frames if only is None else only)
+        lines = ["", "Frames:"]
+        for frame, series in sorted(self._frames.items()):
+            if frame in wanted:
+                average, longest = series.delay_text
+                lines.append(
+                    f"Frame: {frame}, published by {self._authorities[frame]}, Average Delay: {average}, "
+                    f"Max Delay: {longest}, Rate: {series.rate_hz:.6g} Hz"
+                )
+        lines += ["", "All Broadcasters:"]
+        for name, series in sorted((str(authority), series) for authority, series in self._nodes.items()):
+            average, longest = series.delay_text
+            lines.append(
+                f"Node: {name} {series.rate_hz:.6g} Hz, Average Delay: {average} Max Delay: {longest}"
+            )
+        return "\n".join(lines) + "\n"
+
+
+def net_delay(delays_ns: Sequence[int]) -> str:
+    """Return tf2_monitor's line about a chain."""
+    average = sum(delays_ns) / max(1, len(delays_ns))
+    return f"Net delay     avg = {average * 1e-9:.6g}: max = {max(delays_ns, default=0) * 1e-9:.6g}"
+
+
+def graphviz(infos: Sequence[FrameInfo], now_ns: int) -> str:
+    """Return the tree as a .gv file with the labels of view_frames."""
+    if not infos:
+        return 'digraph G { "No tf data received" }\n'
+    lines = ["digraph G {"]
+    for info in infos:
+        label = "\\n".join(escaped(text) for text in _label(info))
+        lines.append(f'"{escaped(info.parent)}" -> "{escaped(info.frame)}"[label=" {label}\\n"];')
+    lines += [
+        "edge [style=invis];",
+        ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";',
+        f'"Recorded at time: {now_ns * 1e-9:.6f}"[ shape=plaintext ] ;',
+    ]
+    lines += [f'}}->"{escaped(roots(infos)[0])}";', "}"]
+    return "\n".join(lines) + "\n"
+
+
+def svg(infos: Sequence[FrameInfo], now_ns: int) -> str:
+    """Return the tree as SVG: roots at the left, a column for each generation."""
+    if not infos:
+        return tree_drawing.svg({"": Node(lines=["No tf data received"])}, (), [""], title="frames")
+    tops, children = roots(infos), children_of(infos)
+    nodes = {frame: Node(lines=[frame]) for frame in tops}
+    for info in infos:
+        if info.frame not in nodes:
+            nodes[info.frame] = Node(lines=[info.frame, *_box(info)])
+    arrows = [(info.parent, info.frame) for below in children.values() for info in below]
+    note = f"Recorded at time: {now_ns * 1e-9:.6f}"
+    return tree_drawing.svg(nodes, arrows, tops, title="frames", note=note)
+
+
+def _label(info: FrameInfo) -> list[str]:
+    return [
+        f"Broadcaster: {info.broadcaster}",
+        f"Average rate: {info.rate_hz:.3f}",
+        f"Buffer length: {info.length_ns * 1e-9:.3f}",
+        f"Most recent transform: {info.newest_ns * 1e-9:.6f}",
+        f"Oldest transform: {info.oldest_ns * 1e-9:.6f}",
+    ]
+
+
+def _box(info: FrameInfo) -> list[str]:
+    rate = "static" if info.is_static else f"{info.rate_hz:.1f} Hz, latest {info.newest_ns * 1e-9:.3f} s"
+    return [info.broadcaster, rate]

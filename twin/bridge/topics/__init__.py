@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import zenoh
@@ -16,6 +17,7 @@ from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
+from twin.bridge.wire.late_session import LateSession
 from twin.bridge.wire.naming import Interface
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
@@ -65,7 +67,7 @@ class Endpoint:
     def announce(self) -> None:
         """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
         if self._token is not None:
-            self._declared.append(self.node.bus.zenoh.liveliness().declare_token(self._token))
+            self._declared.append(self.node.bus.wire.declare_token(self._token))
 
     def destroy(self) -> None:
         """Leave the graph; nothing arrives any more. Harmless when repeated."""
@@ -82,20 +84,25 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
+        self.msgtype = self.codec.msgtype
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
-        self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
-        by_zenoh = self._latched or node.bus.networked
-        self._listeners = None if by_zenoh else node.bus.in_process.listeners(self.key)
+        self._zenoh: Any = declare_publisher(node.bus.wire, self.key, qos)
+        self._listeners = None if node.bus.networked else node.bus.in_process.listeners(self.key)
+        self._retained = deque[Sample[M]](maxlen=min(qos.depth, _KEEP_ALL))
+        if self._latched and self._listeners is not None:
+            self._listeners.latched.append(self)
         self._declared.append(self._zenoh)
         self.announce()
 
     @property
     def has_subscribers(self) -> bool:
         """Whether somebody listens now, here or elsewhere; always true if latched: Zenoh does not tell."""
+        if self._latched:
+            return True
         if self._listeners is not None and self._listeners.is_direct:
             return bool(self._listeners.receivers)
-        return self._latched or self._zenoh.matching_status.matching
+        return bool(self._zenoh.matching_status.matching)
 
     def publish(self, message: M, *, frozen: bool = False) -> None:
         """Publish at the clock's time.
@@ -115,19 +122,44 @@ class Publisher(Endpoint, Generic[M]):
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
         bus, listeners = self._bus, self._listeners
+        frozen = frozen and self._by_reference
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
-        if bus.taps:
-            sample.settle(frozen and self._by_reference)
-            for tap in bus.taps:
-                tap(sample)
-        if listeners is not None and listeners.is_direct and bus.in_own_thread():
-            if listeners.receivers:
-                sample.settle(frozen and self._by_reference)
-                for receiver in listeners.receivers:
-                    receiver.enqueue(sample, False)
+        receivers = None
+        if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
+            receivers = listeners.receivers
+        latched = self._latched and receivers is not None
+        # What stays as it is, and nobody is given, need not be settled.
+        if receivers or latched or (bus.taps and not frozen):
+            sample.settle(frozen)
+        for tap in bus.taps:
+            tap(sample)
+        if receivers is not None:
+            if latched:
+                self._retained.append(sample)
+            for receiver in receivers:
+                receiver.enqueue(sample, False)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         elif bus.taps or self.has_subscribers:
-            self._zenoh.put(sample.payload, attachment=pack_attachment(*sample.source))
+            self._put(sample)
+
+    def retained(self, most: int) -> list[Sample[M]]:
+        """Return the last samples that those who come later are to hear, at most so many."""
+        return list(self._retained)[-most:]
+
+    def put_retained(self) -> None:
+        """Put these into Zenoh, of which nobody there knows yet."""
+        for sample in self._retained:
+            self._put(sample)
+        self._retained.clear()
+
+    def destroy(self) -> None:
+        """Leave the graph; who comes later hears nothing."""
+        if self._declared and self._latched and self._listeners is not None:
+            self._listeners.latched.remove(self)
+        super().destroy()
+
+    def _put(self, sample: Sample[M]) -> None:
+        self._zenoh.put(sample.payload, attachment=pack_attachment(*sample.source))
 
 
 class Subscription(Endpoint, Generic[M]):
@@ -176,14 +208,13 @@ class Subscription(Endpoint, Generic[M]):
         self._untyped = bus.networked and bus.naming.wire == "ros2dds"
         self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
-            self._declared.append(declare_subscriber(bus.zenoh, key, self._on_sample, qos))
+            self._declared.append(declare_subscriber(bus.wire, key, self._on_sample, qos))
         self._listeners = bus.in_process.listeners(self.key)
-        self._latched = qos.durability == "transient_local"
-        if self._latched:
-            self._listeners.through_zenoh += 1
-        else:
-            self._listeners.receivers.append(self)
+        self._listeners.receivers.append(self)
         self.announce()
+        if qos.durability == "transient_local":
+            for sample in self._listeners.retained(self._most):
+                self.enqueue(sample, False)
 
     @property
     def source(self) -> Attachment | None:
@@ -234,10 +265,7 @@ class Subscription(Endpoint, Generic[M]):
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""
         if self._declared:
-            if self._latched:
-                self._listeners.through_zenoh -= 1
-            else:
-                self._listeners.receivers.remove(self)
+            self._listeners.receivers.remove(self)
         super().destroy()
         for entry in self._pending:
             entry[0] = None
@@ -248,6 +276,8 @@ class Subscription(Endpoint, Generic[M]):
         bus = self.node.bus
         if bus.in_own_thread():
             # The wide expressions of a networked bus match this process's topics of other types too.
+            if bus.in_process.is_deaf:
+                return
             if not self._networked or str(sample.key_expr) == self.key:
                 self.enqueue((sample.payload.to_bytes(), sample), self._untyped)
             return
@@ -257,7 +287,7 @@ class Subscription(Endpoint, Generic[M]):
             bus.external.push(Arrival(source, self, (payload, source), len(payload)))
 
 
-def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
+def declare_publisher(wire: LateSession, key: str, qos: QoS) -> Any:
     """Return a publisher with rmw_zenoh's settings (rmw_publisher_data.cpp)."""
     reliable = qos.reliability == "reliable"
     waits = reliable and qos.history == "keep_all"
@@ -266,30 +296,34 @@ def declare_publisher(session: zenoh.Session, key: str, qos: QoS) -> Any:
         "reliability": zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT,
     }
     if qos.durability == "volatile":
-        return session.declare_publisher(key, **settings)
+        return wire.declare(lambda session: session.declare_publisher(key, **settings))
     miss = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
-    return zenoh.ext.declare_advanced_publisher(
-        session,
-        key,
-        **settings,
-        cache=zenoh.ext.CacheConfig(qos.depth),
-        sample_miss_detection=miss if reliable else None,
-        publisher_detection=True,
+    return wire.declare(
+        lambda session: zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            **settings,
+            cache=zenoh.ext.CacheConfig(qos.depth),
+            sample_miss_detection=miss if reliable else None,
+            publisher_detection=True,
+        )
     )
 
 
 def declare_subscriber(
-    session: zenoh.Session, key: str | zenoh.KeyExpr, callback: Callable[[zenoh.Sample], None], qos: QoS
+    wire: LateSession, key: str | zenoh.KeyExpr, callback: Callable[[zenoh.Sample], None], qos: QoS
 ) -> Any:
     """Return a subscriber with rmw_zenoh's settings (rmw_subscription_data.cpp)."""
     if qos.durability == "volatile":
-        return session.declare_subscriber(key, direct(callback))
+        return wire.declare(lambda session: session.declare_subscriber(key, direct(callback)))
     reliable = qos.reliability == "reliable"
-    return zenoh.ext.declare_advanced_subscriber(
-        session,
-        key,
-        direct(callback),
-        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
-        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True) if reliable else None,
-        subscriber_detection=True,
+    return wire.declare(
+        lambda session: zenoh.ext.declare_advanced_subscriber(
+            session,
+            key,
+            direct(callback),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True) if reliable else None,
+            subscriber_detection=True,
+        )
     )

@@ -2,25 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any, Protocol
+
 from twin.bridge.wire.external import Receiver
+
+
+class Latched(Protocol):
+    """A publisher whose last messages are for those who come later, too."""
+
+    def retained(self, most: int) -> list[Any]:
+        """Return the last of its samples, at most so many."""
+
+    def put_retained(self) -> None:
+        """Put them into Zenoh."""
 
 
 class Listeners:
     """Who hears one key."""
 
-    __slots__ = ("_all", "receivers", "through_zenoh")
+    __slots__ = ("every", "latched", "receivers")
 
     def __init__(self, every: InProcess) -> None:
-        self._all = every
+        self.every = every
         self.receivers: list[Receiver] = []
         """Those who can be given a message directly; Zenoh reaches them too."""
-        self.through_zenoh = 0
-        """How many Zenoh alone can reach: those who want to hear what was said before they came."""
+        self.latched: list[Latched] = []
+        """Who has something for those who come later."""
 
     @property
     def is_direct(self) -> bool:
         """Whether the receivers are all who hear the key."""
-        return not self.through_zenoh and self._all.is_private
+        return self.every.is_private
+
+    def retained(self, most: int) -> Iterator[Any]:
+        """Yield what is for a receiver that comes now: of each publisher at most so many samples."""
+        for publisher in self.latched:
+            yield from publisher.retained(most)
 
 
 class InProcess:
@@ -33,8 +51,20 @@ class InProcess:
     def __init__(self, is_private: bool) -> None:
         self.is_private = is_private
         """Whether nobody can hear a topic who is not known here."""
+        self.is_deaf = False
+        """Whether what Zenoh delivers was heard before."""
         self._listeners: dict[str, Listeners] = {}
 
     def listeners(self, key: str) -> Listeners:
         """Return who hears a key, now and later."""
         return self._listeners.setdefault(key, Listeners(self))
+
+    def go_public(self) -> None:
+        """Let Zenoh carry all from now on, and keep what those who come later are to hear."""
+        if not self.is_private:
+            return
+        self.is_private, self.is_deaf = False, True
+        for listeners in self._listeners.values():
+            for publisher in listeners.latched:
+                publisher.put_retained()
+        self.is_deaf = False

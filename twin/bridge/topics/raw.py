@@ -59,8 +59,9 @@ class RawSubscription:
         self._nameless = count(1)
         bus = node.bus
         self._announced = AnnouncedTypes(bus) if bus.networked else None
+        bus.in_process.go_public()
         self._zenoh = [
-            declare_subscriber(bus.session, zenoh.KeyExpr.autocanonize(key), self._on_sample, self.qos)
+            declare_subscriber(bus.wire, zenoh.KeyExpr.autocanonize(key), self._on_sample, self.qos)
             for key in self._keys(bus)
         ]
         node.add_endpoint(self)

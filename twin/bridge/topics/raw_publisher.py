@@ -39,7 +39,7 @@ class RawPublisher(Presence):
         super().__init__(node, "MP", topic, typename, type_hash, qos)
         self.type, self.type_hash = typename, type_hash
         self._sequence = 0
-        self._zenoh: Any = declare_publisher(node.bus.zenoh, self.key, qos)
+        self._zenoh: Any = declare_publisher(node.bus.wire, self.key, qos)
         self._declared.append(self._zenoh)
 
     @property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from twin.bridge.cdr.exact import exactness
 from twin.bridge.wire.keys import Attachment
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ class Sample(Generic[M]):
         """The publisher's count, from 1."""
         self.topic: str = publisher.name
         """Absolute name."""
-        self.msgtype = publisher.codec.msgtype
+        self.msgtype: str = publisher.msgtype
         self.time_ns = time_ns
         """Simulated time of publishing [ns]."""
         self.message = message
@@ -35,7 +34,7 @@ class Sample(Generic[M]):
     def settle(self, frozen: bool) -> None:
         """Let what is received be the message as it is now; one that is frozen need not become bytes yet."""
         if self._shared is None and self._payload is None:
-            if frozen and exactness(self.msgtype)(self.message):
+            if frozen and self.publisher.codec.is_exact(self.message):
                 self._shared = self.message
             else:
                 _ = self.payload

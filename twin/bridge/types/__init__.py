@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from twin.bridge.types import type_store
-from twin.bridge.types.known_hashes import known_hashes
 from twin.bridge.types.literals import Value
-from twin.bridge.types.type_hash import rihs01_of
+from twin.bridge.types.type_hash import known_hashes, rihs01_of
 from twin.bridge.types.type_names import dds_name as dds_name
 from twin.bridge.types.type_names import from_dds_name as from_dds_name
 from twin.bridge.types.type_names import full_name as full_name

@@ -11,8 +11,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
-from twin.bridge.types.bounds import STRINGS
-from twin.bridge.types.literals import Value
+from twin.bridge.types.literals import STRINGS, Value
 
 M = TypeVar("M")
 

@@ -12,9 +12,8 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from twin.bridge import types
-from twin.bridge.types.bounds import MOST_NUMBERS, MOST_OBJECTS, STRINGS
 from twin.bridge.types.default_values import new
-from twin.bridge.types.literals import Scalar, Value, parse_scalar
+from twin.bridge.types.literals import MOST_NUMBERS, MOST_OBJECTS, STRINGS, Scalar, Value, parse_scalar
 from twin.bridge.types.type_hash import BASE_NAMES, FieldDefs, description_of, element_of, rihs01_of
 from twin.errors import BridgeError
 

@@ -10,7 +10,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from twin.bridge import types
-from twin.bridge.types.bounds import Many
+from twin.bridge.types.literals import Many
 from twin.bridge.types.text import PADDING
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from types import ModuleType
 from typing import Any
 
 from rosbags.typesys.store import Typestore
+
+from twin.bridge.types.type_hash import FieldDefs
 
 
 class LazyTypestore(Typestore):
     """Message types and their classes; what is in `fielddefs` is known."""
 
-    def __init__(self, base: ModuleType | None = None) -> None:
-        super().__init__(base)
-        self.types = _Classes(self.types, self.fielddefs)
+    def __init__(self, fielddefs: FieldDefs) -> None:
+        super().__init__()
+        self.fielddefs.update(fielddefs)
+        self.types = _Classes(self.fielddefs)
 
     def register(self, typs: Any) -> None:
         """Make types known: name -> (constants, fields), with one field at least and all names distinct."""
@@ -23,8 +25,8 @@ class LazyTypestore(Typestore):
 class _Classes(dict[str, Any]):
     """Message classes by name."""
 
-    def __init__(self, classes: dict[str, Any], fielddefs: Any) -> None:
-        super().__init__(classes)
+    def __init__(self, fielddefs: Any) -> None:
+        super().__init__()
         self._fielddefs = fielddefs
 
     def __missing__(self, name: str) -> Any:

@@ -13,8 +13,17 @@ from typing import Any, NamedTuple
 
 from rosbags.interfaces import Nodetype
 
-from twin.bridge.types.bounds import BASE_TYPES, MOST_NUMBERS, MOST_OBJECTS, STRINGS, Many
-from twin.bridge.types.literals import Value, parse_list, parse_scalar, without_comment
+from twin.bridge.types.literals import (
+    BASE_TYPES,
+    MOST_NUMBERS,
+    MOST_OBJECTS,
+    STRINGS,
+    Many,
+    Value,
+    parse_list,
+    parse_scalar,
+    without_comment,
+)
 from twin.errors import BridgeError, Problem, nearest
 
 _ROS_1 = {"time": "builtin_interfaces/msg/Time", "duration": "builtin_interfaces/msg/Duration"}

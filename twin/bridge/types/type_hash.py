@@ -2,6 +2,9 @@
 
 rosbags has such a function too, but it hashes `char` as type 13, while rosidl maps a .msg `char` to uint8;
 that breaks ServiceEventInfo and with it every service and action hash.
+
+Those of the types that come with this package are a table, so that a start computes none; `python
+docs/reference.py` writes it, after a change of rosbags or of `interfaces/`.
 """
 
 from __future__ import annotations
@@ -9,6 +12,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from rosbags.interfaces import Nodetype
@@ -86,3 +91,13 @@ def _field_type(description: Any) -> dict[str, Any]:
         "string_capacity": string_capacity,
         "nested_type_name": nested,
     }
+
+
+TABLE = Path(__file__).with_name("known_hashes.json")
+
+
+@cache
+def known_hashes() -> Mapping[str, str]:
+    """Return the table: package/kind/Name of every type that an endpoint may have -> 'RIHS01_<64 hex>'."""
+    found: dict[str, str] = json.loads(TABLE.read_text("utf-8"))["hashes"]
+    return found

@@ -11,12 +11,11 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
-from rosbags.typesys.stores import ros2_jazzy
 
-from twin.bridge.types.bounds import BASE_TYPES
 from twin.bridge.types.folders import find_definitions
+from twin.bridge.types.jazzy import jazzy
 from twin.bridge.types.lazy_store import LazyTypestore
-from twin.bridge.types.literals import Value
+from twin.bridge.types.literals import BASE_TYPES, Value
 from twin.bridge.types.parser import Definition, Reference, Structure
 from twin.bridge.types.text import PADDING, definition_text
 from twin.bridge.types.type_hash import FieldDefs
@@ -24,7 +23,7 @@ from twin.bridge.types.type_names import full_name, whole
 from twin.bridge.types.type_parts import action_parts, action_structures, service_parts, service_structure
 from twin.errors import BridgeError, Problem, nearest
 
-store = LazyTypestore(ros2_jazzy)
+store = LazyTypestore(jazzy())
 """Every message type known so far; grows as types are used."""
 derived: FieldDefs = {}
 """Types that exist only in hashes: a service and an action as structures."""

@@ -171,9 +171,13 @@ def _settings(config: SessionConfig) -> dict[str, Any]:
     if client:
         settings["transport/unicast/open_timeout"] = round(min(config.timeout_s, _ATTEMPT_S) * 1e3)
     if config.name:
-        # An id may not start with a zero digit.
-        settings["id"] = "7" + xxhash.xxh3_128_hexdigest(config.name.encode())[1:]
+        settings["id"] = session_id(config.name)
     return settings
+
+
+def session_id(name: str) -> str:
+    """Return the id of the session of a name; it may not start with a zero digit."""
+    return "7" + xxhash.xxh3_128_hexdigest(name.encode())[1:]
 
 
 def _reason(error: zenoh.ZError) -> str:

@@ -42,7 +42,7 @@ def convert(
 
     from twin.errors import MapError
     from twin.navigation.maps.map_saver import LOSSLESS_SCALE, SaveParameters, save_map
-    from twin.navigation.maps.resampling import resampled
+    from twin.navigation.maps.occupancy_map import resampled
 
     path = yaml_path(output)
     occupancy = load(name)

@@ -23,7 +23,7 @@ def tree(file: RobotFile, *, read: ReadOptions) -> None:
     from twin.cli.console import print_error
     from twin.errors import ModelError
     from twin.models import load
-    from twin.models.tree import tree_text
+    from twin.models.graph import tree_text
 
     try:
         description = load(file, read)

@@ -33,6 +33,23 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> BridgeError:
     return BridgeError(f"Unknown {kind} '{name}'; {instead(kind, name, known)}")
 
 
+def known(kind: str, name: str, names: Mapping[str, Sequence[str]], hidden: bool = True) -> str:
+    """Return the absolute name of a topic, service or action that is there.
+
+    Raises:
+        BridgeError: it is not; tells the nearest, of hidden ones only if they are wanted.
+    """
+    if absolute(name) not in names:
+        raise unknown(kind, name, shown(names, hidden))
+    return absolute(name)
+
+
+def print_types(kind: str, name: str, names: Mapping[str, Sequence[str]], hidden: bool = True) -> None:
+    """Print the types of what has a name; raises what `known` raises."""
+    for typename in names[known(kind, name, names, hidden)]:
+        typer.echo(typename)
+
+
 def instead(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the nearest of the names that there are, and all of them."""
     names = list(known)

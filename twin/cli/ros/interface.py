@@ -12,7 +12,7 @@ from twin.cli.option_groups import example, takes
 from twin.cli.ros.joining import Interfaces, add_interfaces
 
 if TYPE_CHECKING:
-    from twin.bridge.types.show import Comments
+    from twin.bridge.types.text import Comments
 
 app = typer.Typer(no_args_is_help=True, help="Types: list, show, prototypes; as `ros2 interface`.")
 
@@ -44,7 +44,7 @@ def show(
     """Show a definition, and those of the types that it uses, indented."""
     if all_comments and no_comments:
         raise typer.BadParameter("not together with --no-comments", param_hint="--all-comments")
-    from twin.bridge.types.show import show_lines
+    from twin.bridge.types.text import show_lines
 
     add_interfaces(interfaces)
     comments: Comments = "all" if all_comments else "none" if no_comments else "own"
@@ -97,7 +97,7 @@ def proto(
     interfaces: Interfaces = None,
 ) -> None:
     """Show a message, a request or a goal with all its fields as YAML, to copy and fill in."""
-    from twin.bridge.messages.as_yaml import prototype
+    from twin.bridge.messages.as_text import prototype
 
     add_interfaces(interfaces)
     text = prototype(_given(typename))

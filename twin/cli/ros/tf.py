@@ -40,7 +40,7 @@ def tree(wait_time: WaitTime = 2.0, *, joining: Joining) -> None:
 def frames(output: Output = None, wait_time: WaitTime = 5.0, *, joining: Joining) -> None:
     """Draw the tree: Graphviz text as view_frames writes it, or SVG, which needs no Graphviz."""
     check_ending(output)
-    from twin.bridge.tf.drawing import graphviz, svg
+    from twin.bridge.tf.report import graphviz, svg
 
     with joining.open() as process:
         infos, now_ns = _listen(process, wait_time)
@@ -93,7 +93,7 @@ def monitor(
     """Report delay and rate of every frame and broadcaster, or of a chain; the words are tf2_monitor's."""
     if (source_frame is None) != (target_frame is None):
         raise BridgeError("tf monitor takes two frames, or none for all")
-    from twin.bridge.tf.monitor import TransformStatistics, net_delay
+    from twin.bridge.tf.report import TransformStatistics, net_delay
 
     with joining.open() as process:
         clock, statistics = process.bus.clock, TransformStatistics()

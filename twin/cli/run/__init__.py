@@ -18,6 +18,6 @@ def run(*, options: RunOptions) -> None:
         from twin.cli.run.once import run_once
 
         raise typer.Exit(run_once(options))
-    from twin.cli.run.repeat import run_repeatedly
+    from twin.cli.run.batch import run_repeatedly
 
     raise typer.Exit(run_repeatedly(options))

@@ -1,8 +1,13 @@
-"""`twin test`: many scenarios as tests."""
+"""Many runs: `twin test`, scenarios as tests, and `twin run --repeat`, which compares the digests.
+
+Each run is in a process of its own: a crash or a leftover of one run cannot touch the next.
+"""
 
 from __future__ import annotations
 
 import json as json_module
+import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,8 +15,41 @@ from typing import Annotated, Any
 import typer
 
 from twin.cli import completion
+from twin.cli.console import stderr, stdout
+from twin.cli.run.folders import results_folder
+from twin.cli.run.options import RunOptions
 from twin.errors import ScenarioError
 from twin.files.reading import absence
+
+COMMAND = (sys.executable, "-m", "twin.cli")
+"""How to start another `twin`."""
+
+
+def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
+    """Return the content of the run's `verdict.json`; a process that dies gives a verdict of error."""
+    child = subprocess.run(
+        [*COMMAND, *options.arguments(out)],
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},  # whatever this process's terminal can show
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
+    )
+    if child.returncode == 130:
+        raise KeyboardInterrupt
+    try:
+        verdict: dict[str, Any] = json_module.loads(child.stdout)
+    except json_module.JSONDecodeError:
+        from twin.scenario.verdict import Verdict
+
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "stderr.txt").write_text(child.stderr, encoding="utf-8")
+        last = (child.stderr.strip() or "no message").splitlines()[-1]
+        error = (
+            f"the run's process ended with code {child.returncode}: {last} (all of it: {out / 'stderr.txt'})"
+        )
+        return Verdict(scenario=options.scenario.stem, seed=0, error=error).to_dict()
+    return verdict
 
 
 def run_batch(
@@ -38,10 +76,6 @@ def run_batch(
 
     Exit code 0: all pass; 1: one fails; 2: one could not be run.
     """
-    from twin.cli.console import stderr, stdout
-    from twin.cli.run.child import run_in_child
-    from twin.cli.run.folders import results_folder
-    from twin.cli.run.options import RunOptions
     from twin.cli.run.verdict_table import many_report
     from twin.files.writing import check_file, write_whole
 
@@ -62,7 +96,7 @@ def run_batch(
         sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")
     else:
         stdout().print(many_report(verdicts))
-    raise typer.Exit(max({"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]] for verdict in verdicts))
+    raise typer.Exit(max(map(_exit_code, verdicts)))
 
 
 def own_scenarios() -> Path:
@@ -91,3 +125,44 @@ def scenario_files(paths: list[Path]) -> list[Path]:
             raise ScenarioError(f"{path}: {absence(path)}")
         files |= dict.fromkeys(found)
     return list(files)
+
+
+def run_repeatedly(options: RunOptions) -> int:
+    """Run some times in fresh processes, print the digests, and return the exit code."""
+    from twin.scenario import schema
+
+    runs = max(2, options.repeat)  # one run has nothing to be compared with
+    name = "" if options.out else schema.load(options.scenario, options.overrides).name
+    verdicts: list[dict[str, Any]] = []
+    with results_folder(options.out, name) as parent, stderr().status("") as status:
+        for number in range(1, runs + 1):
+            status.update(f"run {number} of {runs}")
+            verdicts.append(run_in_child(options, parent / str(number)))
+    digests = sorted({verdict["digest"] or "none" for verdict in verdicts})
+    if options.json:
+        sys.stdout.write(json_module.dumps({"runs": verdicts, "digests": digests}, indent=2) + "\n")
+    else:
+        _report(verdicts, digests)
+    differ = options.expect_one_hash and (len(digests) > 1 or digests == ["none"])
+    return max(*map(_exit_code, verdicts), int(differ))
+
+
+def _exit_code(verdict: dict[str, Any]) -> int:
+    return {"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]]
+
+
+def _report(verdicts: list[dict[str, Any]], digests: list[str]) -> None:
+    from rich.text import Text
+
+    from twin.cli.run.verdict_table import many_report
+
+    console = stdout()
+    console.print(many_report(verdicts))
+    if len(digests) == 1:
+        console.print(Text(f"one digest: {digests[0]}", style="green"))
+    else:
+        console.print(Text(f"{len(digests)} different digests:", style="red"))
+        found = [verdict["digest"] or "none" for verdict in verdicts]
+        for digest in digests:
+            numbers = [str(number) for number, other in enumerate(found, 1) if other == digest]
+            console.print(f"  {digest}  run {', '.join(numbers)}")

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from twin.convert.ledger.fates import Fate, container_fate
 from twin.models.description import RobotDescription
-from twin.models.urdf.commands import command_interface
+from twin.models.urdf.commands import (
+    HARDWARE,
+    Transmission,
+    command_interface,
+    hardware_interface,
+    transmissions,
+)
 from twin.models.urdf.document import Element
 from twin.models.urdf.gazebo import number_in
-from twin.models.urdf.transmissions import HARDWARE, Transmission, hardware_interface, transmissions
 
 HARDWARE_ONLY: Fate = ("dropped", "a matter of the hardware")
 

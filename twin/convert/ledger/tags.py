@@ -15,7 +15,7 @@ from twin.convert.geoms import wheel_ellipsoid
 from twin.convert.ledger.commands import CommandFates
 from twin.convert.ledger.fates import Fate, Outcome, lost_attributes
 from twin.convert.ledger.gazebo import gazebo_fate
-from twin.models.checks.source import is_repeated, number, read_source
+from twin.models.checks.diagnostic import is_repeated, number, read_source
 from twin.models.description import WORLD, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.shapes import Cylinder, Mesh

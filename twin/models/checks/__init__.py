@@ -11,7 +11,7 @@ from twin.models.description import RobotDescription
 __all__ = ["CHECKS", "ERRORS", "WARNINGS", "Diagnostic", "check", "from_problems", "in_file_order"]
 
 CHECKS = (
-    "masses:masses",
+    "inertia:masses",
     "meshes:meshes",
     "wheels:wheel_axis",
     "wheels:wheel_fixed",
@@ -21,8 +21,8 @@ CHECKS = (
     "inertia:impossible_inertia",
     "inertia:inertia",
     "poses:visual_collision",
-    "limits:limits",
-    "motors:weak_motor",
+    "joints:limits",
+    "joints:weak_motor",
     "spelling:axis_length",
     "spelling:rounded_angle",
     "spelling:material_elsewhere",

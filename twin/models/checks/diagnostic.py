@@ -1,7 +1,8 @@
-"""One finding of a check."""
+"""One finding of a check: about the description, or about the text for what has no effect and is not kept."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 from twin.errors import Problem, SourceLine
 from twin.models.checks.codes import ERRORS, Severity, severity_of
 from twin.models.description import RobotDescription
-from twin.models.urdf.document import Report
+from twin.models.urdf.document import Element, Report, parse, place
+from twin.models.urdf.plain_numbers import plain_number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,3 +71,32 @@ def in_file_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by file and line, those without a line last, each once; else as they were found."""
     distinct = dict.fromkeys(diagnostics)
     return tuple(sorted(distinct, key=lambda found: (found.line is None, str(found.file), found.line or 0)))
+
+
+ONCE = ("inertial", "visual", "collision", "joint")
+"""Elements in which each other one stands once."""
+
+
+def read_source(description: RobotDescription) -> tuple[Element, Report]:
+    """Return the root element of the robot's text, and a report that knows its lines."""
+    report = Report(description.source, description.lines)
+    return parse(description.urdf.encode(), report), report
+
+
+def finding_in(report: Report, code: str, element: Element, message: str, fix: str) -> Diagnostic:
+    """Return a diagnostic of an element of the text that `report` is of."""
+    return finding(report, code, place(element), report.line(element), message, fix)
+
+
+def number(text: str | None) -> float:
+    """Return the number in a text, or NaN: only the first of repeated elements was validated."""
+    try:
+        return plain_number(text or "")
+    except ValueError:
+        return math.nan
+
+
+def is_repeated(element: Element) -> bool:
+    """Tell whether an element stands a second time where URDF has it once."""
+    parent = element.getparent()
+    return parent is not None and parent.tag in ONCE and parent.find(element.tag) is not element

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.errors import nearest
-from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.checks.source import finding_in, read_source
+from twin.models.checks.diagnostic import Diagnostic, finding, finding_in, read_source
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
-from twin.models.urdf.cameras import CAMERA, camera_fault, lenses
-from twin.models.urdf.commands import INTERFACES, command_interface
+from twin.models.urdf.commands import HARDWARE, INTERFACES, command_interface, transmissions
 from twin.models.urdf.document import Element, Report, first
 from twin.models.urdf.drives import is_drive, library_of
 from twin.models.urdf.gazebo import MU1, MU2, NUMBERS, extensions_of, number_in, value_of
-from twin.models.urdf.sensors import PLUGIN_IMU, kind_of
-from twin.models.urdf.transmissions import HARDWARE, transmissions
+from twin.models.urdf.sensors import CAMERA, PLUGIN_IMU, camera_fault, kind_of, lenses
 
 OWN_PLUGINS = ("joint_state_publisher", "joint-state-publisher-system", "_control", "_control-system")
 """Ends of the names of libraries whose work twin's own nodes do: joint states, and running controllers."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
-from twin.models.checks.diagnostic import Diagnostic
-from twin.models.checks.source import finding_in, is_repeated, number, read_source
+from twin.models.checks.diagnostic import Diagnostic, finding_in, is_repeated, number, read_source
 from twin.models.description import RobotDescription
 from twin.models.urdf.document import Element
 

@@ -1,4 +1,4 @@
-"""Inertias that no body of the link's size has, or that were never computed."""
+"""Parts that weigh nothing, and inertias that no body of the link's size has, or that were never computed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.checks.diagnostic import Diagnostic, finding
-from twin.models.description import Inertial, RobotDescription
+from twin.models.description import WORLD, Inertial, RobotDescription
+from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import LEAST, describe_repair, inertia_as_urdf, inertia_fault
 from twin.models.shapes import Mesh
 from twin.models.solids import Shape, all_solid, bounds, homogeneous_inertia
@@ -119,3 +120,28 @@ def _is_placeholder(actual: Array, expected: Array) -> bool:
     isotropic = np.allclose(actual, actual[0, 0] * np.eye(3), rtol=0.0, atol=1e-6 * actual[0, 0])
     moments = np.linalg.eigvalsh(expected)
     return bool(isotropic and moments[2] > ALIKE * moments[0])
+
+
+def masses(description: RobotDescription) -> Iterator[Diagnostic]:
+    """Yield rigid parts (links on fixed joints) without mass, and visible ones without collision shape."""
+    heads = rigid_groups(description)
+    heavy = description.settlement.bodies
+    for head in dict.fromkeys(heads.values()):
+        links = [description.links[name] for name in heads if heads[name] == head]
+        fixed = ", ".join(link.name for link in links if link.name != head)
+        others = f" (nor do the links fixed to it: {fixed})" if fixed else ""
+        line = description.links[head].line
+        if not any(link.name in heavy for link in links) and head != WORLD:
+            code, message = "massless", f"moves and weighs nothing{others}"
+            if head == description.root:
+                code = "massless-base"
+                message = f"the base '{head}' weighs nothing{others}; it can only be fixed to the ground"
+            fix = "give it <inertial> with <mass value='…'/> and <inertia ixx='…' iyy='…' izz='…'/>"
+            yield finding(description, code, f"link '{head}'", line, message, fix)
+        visible = [link.name for link in links if link.visuals]
+        also = f" (also of {', '.join(visible[1:])})" if visible[1:] else ""
+        if visible and not any(link.collisions for link in links):
+            first, line = f"link '{visible[0]}'", description.links[visible[0]].line
+            message = f"seen, not touched: there is no collision shape{also}"
+            fix = "add <collision> with the same <origin> and a simple <geometry>"
+            yield finding(description, "no-collision", first, line, message, fix)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from twin.models.checks.diagnostic import Diagnostic
-from twin.models.checks.source import finding_in, number, read_source
+from twin.models.checks.diagnostic import Diagnostic, finding_in, number, read_source
 from twin.models.description import RobotDescription
 from twin.models.urdf.document import Element, place
 

@@ -16,8 +16,7 @@ import numpy as np
 from lxml import etree
 
 from twin.geometry import Array
-from twin.models.mesh.allowance import Allowance
-from twin.models.mesh.dae_geometry import GeometryReader, Part
+from twin.models.mesh.dae_geometry import Allowance, GeometryReader, Part
 from twin.models.mesh.mesh_formats import MOST_FACES, Faces, Rgb, TriangleMesh, too_many
 from twin.models.urdf.document import Element, safe_parser
 

@@ -16,8 +16,7 @@ from twin.models.mesh.meshes import read_mesh
 from twin.models.options import ReadOptions
 from twin.models.shapes import Box, Capsule, Collision, Cylinder, Geometry, Mesh, SkippedMesh, Sphere, Visual
 from twin.models.urdf.document import Element, Report, describe, owner
-from twin.models.urdf.packages import Packages
-from twin.models.urdf.resources import locate
+from twin.models.urdf.packages import Packages, locate
 
 Rgba = tuple[float, float, float, float]
 

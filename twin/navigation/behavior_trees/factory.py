@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from twin.errors import NavigationError, Problem, nearest
-from twin.navigation.behavior_trees import decorators, leaves, nav2_control, parallel, sequences
+from twin.navigation.behavior_trees import decorators, leaves, nav2_control, sequences
 from twin.navigation.behavior_trees.blackboard import Blackboard
 from twin.navigation.behavior_trees.node import DecoratorNode, NodeSetup, Status, TreeContext, TreeNode
 from twin.navigation.behavior_trees.ports import is_pointer, read_value
@@ -37,7 +37,7 @@ def nodes_of(*modules: ModuleType) -> Registry:
 
 
 BASIC_NODES: Registry = {
-    **nodes_of(sequences, parallel, decorators, leaves, nav2_control),
+    **nodes_of(sequences, decorators, leaves, nav2_control),
     "SequenceStar": sequences.SequenceWithMemory,
     "RetryUntilSuccesful": decorators.RetryUntilSuccessful,
 }

@@ -119,13 +119,19 @@ def _room(polygon: MonitorPolygon, ratio: float, v: float) -> float:
 
 
 @jit
+def _reach(corners: Array) -> float:
+    """Return the distance of the farthest corner, shape (n, 2), and a trifle [m]."""
+    squared = 0.0
+    for i in range(corners.shape[0]):
+        squared = max(squared, corners[i, 0] ** 2 + corners[i, 1] ** 2)
+    return math.sqrt(squared) * (1.0 + 1e-9)
+
+
+@jit
 def count_inside(points: Array, corners: Array, x: float, y: float, yaw: float) -> int:
     """Return how many points, shape (n, 2), are in a polygon, shape (m, 2), moved to a pose."""
     c, s, inside, n = math.cos(yaw), math.sin(yaw), 0, corners.shape[0]
-    reach = 0.0  # squared; most points are farther away than any corner
-    for i in range(n):
-        reach = max(reach, corners[i, 0] ** 2 + corners[i, 1] ** 2)
-    reach *= 1.0 + 1e-9
+    reach = _reach(corners) ** 2  # most points are farther away than any corner
     for k in range(points.shape[0]):
         dx, dy = points[k, 0] - x, points[k, 1] - y
         if dx * dx + dy * dy > reach:
@@ -160,8 +166,16 @@ def time_to_collision(
         horizon: How far is looked ahead [s]; negative: only at the present.
         min_points: How many points make a collision.
     """
+    # What is farther away than the polygon comes is never in it.
+    far = _reach(corners) + abs(v) * (max(horizon, 0.0) + 2.0 * dt)
+    near, count = np.empty_like(points), 0
+    for k in range(points.shape[0]):
+        if points[k, 0] ** 2 + points[k, 1] ** 2 <= far**2:
+            near[count, 0], near[count, 1] = points[k, 0], points[k, 1]
+            count += 1
+    near = near[:count]
     x, y, yaw, time = 0.0, 0.0, 0.0, -dt
-    while count_inside(points, corners, x, y, yaw) < min_points:
+    while count_inside(near, corners, x, y, yaw) < min_points:
         time += dt
         if time > horizon + 1e-9:
             return -1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,10 @@ from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import inflation_costs
 from twin.navigation.costmaps.kernels import Cells
 from twin.navigation.costmaps.window import Window
+
+Squares = NDArray[np.uint16] | NDArray[np.uint32]
+_MOST_NARROW = 180
+"""Cells that an obstacle reaches for which the sum of two squares fits into 16 bits."""
 
 
 class Inflation:
@@ -32,9 +37,16 @@ class Inflation:
         self.reach = math.floor(inflation_radius / resolution + 1e-9)
         """How many cells an obstacle reaches."""
         self.inflate_unknown = inflate_unknown
-        cells = np.arange(-self.reach, self.reach + 1, dtype=np.float64)
-        self._profile = inflation_costs(
-            np.hypot(cells[self.reach :, None], cells) * resolution,
+        cells = np.arange(self.reach + 2)
+        # Narrow numbers are added and compared many at a time.
+        dtype: Any = np.uint16 if self.reach <= _MOST_NARROW else np.uint32
+        self._squares: Squares = (cells**2).astype(dtype)
+        along, across = np.meshgrid(cells[:-1], cells[:-1])
+        squared, end = along**2 + across**2, int(self._squares[-1])
+        near = squared < end
+        self._costs = np.zeros(end + 1, dtype=np.uint8)
+        self._costs[squared[near]] = inflation_costs(
+            np.hypot(along[near], across[near]) * resolution,
             inscribed_radius=inscribed_radius,
             inflation_radius=inflation_radius,
             cost_scaling_factor=cost_scaling_factor,
@@ -43,67 +55,82 @@ class Inflation:
     def write(self, costs: Cells, master: Cells, window: Window) -> None:
         """Rewrite the window of `costs` from `master`, the combined layers; both of the same shape."""
         if not window.empty:
-            _inflate(costs, master, self._profile, self.inflate_unknown, window)
+            _inflate(costs, master, self._costs, self._squares, self.inflate_unknown, window)
 
 
 @jit
-def _gaps(
-    master: Cells, far: int, x0: int, y0: int, x1: int, y1: int, above: int, below: int
-) -> NDArray[np.uint16]:
-    """Return for the cells of a window how far the nearest lethal cell of their column is, at most `far`."""
-    gaps = np.empty((y1 - y0, x1 - x0), dtype=np.uint16)
-    run = np.full(x1 - x0, far, dtype=np.uint16)
-    for y in range(below, y1):
-        line = master[y, x0:x1]
+def _squared_gaps(
+    master: Cells, squares: Squares, left: int, right: int, y0: int, y1: int, before: int
+) -> Squares:
+    """Return for the cells of some rows how far the nearest lethal cell of their column is, squared.
+
+    Args:
+        master: The layers' costs.
+        squares: As `_inflate` has them: the last is for what is farther away than any of them.
+        left: First column.
+        right: The one after the last column.
+        y0: First row.
+        y1: The one after the last row.
+        before: Columns without anything, that the result begins with, and ends with.
+    """
+    far, most = squares.size - 1, np.uint16(squares.size - 1)
+    result = np.full((y1 - y0, right - left + 2 * before), squares[-1], dtype=squares.dtype)
+    gaps = np.empty((y1 - y0, right - left), dtype=np.uint16)
+    run = np.full(right - left, far, dtype=np.uint16)
+    for y in range(max(0, y0 - far + 1), y1):
+        line = master[y, left:right]
         for k in range(run.size):
-            run[k] = 0 if line[k] == 254 else min(run[k] + 1, far)
+            run[k] = np.uint16(0) if line[k] == 254 else np.uint16(run[k] + np.uint16(run[k] < most))
         if y >= y0:
             row = gaps[y - y0]
             for k in range(run.size):
                 row[k] = run[k]
     run[:] = far
-    for i in range(above - y0):
-        y = above - 1 - i
-        line = master[y, x0:x1]
+    for y in range(min(master.shape[0], y1 + far - 1) - 1, y0 - 1, -1):
+        line = master[y, left:right]
         for k in range(run.size):
-            run[k] = 0 if line[k] == 254 else min(run[k] + 1, far)
+            run[k] = np.uint16(0) if line[k] == 254 else np.uint16(run[k] + np.uint16(run[k] < most))
         if y < y1:
-            row = gaps[y - y0]
+            row, out = gaps[y - y0], result[y - y0, before : before + run.size]
             for k in range(run.size):
-                row[k] = min(row[k], run[k])
-    return gaps
+                gap = min(row[k], run[k])
+                out[k] = gap * gap
+    return result
 
 
 @jit
-def _inflate(costs: Cells, master: Cells, profile: Cells, inflate_unknown: bool, window: Window) -> None:
+def _inflate(
+    costs: Cells, master: Cells, by_square: Cells, squares: Squares, inflate_unknown: bool, window: Window
+) -> None:
     """Rewrite the window of `costs`.
 
     Args:
         costs: Written.
         master: The layers' costs: 254 is inflated, 255 unknown.
-        profile: profile[g, r + k] is the cost at g cells along and k cells across, shape (r + 1, 2 r + 1).
+        by_square: The cost at the root of so many cells.
+        squares: 0, 1, 4 … of as many cells as an obstacle reaches, and of one more, which is too far.
         inflate_unknown: Whether every cost goes into unknown cells, not only 253 and above.
         window: Which cells are written.
     """
-    height, width = master.shape
     x0, y0, x1, y1 = window
-    r = profile.shape[0] - 1
-    left, right = max(0, x0 - r), min(width, x1 + r)
-    gaps = _gaps(master, r + 1, left, y0, right, y1, min(height, y1 + r), max(0, y0 - r))
-    # One row's inflation, with room for what reaches out of the window.
-    row = np.zeros(right - left + 2 * r, dtype=np.uint8)
+    r, n = squares.size - 2, x1 - x0
+    left, right = max(0, x0 - r), min(master.shape[1], x1 + r)
+    # Beyond the grid there is nothing, for as far as the window's first or last columns reach.
+    room = max(left - x0 + r, x1 + r - right)
+    gaps = _squared_gaps(master, squares, left, right, y0, y1, room)
+    first = x0 - left + room
+    nearest, other = np.empty(n, dtype=squares.dtype), np.empty(n, dtype=squares.dtype)
     for y in range(y0, y1):
         line = gaps[y - y0]
-        row[:] = 0
-        for i in range(line.size):
-            if line[i] <= r:
-                target, source = row[i : i + 2 * r + 1], profile[line[i]]
-                for k in range(source.size):
-                    target[k] = max(target[k], source[k])
-        shift = x0 - left + r
-        inflated, base, out = row[shift : shift + x1 - x0], master[y, x0:x1], costs[y, x0:x1]
-        for k in range(out.size):
-            cost = inflated[k]
+        nearest[:] = line[first : first + n]
+        for d in range(1, r + 1):
+            before, after, square = line[first - d :], line[first + d :], squares[d]
+            for k in range(n):
+                other[k] = min(before[k], after[k]) + square
+                nearest[k] = min(nearest[k], other[k])
+        base, out = master[y, x0:x1], costs[y, x0:x1]
+        for k in range(n):
+            cost = by_square[nearest[k]]
             if base[k] == 255:
                 out[k] = cost if cost >= 253 or (inflate_unknown and cost > 0) else 255
             else:

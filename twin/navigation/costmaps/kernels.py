@@ -40,7 +40,7 @@ def trace_scan(
         clearing: raytrace_min_range, raytrace_max_range [m].
         frame: Of the grid.
     """
-    height, width = obstacles.shape
+    (height, width), cells = obstacles.shape, obstacles.reshape(-1)
     origin_x, origin_y, resolution = frame
     sx, sy = (sensor[0] - origin_x) / resolution, (sensor[1] - origin_y) / resolution
     if sx < 0.0 or sy < 0.0 or sx >= width or sy >= height:
@@ -54,26 +54,26 @@ def trace_scan(
         t_start = clearing[0] / (length * resolution)
         t_end = min(1.0, clearing[1] / (length * resolution))
         ix, iy = int(sx), int(sy)
-        step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
+        at, step_x, step_y = iy * width + ix, (1 if dx > 0.0 else -1), (width if dy > 0.0 else -width)
+        # steps that stay on the grid
+        room_x, room_y = (width - 1 - ix if dx > 0.0 else ix), (height - 1 - iy if dy > 0.0 else iy)
         t_dx = abs(1.0 / dx) if dx != 0.0 else math.inf
         t_dy = abs(1.0 / dy) if dy != 0.0 else math.inf
         t_x = ((ix + 1 - sx) if dx > 0.0 else (sx - ix)) * t_dx if dx != 0.0 else math.inf
         t_y = ((iy + 1 - sy) if dy > 0.0 else (sy - iy)) * t_dy if dy != 0.0 else math.inf
         while True:
             if t_x >= t_start and t_y >= t_start:
-                obstacles[iy, ix] = 0
+                cells[np.uint64(at)] = 0
             if t_x < t_y:
-                if t_x > t_end:
+                if t_x > t_end or room_x == 0:
                     break
-                ix += step_x
+                at, room_x = at + step_x, room_x - 1
                 t_x += t_dx
             else:
-                if t_y > t_end:
+                if t_y > t_end or room_y == 0:
                     break
-                iy += step_y
+                at, room_y = at + step_y, room_y - 1
                 t_y += t_dy
-            if ix < 0 or iy < 0 or ix >= width or iy >= height:
-                break
     for k in range(points.shape[0]):
         distance = math.hypot(points[k, 0] - sensor[0], points[k, 1] - sensor[1])
         if not (marking[0] <= distance <= marking[1]):

@@ -59,6 +59,7 @@ class LayeredCostmap:
             origin = (-config.width / 2.0, -config.height / 2.0)
         else:
             shape, origin = static.data.shape, (static.origin.x, static.origin.y)
+        self._polygon = config.polygon
         self._static: Cells = np.full(shape, unknown, dtype=np.uint8)
         if static is not None and "static_layer" in config.plugins:
             self._static = _static_costs(static, config)
@@ -139,7 +140,7 @@ class LayeredCostmap:
         clearing = float(config.raytrace_min_range), float(config.raytrace_max_range)
         self._touch(self._obstacles.trace(points, (x, y), marking, clearing, self._grid.frame))
         if robot is not None and config.footprint_clearing_enabled:
-            self._touch(self._obstacles.clear_polygon(robot.apply(config.polygon), self._grid.frame))
+            self._touch(self._obstacles.clear_polygon(robot.apply(self._polygon), self._grid.frame))
 
     def update_range(
         self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float

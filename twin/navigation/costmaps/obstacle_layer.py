@@ -11,7 +11,7 @@ from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE
 from twin.navigation.costmaps.kernels import Cells, Triple, trace_scan
 from twin.navigation.costmaps.layer import SensedLayer
-from twin.navigation.costmaps.window import NOTHING, Window, differing, everything
+from twin.navigation.costmaps.window import Window, differing, everything
 
 
 class ObstacleLayer(SensedLayer):
@@ -39,7 +39,7 @@ class ObstacleLayer(SensedLayer):
         ).clipped(self.cells.shape)
         before = self.cells[around.slices].copy()
         trace_scan(self.cells, points, sensor, marking, clearing, frame)
-        return differing(before, self.cells[around.slices], around)
+        return Window(*differing(before, self.cells, around))
 
     def mark(self, points: Array, frame: Triple) -> Window:
         """Mark the cells of points, shape (n, 2) [m], without a ray to them; return where that may matter."""
@@ -54,22 +54,30 @@ class ObstacleLayer(SensedLayer):
 
         Nav2's footprint clearing: where the robot stands nothing else is.
         """
-        cells = (corners - frame[:2]) / frame[2]
-        low, high = np.floor(cells.min(axis=0)).astype(int), np.ceil(cells.max(axis=0)).astype(int)
-        around = Window(*low.tolist(), *(high + 1).tolist()).clipped(self.cells.shape)
-        if around.empty:
-            return NOTHING
-        before = self.cells[around.slices].copy()
-        _fill_convex(self.cells, np.ascontiguousarray(cells), around)
-        return differing(before, self.cells[around.slices], around)
+        return Window(*_free_convex(self.cells, corners, frame))
 
 
 @jit
-def _fill_convex(cells: Cells, corners: Array, window: Window) -> None:
-    """Free the cells of a window whose centres lie in a convex polygon, given in cells, of either sense."""
-    n = corners.shape[0]
-    for y in range(window.y0, window.y1):
-        for x in range(window.x0, window.x1):
+def _free_convex(cells: Cells, polygon: Array, frame: Triple) -> tuple[int, int, int, int]:
+    """Free the cells whose centres lie in a convex polygon, shape (n, 2), of either sense.
+
+    Return the smallest window of those that were not free.
+    """
+    (height, width), n = cells.shape, polygon.shape[0]
+    corners = np.empty((n, 2))  # in cells
+    low_x = low_y = math.inf
+    high_x = high_y = -math.inf
+    for k in range(n):
+        corners[k, 0] = x = (polygon[k, 0] - frame[0]) / frame[2]
+        corners[k, 1] = y = (polygon[k, 1] - frame[1]) / frame[2]
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        low_y, high_y = min(low_y, y), max(high_y, y)
+    first, last = max(0, math.floor(low_x)), min(width, math.ceil(high_x) + 1)
+    x0, y0, x1, y1 = width, height, 0, 0
+    for y in range(max(0, math.floor(low_y)), min(height, math.ceil(high_y) + 1)):
+        for x in range(first, last):
+            if cells[y, x] == 0:
+                continue
             left, right = False, False
             for k in range(n):
                 m = (k + 1) % n
@@ -80,3 +88,5 @@ def _fill_convex(cells: Cells, corners: Array, window: Window) -> None:
                 right = right or side < 0.0
             if not (left and right):
                 cells[y, x] = 0
+                x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x + 1), max(y1, y + 1)
+    return (x0, y0, x1, y1) if y1 > y0 else (0, 0, 0, 0)

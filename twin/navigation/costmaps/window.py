@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from twin.navigation._jit import jit
 from twin.navigation.costmaps.kernels import Cells
 
 
@@ -54,16 +54,28 @@ def everything(shape: tuple[int, ...]) -> Window:
     return Window(0, 0, shape[1], shape[0])
 
 
-def differing(before: NDArray[np.uint8], after: NDArray[np.uint8], window: Window) -> Window:
-    """Return the smallest window, of the grid that `window` was cut out of, in which two cuts differ."""
-    differs = before != after
-    ys = np.flatnonzero(differs.any(axis=1))
-    if not ys.size:
-        return NOTHING
-    y0, y1 = int(ys[0]), int(ys[-1]) + 1
-    xs = np.flatnonzero(differs[y0:y1].any(axis=0))
-    x0, x1 = int(xs[0]), int(xs[-1]) + 1
-    return Window(window.x0 + x0, window.y0 + y0, window.x0 + x1, window.y0 + y1)
+@jit
+def differing(before: Cells, after: Cells, window: Window) -> tuple[int, int, int, int]:
+    """Return the smallest window in which a grid differs from what was in a window of it before.
+
+    Args:
+        before: Shape (window's height, width).
+        after: The whole grid.
+        window: Where `before` was.
+    """
+    left, top, right, bottom = window.x1, -1, -1, -1
+    for y in range(window.y0, window.y1):
+        was, row, some = before[y - window.y0], after[y, window.x0 : window.x1], np.uint8(0)
+        for x in range(row.size):
+            some |= was[x] ^ row[x]
+        if some:
+            top, bottom, first, last = (top if top >= 0 else y), y, 0, row.size - 1
+            while was[first] == row[first]:
+                first += 1
+            while was[last] == row[last]:
+                last -= 1
+            left, right = min(left, window.x0 + first), max(right, window.x0 + last)
+    return (left, top, right + 1, bottom + 1) if bottom >= 0 else (0, 0, 0, 0)
 
 
 def raised(costs: Cells, layer: Cells) -> Cells:

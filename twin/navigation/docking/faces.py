@@ -1,15 +1,22 @@
-"""Docking with a lidar: where the wall or the box in front is, read from scan points in the base frame."""
+"""What a planar lidar sees of what is in front: the face of a wall or a box to dock at, in the base frame.
+
+Detectors tell where the boxes are that a gripper is to take.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
+from twin.parameters import Metres, Positive
 
 CORNER = 0.02
 """A chain of points that leaves its chord by more than this has a corner [m]."""
@@ -95,8 +102,10 @@ def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, flo
     if not may_be.any():
         return None
     normals, offsets = normals[may_be], offsets[may_be]
-    squared = (normals @ some.T - offsets[:, None]) ** 2
-    best = int(np.argmin(np.minimum(squared, _ON_LINE**2).sum(axis=1)))
+    squared = normals @ some.T
+    squared -= offsets[:, None]
+    squared *= squared
+    best = int(np.argmin(np.minimum(squared, _ON_LINE**2, out=squared).sum(axis=1)))
     return normals[best], float(offsets[best])
 
 
@@ -187,3 +196,54 @@ def _face(points: Array, width: float, tolerance: float) -> BoxFace | None:
         return None
     centre = offset * normal + 0.5 * (low + high) * tangent
     return BoxFace(pose=Pose2(float(centre[0]), float(centre[1]), yaw), width=measured)
+
+
+class Detector(ABC):
+    """Finds what is to be grasped in one scan."""
+
+    Config: ClassVar[type | None] = None
+    """The class of its parameters: a frozen dataclass; None: it has none."""
+
+    def __init__(self, config: Any) -> None:
+        """Take an object of its `Config`."""
+        self.config = config
+
+    @abstractmethod
+    def detect(self, points: Array) -> Sequence[Pose2]:
+        """Return the centres of the front faces, that nearest to straight ahead first.
+
+        Args:
+            points: Shape (n, 2), in the base frame, in the order of the beams, some NaN [m].
+
+        Returns:
+            In the base frame, x into the box.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxFacesConfig:
+    """What a box looks like."""
+
+    width: Annotated[Metres, Positive] = 0.24
+    """Width of its face [m]."""
+    width_tolerance: Annotated[Metres, Positive] = 0.035
+    """How far a face may be off it [m]."""
+    max_x: Annotated[Metres, Positive] = 1.8
+    """Points further ahead of the base are not looked at [m]."""
+    max_y: Annotated[Metres, Positive] = 0.8
+    """Points further aside are not looked at [m]."""
+
+
+class BoxFaces(Detector):
+    """Finds faces of one width."""
+
+    Config = BoxFacesConfig
+
+    def detect(self, points: Array) -> Sequence[Pose2]:
+        """Return their centres."""
+        config = self.config
+        near = (points[:, 0] < config.max_x) & (np.abs(points[:, 1]) < config.max_y)
+        if np.count_nonzero(near) < 5:
+            return []
+        faces = find_box_faces(points[near], config.width, width_tolerance=config.width_tolerance)
+        return [face.pose for face in faces]

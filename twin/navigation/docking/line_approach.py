@@ -2,16 +2,19 @@
 
 On the way the lateral error follows the cubic that ends on the line, along the line (the guidance law for a
 terminal heading of Ryoo, Cho and Tahk, JGCD 28(4), 2005): of all ways that end so it bends least, and the
-heading leaves the line's by no more than 1.5 times the lateral error over the way left.
+heading leaves the line's by no more than 1.5 times the lateral error over the way left. Whether it would
+touch something is asked as by opennav_docking's Controller::isTrajectoryCollisionFree.
 """
 
 from __future__ import annotations
 
+import copy
 import math
 from enum import Enum, auto
 
-from twin.geometry import Pose2
-from twin.navigation.docking.config import LineApproachConfig
+from twin.geometry import Array, Pose2
+from twin.navigation.costmaps.costmap import Costmap, collision_step
+from twin.navigation.docking.config import DockCollisionConfig, LineApproachConfig
 from twin.navigation.recovery import TIMEOUT, BehaviorStep
 
 MISSED = "missed"
@@ -108,3 +111,37 @@ class LineApproach:
         horizon = max(left - settle, settle)
         aside = -lateral if self.backward else lateral
         return -(_LATERAL_GAIN * aside / horizon + _HEADING_GAIN * math.sin(yaw_error)) / horizon
+
+
+def collision_ahead(
+    approach: LineApproach,
+    pose: Pose2,
+    docked: Pose2,
+    costmap: Costmap,
+    footprint: Array,
+    config: DockCollisionConfig,
+) -> Pose2 | None:
+    """Return where the robot would touch something if the approach went on; None if nowhere.
+
+    Args:
+        approach: As far as it is; it stays so.
+        pose: Of the base, in the costmap's frame, as all poses here.
+        docked: Where the base stands at the dock.
+        costmap: What is in the way.
+        footprint: As `collision_step` takes it, shape (n, 2) [m].
+        config: How far is looked ahead.
+    """
+    if not config.use_collision_detection:
+        return None
+    ghost, dt = copy.copy(approach), config.simulation_time_step
+    for _ in range(round(config.projection_time / dt)):
+        step = ghost.update(pose, dt)
+        if step.done or step.failed_reason is not None:
+            return None
+        pose = pose @ Pose2(step.v * dt, 0.0, step.w * dt)
+        if pose.distance(docked) < config.dock_collision_threshold:
+            if not approach.backward:
+                return None  # the rest leads nearer still
+        elif collision_step(costmap, footprint, pose, (0.0, 0.0), 0.0, 0) == 0:
+            return pose
+    return None

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from twin.geometry import Array, Pose2
 from twin.navigation._jit import jit
@@ -53,6 +51,9 @@ def clusters(particles: Array) -> NDArray[np.int64]:
     """Return the number, shape (n,), of each particle's cluster: those in bins that touch each other."""
     if _fit_in_a_bin(particles):  # then they are in bins that all touch each other
         return np.zeros(len(particles), dtype=np.int64)
+    from scipy.sparse import coo_matrix  # few robots are ever lost, and it takes long to import
+    from scipy.sparse.csgraph import connected_components
+
     keys, bin_of = np.unique(bin_keys(particles), return_inverse=True)
     turn, cell = keys % YAW_BINS, keys // YAW_BINS
     links = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -21,14 +23,7 @@ class SurfaceDistance:
             max_dist: Distances are cut off here [m].
         """
         occupied = occupancy.data >= OCCUPIED
-        signed = np.full(occupied.shape, max_dist)
-        if occupied.any():
-            # The border runs half a cell off the centres on both sides of it.
-            outside = ndimage.distance_transform_edt(~occupied) - 0.5
-            inside = ndimage.distance_transform_edt(occupied) - 0.5
-            cells = np.where(occupied, -inside, outside)
-            signed = np.clip(cells * occupancy.resolution, -max_dist, max_dist)
-        self.signed: NDArray[np.float32] = signed.astype(np.float32)
+        self.signed = _signed(occupied.tobytes(), occupied.shape, occupancy.resolution, max_dist)
         """At the centres of the cells, shape (height, width) [m]."""
         self.max_dist = max_dist
         self.resolution = occupancy.resolution
@@ -38,14 +33,22 @@ class SurfaceDistance:
         """Return the interpolated distance at points of the map frame, shape (n, 2) -> (n,) [m]."""
         height, width = self.signed.shape
         cells = self.origin.inverse().apply(points) / self.resolution - 0.5
-        inside = ((cells >= 0.0) & (cells < (width - 1, height - 1))).all(axis=1)
-        result = np.full(len(points), self.max_dist)
-        u, v = cells[inside].T
+        u, v = cells.T
+        inside = (u >= 0.0) & (v >= 0.0) & (u < width - 1) & (v < height - 1)
+        all_inside = inside.all()
+        if not all_inside:
+            u, v = u[inside], v[inside]
         iu, iv = u.astype(np.int64), v.astype(np.int64)
         fu, fv = u - iu, v - iv
-        low = (1.0 - fu) * self.signed[iv, iu] + fu * self.signed[iv, iu + 1]
-        high = (1.0 - fu) * self.signed[iv + 1, iu] + fu * self.signed[iv + 1, iu + 1]
-        result[inside] = (1.0 - fv) * low + fv * high
+        flat, at = self.signed.ravel(), iv * width + iu
+        low = (1.0 - fu) * flat[at] + fu * flat[at + 1]
+        at += width
+        high = (1.0 - fu) * flat[at] + fu * flat[at + 1]
+        distance: Array = (1.0 - fv) * low + fv * high
+        if all_inside:
+            return distance
+        result = np.full(len(points), self.max_dist)
+        result[inside] = distance
         return result
 
     def normals(self, points: Array) -> Array:
@@ -54,8 +57,28 @@ class SurfaceDistance:
         Of length 1; 0 where the distance has no slope. Points are in the map frame [m].
         """
         half = 0.5 * self.resolution
-        slope = np.empty((len(points), 2))
-        for axis, step in enumerate(((half, 0.0), (0.0, half))):
-            slope[:, axis] = self.at(points + step) - self.at(points - np.array(step))
+        steps = np.array([[half, 0.0], [0.0, half], [-half, 0.0], [0.0, -half]])
+        around = self.at((points + steps[:, None]).reshape(-1, 2)).reshape(4, -1)
+        slope = (around[:2] - around[2:]).T
         length = np.hypot(slope[:, 0], slope[:, 1])
         return np.asarray(slope / np.maximum(length, 1e-9)[:, None])
+
+
+@lru_cache(maxsize=4)
+def _signed(
+    occupied: bytes, shape: tuple[int, int], resolution: float, max_dist: float
+) -> NDArray[np.float32]:
+    """Return the distances of a map, read-only: runs in one process often share theirs."""
+    inside = np.frombuffer(occupied, dtype=bool).reshape(shape)
+    signed = np.full(shape, max_dist)
+    if inside.any():
+        # The border runs half a cell off the centres on both sides of it.
+        cells = np.where(
+            inside,
+            0.5 - ndimage.distance_transform_edt(inside),
+            ndimage.distance_transform_edt(~inside) - 0.5,
+        )
+        signed = np.clip(cells * resolution, -max_dist, max_dist)
+    made = signed.astype(np.float32)
+    made.flags.writeable = False
+    return made

@@ -1,12 +1,22 @@
-"""The scans of a map with the graph of their poses, and which of them a new scan is matched with."""
+"""The scans of a map with the graph of their poses, and which of them a new scan is matched with.
+
+As bytes they are a compressed npz archive.
+"""
 
 from __future__ import annotations
 
+import io
+import json
+import zipfile
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from twin.errors import MapError
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import SlamConfig
 from twin.navigation.mapping.loop_closing import spread
@@ -66,3 +76,95 @@ class MappedScans:
         """Return the scans of some nodes, ready to be matched with; see `Registration`."""
         poses = self.graph.poses[list(nodes)]
         return Registration(self.config, [self.scans[node] for node in nodes], poses, half_width)
+
+
+FORMAT = "twin pose graph 1"
+
+
+class SavedGraph(NamedTuple):
+    """What a file holds."""
+
+    mapped: MappedScans
+    steps: list[Array]
+    """Covariance of each node in the frame of the one before, shape (3, 3)."""
+    covariance: Array
+    """Of the last node in the map frame, shape (3, 3)."""
+
+
+def pack(saved: SavedGraph) -> bytes:
+    """Return a graph as bytes; the same graph gives the same bytes."""
+    mapped, scans = saved.mapped, saved.mapped.scans
+    first, second, poses, information, loops = mapped.graph.arrays()
+    arrays: dict[str, NDArray[np.generic]] = {
+        "header": np.array(json.dumps({"format": FORMAT, "config": asdict(mapped.config)})),
+        "poses": mapped.graph.poses,
+        "stamps_ns": np.array(mapped.stamps_ns, dtype=np.int64),
+        "steps": np.array(saved.steps).reshape(-1, 3, 3),
+        "covariance": saved.covariance,
+        "edge_nodes": np.column_stack([first, second]),
+        "edge_poses": poses,
+        "edge_information": information,
+        "edge_loops": loops,
+        "sensors": np.array([scan.sensor for scan in scans], np.float64).reshape(-1, 3),
+        "beams": np.array([len(scan.ranges) for scan in scans], np.int64),
+        "ranges": np.concatenate([np.zeros(0), *(scan.ranges for scan in scans)]),
+        "angles": np.concatenate([np.zeros(0), *(scan.angles for scan in scans)]),
+    }
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]  # numpy's stub takes **kwds for its flag
+    return buffer.getvalue()
+
+
+def unpack(data: bytes, name: str) -> SavedGraph:
+    """Return the graph that `pack` has made bytes of.
+
+    Raises:
+        MapError: these are not such bytes; it says so of `name`.
+    """
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {key: archive[key] for key in archive.files}
+        header = json.loads(str(arrays["header"]))
+        if header["format"] != FORMAT:
+            raise ValueError(header["format"])
+        return _unpacked(SlamConfig(**header["config"]), arrays)
+    except (ValueError, KeyError, TypeError, IndexError, OSError, EOFError, zipfile.BadZipFile) as fault:
+        raise MapError(f"{name}: is not a pose graph; valid is a file that SLAM has saved") from fault
+
+
+def _unpacked(config: SlamConfig, arrays: dict[str, NDArray[np.generic]]) -> SavedGraph:
+    graph = PoseGraph()
+    for pose in _rows(arrays["poses"]):
+        graph.add_node(pose)
+    for (first, second), pose, information, loop in zip(
+        np.asarray(arrays["edge_nodes"], np.int64).tolist(),
+        _rows(arrays["edge_poses"]),
+        np.asarray(arrays["edge_information"], np.float64),
+        arrays["edge_loops"].tolist(),
+        strict=True,
+    ):
+        if not (0 <= first < len(graph) and 0 <= second < len(graph)):
+            raise ValueError(f"edge {first}-{second}")
+        edge = Edge(first=first, second=second, pose=pose, information=information, loop=bool(loop))
+        graph.edges.append(edge)
+    ends = np.cumsum(np.asarray(arrays["beams"], np.int64))[:-1]
+    ranges = np.split(np.asarray(arrays["ranges"], np.float64), ends)
+    angles = np.split(np.asarray(arrays["angles"], np.float64), ends)
+    sensors = _rows(arrays["sensors"])
+    low, high = config.min_laser_range, config.max_laser_range
+    scans = [
+        Scan.from_ranges(*parts, min_range=low, max_range=high)
+        for parts in zip(ranges, angles, sensors, strict=True)
+    ]
+    if len({len(scans), len(graph), len(arrays["stamps_ns"]), len(arrays["steps"])}) != 1 or not scans:
+        raise ValueError("numbers of nodes differ")
+    stamps_ns = np.asarray(arrays["stamps_ns"], np.int64).tolist()
+    return SavedGraph(
+        mapped=MappedScans(config, graph, scans, stamps_ns),
+        steps=list(np.asarray(arrays["steps"], np.float64)),
+        covariance=np.asarray(arrays["covariance"], np.float64).reshape(3, 3),
+    )
+
+
+def _rows(array: NDArray[np.generic]) -> Sequence[Pose2]:
+    return [Pose2(x, y, yaw) for x, y, yaw in np.asarray(array, np.float64).tolist()]

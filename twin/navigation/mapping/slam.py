@@ -16,15 +16,19 @@ from twin.files.writing import replaced
 from twin.geometry import Array, Pose2
 from twin.navigation.mapping.config import Mode
 from twin.navigation.mapping.config import SlamConfig as SlamConfig
-from twin.navigation.mapping.localisation import START_COVARIANCE, at_start, while_driving
 from twin.navigation.mapping.loop_acceptance import LoopAcceptance
 from twin.navigation.mapping.loop_closing import LoopCloser
-from twin.navigation.mapping.mapped_scans import MappedScans
+from twin.navigation.mapping.mapped_scans import MappedScans, SavedGraph, pack, unpack
 from twin.navigation.mapping.matcher import Match
-from twin.navigation.mapping.registration import Registration, doubted
+from twin.navigation.mapping.registration import (
+    START_COVARIANCE,
+    Registration,
+    at_start,
+    doubted,
+    while_driving,
+)
 from twin.navigation.mapping.scan import Scan
 from twin.navigation.mapping.scan_map import ScanMap
-from twin.navigation.mapping.storage import SavedGraph, pack, unpack
 from twin.navigation.mapping.uncertainty import compounded, odometry_covariance, turned
 from twin.navigation.maps.occupancy_map import OccupancyMap
 

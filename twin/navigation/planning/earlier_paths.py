@@ -6,6 +6,7 @@ So every cell off the last path costs a little more. The path itself stays free 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +48,7 @@ def _strip(costmap: Costmap, path: Array, reach: int) -> NDArray[np.bool_]:
     """Return the cells within so many of those of a path."""
     strip = np.zeros(costmap.costs.shape, dtype=np.bool_)
     cells = np.floor((path[:, :2] - costmap.origin) / costmap.resolution).astype(np.int64)
-    for column, row in np.unique(cells, axis=0):
+    for (column, row), _ in itertools.groupby(cells.tolist()):
         rows = slice(max(0, row - reach), max(0, row + reach + 1))
         strip[rows, max(0, column - reach) : max(0, column + reach + 1)] = True
     return strip
@@ -55,5 +56,5 @@ def _strip(costmap: Costmap, path: Array, reach: int) -> NDArray[np.bool_]:
 
 def _dearer(costs: NDArray[np.uint8], cells: NDArray[np.bool_], by: int) -> NDArray[np.uint8]:
     """Return costs that are higher in some cells, where they are passable."""
-    dearer = np.minimum(costs.astype(np.int16) + by, MAX_NON_OBSTACLE).astype(np.uint8)
+    dearer = np.minimum(costs, MAX_NON_OBSTACLE - by) + np.uint8(by)
     return np.where(cells & (costs <= MAX_NON_OBSTACLE), dearer, costs)

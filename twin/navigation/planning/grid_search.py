@@ -21,8 +21,6 @@ class GridSearch:
         self._shape: tuple[int, ...] = ()
         self._generation = 0
         self._start = 0
-        self.expanded = 0
-        """Cells that the last search expanded."""
 
     def run(
         self,
@@ -51,7 +49,7 @@ class GridSearch:
             self._parent = np.empty(costs.size, dtype=np.int32)
         self._generation += 1
         self._start = start
-        self.expanded = search(
+        search(
             costs.reshape(-1),
             prices,
             costs.shape[1],

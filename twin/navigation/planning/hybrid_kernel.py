@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from typing import Any, NamedTuple
 
@@ -120,41 +121,6 @@ def move_factor(turn: int, way: int, last_turn: int, last_way: int, penalties: A
 
 
 @jit
-def _pushed(keys: Array, items: Ints, waiting: int, key: float, item: int) -> int:
-    """Put an item into a binary heap of so many; return how many it has now."""
-    hole = waiting
-    while hole > 0:
-        above = (hole - 1) // 2
-        if keys[above] <= key:
-            break
-        keys[hole], items[hole] = keys[above], items[above]
-        hole = above
-    keys[hole], items[hole] = key, item
-    return waiting + 1
-
-
-@jit
-def _popped(keys: Array, items: Ints, waiting: int) -> tuple[int, int]:
-    """Take the least item out of a binary heap of so many; return how many it has now, and the item."""
-    least = items[0]
-    waiting -= 1
-    key, item = keys[waiting], items[waiting]
-    hole = 0
-    while True:
-        child = 2 * hole + 1
-        if child >= waiting:
-            break
-        if child + 1 < waiting and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
-            break
-        keys[hole], items[hole] = keys[child], items[child]
-        hole = child
-    keys[hole], items[hole] = key, item
-    return waiting, least
-
-
-@jit
 def _slot(table: Ints, bin_of: NDArray[np.int64], code: int) -> int:
     """Return where in a hash table the node of a bin stands, or would."""
     slot = (code * 2654435761 >> 7) % table.shape[0]
@@ -229,9 +195,8 @@ def expand(
     closed = np.zeros(capacity, np.bool_)
     bin_of = np.empty(capacity, np.int64)
     table = np.full(4096, -1, np.int32)
-    keys, items = np.empty(capacity), np.empty(capacity, np.int32)
     turns, lengths = np.empty(5, np.int64), np.empty(5)
-    nodes, waiting, expanded, until_curve = 1, 1, 0, 0
+    nodes, expanded, until_curve = 1, 0, 0
     best, best_g, last_chance = -1, math.inf, most
     bin_size = 2.0 * math.pi / bins
     poses[0], g[0], parent[0], move[0] = start, 0.0, -1, 1
@@ -239,9 +204,9 @@ def expand(
         (start[2] % (2.0 * math.pi)) / bin_size
     ) % bins
     table[_slot(table, bin_of, bin_of[0])] = 0
-    keys[0], items[0] = 0.0, 0
-    while waiting > 0:
-        waiting, node = _popped(keys, items, waiting)
+    waiting = [(0.0, 0)]
+    while len(waiting) > 0:
+        _, node = heapq.heappop(waiting)
         if closed[node]:
             continue
         closed[node] = True
@@ -290,14 +255,9 @@ def expand(
                 flat = row * width + column
                 left = to_go[flat] if to_go_mark[flat] == to_go_generation else beyond
                 left = max(left, _curve_length(drive, new_x, new_y, new_yaw, goal, turns, lengths))
-            if nodes == capacity or waiting == capacity:
+            if nodes == capacity:
                 poses, g, parent, move = _doubled(poses), _doubled(g), _doubled(parent), _doubled(move)
-                items, bin_of, keys, closed = (
-                    _doubled(items),
-                    _doubled(bin_of),
-                    _doubled(keys),
-                    _doubled(closed),
-                )
+                bin_of, closed = _doubled(bin_of), _doubled(closed)
                 closed[capacity:] = False
                 capacity *= 2
             # A pose reached better becomes a node of its own: what came from the worse one keeps its way.
@@ -311,7 +271,7 @@ def expand(
                 table[slot] = fresh
                 if 2 * nodes > table.shape[0]:
                     table = _rehashed(table, bin_of)
-            waiting = _pushed(keys, items, waiting, g[fresh] + left, fresh)
+            heapq.heappush(waiting, (g[fresh] + left, fresh))
     if best >= 0:
         return FOUND, best, poses, g, parent, move
     return OUT_OF_NODES if expanded == most else UNREACHABLE, 0, poses, g, parent, move

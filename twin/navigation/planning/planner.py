@@ -175,11 +175,6 @@ def with_headings(points: Array, final_yaw: float | None = None) -> Array:
     return np.column_stack([points[:, :2], yaw])
 
 
-def path_length(path: Array) -> float:
-    """Return the length [m] of a path, shape (n, 2 or 3)."""
-    return float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
-
-
 def _flat(costmap: Costmap, pose: Pose2) -> int:
     column, row = costmap.world_to_cell(pose.x, pose.y)
     return row * costmap.costs.shape[1] + column

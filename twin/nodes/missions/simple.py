@@ -1,4 +1,4 @@
-"""Simple missions: a list of actions one after the other, a profile of velocities."""
+"""Simple missions: actions one after the other, a profile of velocities, exploring to the end."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.missions.leaves import CallAction, Do, WaitUntil, sequence
 from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
+from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.periods import next_due
 
 _SETTLE_NS = 1_000_000_000
@@ -97,3 +98,27 @@ class VelocityProfileNode(MissionNode):
         if begins:
             self.enter(f"step {step + 1} of {len(self._ends)}: {linear:+.2f} m/s, {angular:+.2f} rad/s")
         self._commands.publish(twist_from_planar(linear, angular), frozen=True)
+
+
+class ExploreMissionNode(MissionNode):
+    """Tells what `/explore` does as the mission's state, and ends with it."""
+
+    def __init__(self, bus: Bus, explorer: ExplorerNode, *, namespace: str = "") -> None:
+        super().__init__(bus, namespace=namespace)
+        self._explorer = explorer
+        self.node.create_timer(PERIOD_NS, self._update)
+
+    def _update(self) -> None:
+        if self.done:
+            return
+        explorer = self._explorer
+        goal = explorer.explorer.goal
+        state = explorer.status.replace("_", " ")
+        if goal is not None:
+            state += f": frontier at ({goal.target[0]:.1f}, {goal.target[1]:.1f})"
+        if state != self.state:
+            self.enter(state)
+        if explorer.done:
+            if not explorer.succeeded:
+                self.note(explorer.reason or "no frontier could be reached")
+            self.finish(bool(explorer.succeeded))

@@ -14,8 +14,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import PoseStamped, new
 from twin.navigation.behavior_trees.factory import Registry
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
-from twin.nodes.navigation.behavior_trees.log import TreeLog
 from twin.nodes.navigation.behavior_trees.navigator import Navigator, NavigatorSetup
+from twin.nodes.navigation.behavior_trees.progress import TreeLog
 from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.robot_pose import RobotPose

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from twin.errors import Problem, ScenarioError
-from twin.models.checks.drive_guess import VALID_DRIVES, guess_drive, lack_of_drive
+from twin.models.checks.drive import VALID_DRIVES, guess_drive, lack_of_drive
 from twin.models.description import RobotDescription
 from twin.scenario.missions import Behaviors, Idle, Mission, R2D2StatePublisher, UserMission
 from twin.scenario.robots import RobotConfig

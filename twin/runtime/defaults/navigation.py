@@ -22,8 +22,13 @@ from twin.nodes.navigation.planning.smoother_server import SmootherServerConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.runtime.defaults import controllers, docking
-from twin.scenario.navigation import CostmapParameters, NavigationConfig, NavigatorParameters
-from twin.scenario.planners import PlannerParameters, SmootherParameters
+from twin.scenario.navigation import (
+    CostmapParameters,
+    NavigationConfig,
+    NavigatorParameters,
+    PlannerParameters,
+    SmootherParameters,
+)
 from twin.scenario.plugin_groups import config_of_use
 
 C = TypeVar("C")

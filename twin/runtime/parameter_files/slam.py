@@ -11,7 +11,7 @@ from twin.errors import MapError
 from twin.files.reading import read_bytes
 from twin.geometry import Pose2
 from twin.navigation.mapping.config import Mode
-from twin.navigation.mapping.storage import unpack
+from twin.navigation.mapping.mapped_scans import unpack
 from twin.nodes.navigation.mapping.config import SlamNodeConfig
 from twin.nodes.navigation.robot_pose import Frames
 from twin.parameters.declaration import names_of

@@ -33,8 +33,7 @@ def build_localisation(context: StackContext, pose: RobotPose) -> SlamToolboxNod
 
         StaticLocalisationNode(context.bus, pose.frames, guess, namespace=context.namespace)
         return None
-    from twin.nodes.navigation.mapping.map_saver import MapSaverNode
-    from twin.nodes.navigation.mapping.map_server import MapServerNode
+    from twin.nodes.navigation.mapping.map_server import MapSaverNode, MapServerNode
 
     assert context.map is not None
     MapServerNode(context.bus, context.map, namespace=context.namespace)

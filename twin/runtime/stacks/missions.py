@@ -177,7 +177,7 @@ def explore(context: MissionContext, mission: Explore) -> MissionNode:
     """Return an explorer and who watches it."""
     from twin.navigation.costmaps import footprint as footprints
     from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
-    from twin.nodes.missions.explore import ExploreMissionNode
+    from twin.nodes.missions.simple import ExploreMissionNode
     from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
     from twin.nodes.navigation.exploration.explorer import ExplorerNode
 

@@ -12,7 +12,7 @@ from twin.nodes.navigation.robot_pose import Frames
 from twin.runtime.parameter_files.ekf import ekf_with_file
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished
 from twin.runtime.stacks.context import StackContext
-from twin.scenario.localisation import EkfParameters
+from twin.scenario.estimators.ekf import EkfParameters
 from twin.sensors.imu import ImuSpec
 
 

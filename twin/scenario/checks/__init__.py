@@ -5,7 +5,7 @@ from __future__ import annotations
 from twin.plugins import Kind
 from twin.scenario.checks.check import Check as Check
 from twin.scenario.checks.check import CheckResult as CheckResult
-from twin.scenario.checks.guarded import GuardedCheck
+from twin.scenario.checks.check import GuardedCheck
 from twin.scenario.observation import CheckContext
 from twin.scenario.plugins import OneOfKind, PluginUse, with_shipped
 
@@ -13,14 +13,14 @@ CHECKS: Kind[Check] = Kind("check", base="twin.scenario.checks:Check", group="tw
 
 CHECKS.register("mission_succeeded", "twin.scenario.checks.mission:MissionSucceeded")
 CHECKS.register("mission_failed", "twin.scenario.checks.mission:MissionFailed")
-CHECKS.register("delivered", "twin.scenario.checks.delivered:Delivered")
+CHECKS.register("delivered", "twin.scenario.checks.goods:Delivered")
 CHECKS.register("time_limit", "twin.scenario.checks.mission:TimeLimit")
 CHECKS.register("no_collision", "twin.scenario.checks.no_collision:NoCollision")
-CHECKS.register("tote_slip", "twin.scenario.checks.tote_slip:ToteSlip")
+CHECKS.register("tote_slip", "twin.scenario.checks.goods:ToteSlip")
 CHECKS.register("localisation_error", "twin.scenario.checks.localisation:LocalisationError")
 CHECKS.register("odometry_drift", "twin.scenario.checks.localisation:OdometryDrift")
 CHECKS.register("driven_distance", "twin.scenario.checks.totals:DrivenDistance")
-CHECKS.register("recoveries", "twin.scenario.checks.recoveries:Recoveries")
+CHECKS.register("recoveries", "twin.scenario.checks.mission:Recoveries")
 CHECKS.register("map_accuracy", "twin.scenario.checks.map_quality:MapAccuracy")
 CHECKS.register("map_coverage", "twin.scenario.checks.map_quality:MapCoverage")
 CHECKS.register("energy", "twin.scenario.checks.totals:Energy")

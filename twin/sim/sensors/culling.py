@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.geometry import Array
+from twin.savings import ALL, Savings
 
 _FLAT = 1e-12
 """Out of their plane, rays of unit length reach no farther than that."""
@@ -27,10 +28,10 @@ class RayBounds:
     every attitude. Collisions need the volumes as they are: there a larger one costs time.
     """
 
-    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8]) -> None:
+    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8], savings: Savings = ALL) -> None:
         """Bind to a model; `groups` of the shapes that rays see, shape (mjNGROUP,)."""
         seen = np.bincount(model.geom_bodyid, weights=_are_seen(model, groups), minlength=model.nbody)
-        self._unseen = np.flatnonzero(seen == 0)
+        self._unseen = np.flatnonzero((seen == 0) & savings.plane_of_rays)
         self._counts = model.body_geomnum
         self._all = self._counts[self._unseen]
         roots = model.body_bvhadr[model.body_bvhadr >= 0]
@@ -57,20 +58,27 @@ class FanSlice:
     It tests every ray against every shape; most of a scene lies above or below a lidar.
     """
 
-    def __init__(self, model: mujoco.MjModel, directions: Array, groups: NDArray[np.uint8]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        directions: Array,
+        groups: NDArray[np.uint8],
+        savings: Savings = ALL,
+    ) -> None:
         """Bind to a model.
 
         Args:
             model: The compiled world.
             directions: Unit vectors in the link's frame, shape (n, 3); where they fill no plane, all is seen.
             groups: Of the shapes that rays see, shape (mjNGROUP,).
+            savings: What is not done over again.
         """
         self._normal = np.linalg.eigh(directions.T @ directions)[1][:, 0]
         """Of the plane, in the link's frame."""
         self._groups = model.geom_group
         is_flat = np.abs(directions @ self._normal).max() < _FLAT and not groups[_HIDDEN]
         bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & is_flat)
+        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & is_flat & savings.plane_of_rays)
         self._centre, self._half = _boxes(model, self._geoms)
         self._radius = float(np.linalg.norm(np.abs(self._centre) + self._half, axis=1).max(initial=0.0))
         self._shown = self._groups[self._geoms]

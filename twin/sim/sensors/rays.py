@@ -35,8 +35,9 @@ class RayCaster:
         self.directions = np.zeros((n, 3))
         """Directions of the last cast, in the world frame, shape (n, 3)."""
         self._cutoff = cutoff
-        self._bounds = RayBounds(self._model, self._groups)
-        self._slice = FanSlice(self._model, self._directions, self._groups)
+        savings = mount.world.savings
+        self._bounds = RayBounds(self._model, self._groups, savings)
+        self._slice = FanSlice(self._model, self._directions, self._groups, savings)
 
     def cast(self) -> Array:
         """Return the distances, shape (n,) [m]; inf for no hit. A few may lie beyond the cutoff."""

@@ -20,8 +20,8 @@ from twin.navigation.behavior_trees.blackboard import Blackboard
 from twin.navigation.behavior_trees.factory import Tree, TreeBuilder
 from twin.navigation.behavior_trees.node import Status
 from twin.nodes.messages import path_array, path_msg, pose_stamped
-from twin.nodes.navigation.behavior_trees.cancelling import CANCEL_NODES
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
+from twin.nodes.navigation.behavior_trees.families import CANCEL_NODES
 from twin.nodes.navigation.behavior_trees.registry import NAVIGATOR_NODES
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.transforms import TransformListenerNode

@@ -15,7 +15,7 @@ from twin.bridge.msgs import Bool, ExploreStatus, MarkerArray, OccupancyGrid, ne
 from twin.bridge.qos import LATCHED
 from twin.geometry import Pose2
 from twin.navigation.exploration.config import ExplorerConfig, FrontierConfig
-from twin.nodes.missions.explore import ExploreMissionNode
+from twin.nodes.missions.simple import ExploreMissionNode
 from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
 from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.nodes.navigation.mapping.map_server import grid_msg

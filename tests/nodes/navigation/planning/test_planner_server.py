@@ -14,9 +14,9 @@ from twin.bridge.actions import ActionClient
 from twin.bridge.msgs import GoalStatus, Path, new
 from twin.bridge.srvs import IsPathValid
 from twin.geometry import Pose2
+from twin.navigation.behavior_trees.paths import length as path_length
 from twin.navigation.costmaps.layered_costmap import CostmapConfig
 from twin.navigation.planning.config import ThetaStarConfig
-from twin.navigation.planning.planner import path_length
 from twin.nodes.messages import path_array, path_msg, pose_stamped
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.costmap import CostmapNode

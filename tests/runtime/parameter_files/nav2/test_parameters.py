@@ -21,7 +21,7 @@ from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.runtime.defaults.navigation import NavigationParameters
 from twin.runtime.parameter_files.nav2.parameters import amcl_with_file, monitor_with_file
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.localisation import AmclParameters
+from twin.scenario.estimators.amcl import AmclParameters
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 from twin.scenario.schema import load
 

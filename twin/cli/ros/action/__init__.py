@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.cli.ros.action.goal import send_goal
-from twin.cli.ros.graph_names import absolute, of_type, print_names, unknown
+from twin.cli.ros.graph_names import absolute, of_type, print_names, print_types, unknown
 from twin.cli.ros.joining import Joining, on_graph
 
 if TYPE_CHECKING:
@@ -36,11 +36,7 @@ def list_actions(show_types: _Types = False, count: _Count = False, *, joining: 
 @on_graph(app, "type", "twin action type /fibonacci", no_args_is_help=True)
 def show_type(action: _Name, *, joining: Joining) -> None:
     """Print the type of an action."""
-    actions, name = joining.graph().actions(), absolute(action)
-    if name not in actions:
-        raise unknown("action", name, actions)
-    for typename in actions[name]:
-        typer.echo(typename)
+    print_types("action", absolute(action), joining.graph().actions())
 
 
 @on_graph(app, "find", "twin action find example_interfaces/action/Fibonacci", no_args_is_help=True)

@@ -40,7 +40,7 @@ def send_goal(
     """Send a goal and wait for its result; Ctrl-C cancels the goal."""
     from twin.bridge import types
     from twin.bridge.actions.client import ActionClient
-    from twin.bridge.messages.as_yaml import message_to_yaml
+    from twin.bridge.messages.as_text import message_to_yaml
     from twin.bridge.wire.interrupts import noted_signals
 
     text = text_of(goal, stdin)
@@ -87,8 +87,8 @@ def _follow(
     feedback: list[Any],
 ) -> None:
     """Tell what becomes of a goal; feedback may come before the answer that it is accepted."""
-    from twin.bridge.actions.states import NAMES
-    from twin.bridge.messages.as_yaml import message_to_yaml
+    from twin.bridge.actions.goal import NAMES
+    from twin.bridge.messages.as_text import message_to_yaml
 
     def is_over() -> bool:
         while feedback:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.errors import RecordingError
+from twin.tree_drawing import escaped, quoted
 
 if TYPE_CHECKING:
     from twin.bridge.graph import EndpointInfo, Graph
@@ -117,14 +118,14 @@ def text(graph: NodeGraph) -> str:
 def graphviz(graph: NodeGraph) -> str:
     """Return the graph as a .gv file with rqt_graph's shapes: nodes are ellipses, topics boxes."""
     lines = ["digraph graphname {", "rankdir=LR;", "node [shape=ellipse];"]
-    lines += [f"{_id('n', node)} [label={_quoted(node)}];" for node in graph.nodes]
+    lines += [f"{_id('n', node)} [label={quoted(node)}];" for node in graph.nodes]
     if graph.choice.nodes_only:
         for (a, b), names in graph.connections().items():
-            label = "\\n".join(map(_escaped, names))
+            label = "\\n".join(map(escaped, names))
             lines.append(f'{_id("n", a)} -> {_id("n", b)} [label="{label}"];')
     else:
         lines.append("node [shape=box];")
-        lines += [f"{_id('t', topic.name)} [label={_quoted(topic.name)}];" for topic in graph.topics]
+        lines += [f"{_id('t', topic.name)} [label={quoted(topic.name)}];" for topic in graph.topics]
         for topic in graph.topics:
             lines += [f"{_id('n', node)} -> {_id('t', topic.name)};" for node in topic.publishers]
             lines += [f"{_id('t', topic.name)} -> {_id('n', node)};" for node in topic.subscribers]
@@ -187,15 +188,7 @@ def _shown_as(endpoint: EndpointInfo, choice: GraphChoice) -> str | None:
 
 
 def _id(kind: str, name: str) -> str:
-    return _quoted(f"{kind}_{name}")
-
-
-def _quoted(name: str) -> str:
-    return f'"{_escaped(name)}"'
-
-
-def _escaped(name: str) -> str:
-    return name.replace("\\", "\\\\").replace('"', '\\"')
+    return quoted(f"{kind}_{name}")
 
 
 def _entity(*names: str) -> str:

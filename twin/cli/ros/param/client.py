@@ -85,30 +85,19 @@ class ParameterClient:
 
     def names(self, prefixes: Sequence[str] = ()) -> list[str]:
         """Return the names of the declared parameters, sorted."""
-        from twin.bridge.srvs import ListParameters
-
-        response = self._ask(ListParameters, "list_parameters", ListParameters.Request(list(prefixes), 0))
-        return sorted(response.result.names)
+        return sorted(self._ask("ListParameters", list(prefixes), 0).result.names)
 
     def get(self, names: Sequence[str]) -> list[Any]:
         """Return the values as messages; none if one of them is not declared."""
-        from twin.bridge.srvs import GetParameters
-
-        return list(self._ask(GetParameters, "get_parameters", GetParameters.Request(list(names))).values)
+        return list(self._ask("GetParameters", list(names)).values)
 
     def describe(self, names: Sequence[str]) -> list[Any]:
         """Return the descriptors as messages; none if one of them is not declared."""
-        from twin.bridge.srvs import DescribeParameters
-
-        request = DescribeParameters.Request(list(names))
-        return list(self._ask(DescribeParameters, "describe_parameters", request).descriptors)
+        return list(self._ask("DescribeParameters", list(names)).descriptors)
 
     def set(self, parameters: Sequence[Any]) -> list[Any]:
         """Change values, one by one; return a SetParametersResult for each."""
-        from twin.bridge.srvs import SetParameters
-
-        request = SetParameters.Request(list(parameters))
-        return list(self._ask(SetParameters, "set_parameters", request).results)
+        return list(self._ask("SetParameters", list(parameters)).results)
 
     def undeclared(self, names: Sequence[str]) -> BridgeError:
         """Return the error that some of the names are no parameters."""
@@ -117,11 +106,16 @@ class ParameterClient:
         hint = nearest(missing[0], known) if known else "it has none"
         return BridgeError(f"Parameter not set: {self.node} has no parameter {missing[0]!r}; {hint}")
 
-    def _ask(self, srv_type: Any, service: str, request: Any) -> Any:
-        client = self._asking.create_client(srv_type, f"{self.node}/{service}")
+    def _ask(self, what: str, *asked: Any) -> Any:
+        """Return the response of one of the services, which are called as their types are."""
+        from twin.bridge import srvs
+
+        service = getattr(srvs, what)
+        name = what.replace("Parameters", "_parameters").lower()
+        client = self._asking.create_client(service, f"{self.node}/{name}")
         if not self._process.spin(lambda: client.service_is_ready, _WAIT_S):
             raise BridgeError(
                 f"Wait for service timed out waiting for parameter services for node {self.node}; "
                 "it offers none"
             )
-        return answer(self._process, client, request, _WAIT_S)
+        return answer(self._process, client, service.Request(*asked), _WAIT_S)

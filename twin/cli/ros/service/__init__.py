@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from twin.cli.ros.endpoint_text import endpoint_text
-from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
+from twin.cli.ros.graph_names import absolute, known, of_type, print_names, print_types, shown
 from twin.cli.ros.joining import Joining, on_graph
 from twin.cli.ros.service.call import call
 
@@ -39,11 +39,7 @@ def list_services(
 @on_graph(app, "type", "twin service type /add_two_ints", no_args_is_help=True)
 def show_type(service: _Name, hidden: _Hidden = False, *, joining: Joining) -> None:
     """Print the type of a service."""
-    services, name = joining.graph().services(), absolute(service)
-    if name not in services:
-        raise unknown("service", name, shown(services, hidden))
-    for typename in services[name]:
-        typer.echo(typename)
+    print_types("service", absolute(service), joining.graph().services(), hidden)
 
 
 @on_graph(app, "find", "twin service find std_srvs/srv/Empty", no_args_is_help=True)
@@ -70,10 +66,8 @@ def info(
 ) -> None:
     """Print type and number of clients and servers of a service."""
     graph = joining.graph()
-    services, name = graph.services(), absolute(service)
-    if name not in services:
-        raise unknown("service", name, shown(services, hidden))
-    types = services[name]
+    name = known("service", absolute(service), graph.services(), hidden)
+    types = graph.services()[name]
     typer.echo(f"Type: {types[0] if len(types) == 1 else list(types)}")
     blank = "\n" if verbose else ""
     for title, endpoints in (("Clients", graph.clients(name)), ("Services", graph.servers(name))):

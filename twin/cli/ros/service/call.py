@@ -42,7 +42,7 @@ def call(
         raise BridgeError(f"a rate of {rate} Hz; valid: rate must be greater than zero")
     text = text_of(values, stdin)
     from twin.bridge import types
-    from twin.bridge.messages.as_repr import message_repr
+    from twin.bridge.messages.as_text import message_repr
 
     with joining.open(PATIENCE_S if timeout is None else timeout) as process:
         srv_type = types.ServiceType(full_type(service_type, "srv", "service", "std_srvs/srv/Empty"))

@@ -10,7 +10,7 @@ import typer
 from twin.cli.option_groups import takes
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.topic.options import NodeName, SubscriptionQos, TopicName
+from twin.cli.ros.topic.options import Filter, NodeName, SubscriptionQos, TopicName
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -70,12 +70,7 @@ def echo(
     message_type: Annotated[
         str | None, typer.Argument(metavar="TYPE", help="If nobody publishes yet.", show_default=False)
     ] = None,
-    filter_expr: Annotated[
-        str | None,
-        typer.Option(
-            "--filter", metavar="EXPR", help='Only messages m for which this is true: "m.data > 3".'
-        ),
-    ] = None,
+    filter_expr: Filter = None,
     once: Annotated[bool, typer.Option("--once", help="One message, then end.")] = False,
     timeout: Annotated[
         float | None, typer.Option(min=0.001, metavar="S", help="End after so many seconds.")
@@ -88,8 +83,7 @@ def echo(
 ) -> None:
     """Print messages."""
     from twin.cli.ros.topic.filter import compile_filter
-    from twin.cli.ros.topic.listen import Listener
-    from twin.cli.ros.topic.process import open_topics
+    from twin.cli.ros.topic.process import Listener, open_topics
 
     accepts = compile_filter(filter_expr) if filter_expr else None
     with open_topics(joining, node_name=node_name) as process:
@@ -192,7 +186,7 @@ class EchoPrinter:
         return value, None if _is_message(value) else field
 
     def _text(self, sample: RawSample, value: Any, field: Field | None) -> str:
-        from twin.bridge.messages.as_yaml import message_to_csv, message_to_yaml, to_yaml
+        from twin.bridge.messages.as_text import message_to_csv, message_to_yaml, to_yaml
         from twin.cli.ros.topic.values import value_text
 
         style = self._style

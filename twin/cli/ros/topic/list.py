@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from twin.cli.ros.endpoint_text import endpoint_text
-from twin.cli.ros.graph_names import absolute, of_type, print_names, shown, unknown
+from twin.cli.ros.graph_names import known, of_type, print_names, print_types, shown
 from twin.cli.ros.joining import Joining, joins
 from twin.cli.ros.topic.options import TopicName
 
@@ -53,7 +53,8 @@ def info(
 ) -> None:
     """Tell type and number of publishers and subscriptions."""
     graph = joining.graph()
-    name, types = _known(topic, graph.topics())
+    name = known("topic", topic, graph.topics())
+    types = graph.topics()[name]
     end = "\n\n" if verbose else "\n"
     for line, endpoints in (
         (f"Type: {types[0] if len(types) == 1 else list(types)}", ()),
@@ -68,8 +69,7 @@ def info(
 @joins
 def type_of(topic: TopicName, *, joining: Joining) -> None:
     """Print a topic's type."""
-    for name in _known(topic, joining.graph().topics())[1]:
-        typer.echo(name)
+    print_types("topic", topic, joining.graph().topics())
 
 
 @joins
@@ -87,13 +87,6 @@ def find(
 
     wanted = types.full_name(topic_type)
     print_names(of_type(wanted, shown(joining.graph().topics(), hidden)), count=count)
-
-
-def _known(topic: str, topics: Mapping[str, Sequence[str]]) -> tuple[str, Sequence[str]]:
-    name = absolute(topic)
-    if name not in topics:
-        raise unknown("topic", topic, topics)
-    return name, topics[name]
 
 
 def _table(

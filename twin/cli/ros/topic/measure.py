@@ -9,7 +9,7 @@ import typer
 
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import Joining, joins
-from twin.cli.ros.topic.options import TopicName, Window
+from twin.cli.ros.topic.options import Filter, TopicName, Window
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -27,12 +27,7 @@ def hz(
         list[str], typer.Argument(metavar="TOPIC", help="Such as /chatter.", show_default=False)
     ],
     window: Window = 10_000,
-    filter_expr: Annotated[
-        str | None,
-        typer.Option(
-            "--filter", metavar="EXPR", help='Only messages m for which this is true: "m.data > 3".'
-        ),
-    ] = None,
+    filter_expr: Filter = None,
     wall_time: Annotated[
         bool, typer.Option("--wall-time", help="Measure in wall time whatever --use-sim-time says.")
     ] = False,
@@ -114,7 +109,7 @@ def _listen(
 ) -> Any:
     """Call back for every message of a topic, as soon as it exists; return its class."""
     from twin.bridge.qos import SENSOR_DATA
-    from twin.cli.ros.topic.listen import Listener
+    from twin.cli.ros.topic.process import Listener
 
     endpoints = process.wait_for_topic(name)
     cls = process.message_class(endpoints) if decode else None

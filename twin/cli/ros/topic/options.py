@@ -15,6 +15,10 @@ NodeName = Annotated[
     str | None,
     typer.Option("--node-name", "-n", metavar="NAME", help="Name of the node.", show_default="a hidden one"),
 ]
+Filter = Annotated[
+    str | None,
+    typer.Option("--filter", metavar="EXPR", help='Only messages m for which this is true: "m.data > 3".'),
+]
 Window = Annotated[int, typer.Option("--window", "-w", min=1, metavar="N", help="Messages to average over.")]
 
 

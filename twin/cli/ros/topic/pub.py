@@ -168,7 +168,7 @@ def _wait_for_subscriptions(process: TopicProcess, publisher: Publisher[Any], pl
 def _publish(
     process: TopicProcess, publisher: Publisher[Any], make: Callable[[], Any], plan: PublishPlan
 ) -> None:
-    from twin.bridge.messages.as_repr import message_repr
+    from twin.bridge.messages.as_text import message_repr
 
     count = 0
 

@@ -28,7 +28,7 @@ def value_text(value: Any, field: Field) -> str:
     """Return a field's value as `print` shows it in rclpy: 0.5, Hello, array('f', [0.5]), [0. 0.]."""
     import numpy as np
 
-    from twin.bridge.messages.as_repr import message_repr
+    from twin.bridge.messages.as_text import message_repr
 
     if field.many == "array" and isinstance(value, np.ndarray):
         return str(value)

@@ -1,4 +1,8 @@
-"""How far a navigation is: distance along the path and time to go, as Nav2's feedback tells them."""
+"""What others are told of a navigation: how far it is, and what changed in its tree.
+
+Distance along the path and time to go are told as by Nav2's feedback, changes on `behavior_tree_log`
+(nav2_behavior_tree's RosTopicLogger).
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,11 @@ from collections import deque
 
 import numpy as np
 
-from twin.bridge.msgs import Path
+from twin.bridge.msgs import BehaviorTreeLog, BehaviorTreeStatusChange, Path, stamp
+from twin.bridge.node import Node
 from twin.geometry import Array, Pose2
 from twin.navigation.behavior_trees import paths
+from twin.navigation.behavior_trees.node import Status, TreeNode
 from twin.nodes.messages import path_array
 
 _SEARCH_WINDOW = 2.0
@@ -55,7 +61,36 @@ class Progress:
             return 0.0
         to_go = self._to_go
         behind = int(to_go.searchsorted(_SEARCH_WINDOW + to_go[self._nearest], side="right"))
-        ahead_xy = self._points[self._nearest : behind, :2]
-        aside = ahead_xy - (pose.x, pose.y)
-        self._nearest += int(np.einsum("ij,ij->i", aside, aside).argmin())
+        ahead_xy = self._points[self._nearest : behind]
+        dx, dy = ahead_xy[:, 0] - pose.x, ahead_xy[:, 1] - pose.y
+        self._nearest += int((dx * dx + dy * dy).argmin())
         return -float(to_go[self._nearest])
+
+
+class TreeLog:
+    """Gathers changes of status, and publishes those of a tick together."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(BehaviorTreeLog, "behavior_tree_log", 10)
+        self._changes: list[BehaviorTreeStatusChange] = []
+
+    def take(self, node: TreeNode, before: Status, now: Status) -> None:
+        """Remember a change."""
+        self._changes.append(
+            BehaviorTreeStatusChange(
+                timestamp=stamp(self._node.now_ns),
+                node_name=node.name,
+                uid=node.uid,
+                previous_status=before.value,
+                current_status=now.value,
+            )
+        )
+
+    def flush(self) -> None:
+        """Publish what has changed, if anything has."""
+        if self._changes:
+            self._publisher.publish(
+                BehaviorTreeLog(timestamp=stamp(self._node.now_ns), event_log=self._changes)
+            )
+            self._changes = []

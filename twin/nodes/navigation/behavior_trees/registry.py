@@ -9,8 +9,7 @@ from twin.navigation.behavior_trees.node import TreeNode
 from twin.navigation.behavior_trees.ports import Port
 from twin.navigation.plugins import checked
 from twin.nodes.navigation.behavior_trees import actions, conditions, decorators, goals, paths, services
-from twin.nodes.navigation.behavior_trees.cancelling import CANCEL_NODES
-from twin.nodes.navigation.behavior_trees.selectors import SELECTORS
+from twin.nodes.navigation.behavior_trees.families import CANCEL_NODES, SELECTORS
 from twin.plugins import Plugin
 
 NAVIGATOR_NODES: Registry = {

@@ -46,15 +46,18 @@ def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = Tr
     ranges = message.ranges.astype(np.float64)
     ranges[ranges > message.range_max] = no_return if inf_is_valid else np.nan
     ranges[ranges < message.range_min] = np.nan
-    points: Array = ranges[:, None] * _directions(message.angle_min, message.angle_increment, len(ranges))
+    along, aside = _directions(message.angle_min, message.angle_increment, len(ranges))
+    points = np.empty((len(ranges), 2))
+    np.multiply(ranges, along, out=points[:, 0])
+    np.multiply(ranges, aside, out=points[:, 1])
     return points
 
 
 @lru_cache(maxsize=64)
-def _directions(first: float, step: float, count: int) -> Array:
-    """Return unit vectors of a lidar's rays in its frame, shape (count, 2), from their angles [rad]."""
+def _directions(first: float, step: float, count: int) -> tuple[Array, Array]:
+    """Return x and y, shape (count,), of unit vectors along a lidar's rays, from their angles [rad]."""
     angles = first + step * np.arange(count)
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.cos(angles), np.sin(angles)
 
 
 class _ScanSource:

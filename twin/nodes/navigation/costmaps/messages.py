@@ -85,5 +85,5 @@ def costmap_update(grid: Costmap, window: Window, frame: str, time_ns: int) -> A
 
 def polygon_msg(corners: Array, frame: str, time_ns: int) -> PolygonStamped:
     """Return corners, shape (n, 2) [m], as a polygon in a frame."""
-    points = [Point32(x=float(x), y=float(y), z=0.0) for x, y in corners]
+    points = [Point32(x, y, 0.0) for x, y in corners.tolist()]
     return PolygonStamped(header=header(time_ns, frame), polygon=Polygon(points=points))

@@ -11,10 +11,9 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.bridge.node import Node
 from twin.geometry import Array, Pose2
-from twin.navigation.docking.collision_check import collision_ahead
 from twin.navigation.docking.config import DockCollisionConfig, LineApproachConfig
 from twin.navigation.docking.docks import DockError
-from twin.navigation.docking.line_approach import LineApproach
+from twin.navigation.docking.line_approach import LineApproach, collision_ahead
 from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.docking.attempt import CONTROLLING, FAILED_TO_CONTROL, Attempt
 from twin.nodes.navigation.robot_pose import RobotPose

@@ -1,12 +1,24 @@
-"""`/explore`: drives to the frontiers of a growing map until none is left, with explore_lite's names."""
+"""`/explore`: drives to frontiers of a growing map until none is left; names and colours of explore_lite."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.actions.client import ClientGoal
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import Bool, ExploreStatus, MarkerArray, OccupancyGrid, new, ns
+from twin.bridge.msgs import (
+    Bool,
+    ColorRGBA,
+    ExploreStatus,
+    Marker,
+    MarkerArray,
+    OccupancyGrid,
+    header,
+    new,
+    ns,
+)
 from twin.bridge.qos import LATCHED
 from twin.errors import MapError
 from twin.geometry import Pose2
@@ -15,7 +27,7 @@ from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.warm_up import warm_up_exploration
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.exploration.config import ExplorerNodeConfig
-from twin.nodes.navigation.exploration.frontier_markers import frontier_markers
+from twin.nodes.navigation.mapping.graph_markers import BLUE, RED, Look, point_marker
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.node_parameters import declare_config
@@ -159,3 +171,21 @@ class ExplorerNode:
         if self._markers.has_subscribers:
             markers = frontier_markers(self.explorer, self._robot_pose.frames.map, self.node.now_ns)
             self._markers.publish(new(MarkerArray, markers=markers))
+
+
+_GREEN = ColorRGBA(r=0.0, g=1.0, b=0.0, a=1.0)
+
+
+def frontier_markers(explorer: Explorer, frame: str, time_ns: int) -> list[Marker]:
+    """Return frontiers as blue points, given up ones as red points, their targets as green spheres.
+
+    The first marker deletes those of the time before.
+    """
+    at, frontiers = header(time_ns, frame), explorer.frontiers
+    looks: list[Look] = [(Marker.POINTS, frontier.points, 0.1, BLUE) for frontier in frontiers]
+    if frontiers:
+        looks.append((Marker.SPHERE_LIST, np.array([each.target for each in frontiers]), 0.3, _GREEN))
+    if explorer.given_up:
+        looks.append((Marker.POINTS, np.array(explorer.given_up), 0.2, RED))
+    first = new(Marker, header=at, ns="frontiers", action=Marker.DELETEALL)
+    return [first, *(point_marker(at, "frontiers", number, look) for number, look in enumerate(looks, 1))]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose2, quaternion_from_yaw
 from twin.bridge.msgs import (
     DiagnosticArray,
     LaserScan,
     OccupancyGrid,
+    Point,
     Pose,
     PoseArray,
     PoseWithCovariance,
@@ -209,7 +211,7 @@ class AmclNode:
         ranges[ranges < message.range_min] = np.nan
         fault = self._watch.fault(ranges, odom)
         self._report(fault)
-        angles = message.angle_min + message.angle_increment * np.arange(len(ranges), dtype=np.float64)
+        angles = _angles(message.angle_min, message.angle_increment, len(ranges))
         self._localise(odom, np.zeros(0) if fault else ranges, angles, T_base_lidar, stamp_ns)
         if stamp_ns >= self._particles_due:
             self._particles_due = stamp_ns + self.config.particles_period_ns
@@ -284,7 +286,8 @@ class AmclNode:
             PoseWithCovarianceStamped(
                 header=header(stamp_ns, self._robot_pose.frames.map),
                 pose=PoseWithCovariance(
-                    pose=pose_from_pose2(estimate.pose), covariance=planar_covariance(estimate.covariance)
+                    pose=pose_from_pose2(estimate.pose),
+                    covariance=planar_covariance(estimate.covariance.flat),
                 ),
             )
         )
@@ -295,7 +298,13 @@ class AmclNode:
             return
         particles = self._filter.particles
         step = -(-len(particles) // self.config.particles_published)
-        poses: list[Pose] = [pose_from_pose2(Pose2(*particle)) for particle in particles[::step].tolist()]
+        poses = [Pose(Point(x, y, 0.0), quaternion_from_yaw(yaw)) for x, y, yaw in particles[::step].tolist()]
         self._cloud_publisher.publish(
             PoseArray(header=header(stamp_ns, self._robot_pose.frames.map), poses=poses)
         )
+
+
+@lru_cache(maxsize=64)
+def _angles(first: float, step: float, count: int) -> Array:
+    """Return the directions of a lidar's rays in its frame, shape (count,) [rad]."""
+    return first + step * np.arange(count, dtype=np.float64)

@@ -143,7 +143,7 @@ class SlamToolboxNode:
         self._tf.send_transform(moved, frozen=True)
 
     def _publish_pose(self, update: SlamUpdate, stamp_ns: int) -> None:
-        covariance = planar_covariance(update.covariance)
+        covariance = planar_covariance(update.covariance.flat)
         self._pose_publisher.publish(
             PoseWithCovarianceStamped(
                 header=header(stamp_ns, self.robot_pose.frames.map),

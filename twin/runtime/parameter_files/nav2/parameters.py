@@ -24,7 +24,7 @@ from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
 from twin.scenario.collision_monitor import CollisionMonitorParameters
-from twin.scenario.localisation import AmclParameters as AmclGroup
+from twin.scenario.estimators.amcl import AmclParameters as AmclGroup
 from twin.scenario.navigation import CostmapParameters, NavigationConfig
 
 _DOCKS = frozenset({"docks", "pose", "type", "frame"})
