@@ -55,7 +55,7 @@ class CostmapPublisher:
         if before is None or self._always_send_full or not _same_place(before, costmap):
             self._publish_all(costmap, time_ns)
             return
-        changed = differing(before.costs, costs, everything(costs.shape))
+        changed = Window(*differing(before.costs, costs, everything(costs.shape)))
         self._window = self._window.joined(changed)
         self._carried += costs[self._window.slices].size
         if self._carried > costs.size:
