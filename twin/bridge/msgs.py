@@ -144,6 +144,7 @@ _NAMES = {
         "CollisionMonitorState Costmap CostmapFilterInfo CostmapMetaData CostmapUpdate BehaviorTreeLog "
         "BehaviorTreeStatusChange Particle ParticleCloud SpeedLimit"
     ),
+    "map_msgs": "OccupancyGridUpdate",
     "explore_lite_msgs": "ExploreStatus",
     "control_msgs": "GripperCommand JointTolerance JointTrajectoryControllerState",
 }
