@@ -119,7 +119,6 @@ _NAMES = {
         "TwistStamped TwistWithCovariance TwistWithCovarianceStamped Vector3 Vector3Stamped Wrench "
         "WrenchStamped"
     ),
-    "map_msgs": "OccupancyGridUpdate",
     "nav_msgs": "MapMetaData OccupancyGrid Odometry Path",
     "rcl_interfaces": (
         "FloatingPointRange IntegerRange ListParametersResult Log Parameter ParameterDescriptor "
