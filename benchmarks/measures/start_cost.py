@@ -39,10 +39,14 @@ LIBRARIES = (
 """What twin builds on, of which a scenario loads a part."""
 
 _TOLD = """
-import json, os, sys
+import json, os, resource, sys
+
+def cpu():
+    both = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(used.ru_utime + used.ru_stime for used in both)
 
 def tell(*more):
-    print(json.dumps([sum(os.times()[:4]), *more]), flush=True)
+    print(json.dumps([cpu(), *more]), flush=True)
     os._exit(0)
 """
 _FIRST_TICK = f"""{_TOLD}
@@ -63,15 +67,15 @@ from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import load
 
 def start(file):
-    began = os.times()
+    began = cpu()
     run = OpenRun(load(Path(file)), out=Path(sys.argv[3]))
     run.run.tick()
-    now = os.times()
+    took = cpu() - began
     run.close()
-    return sum(now[:4]) - sum(began[:4])
+    return took
 
 start(sys.argv[1])
-first = sum(os.times()[:4])
+first = cpu()
 tell(first, start(sys.argv[1]), start(sys.argv[2]))
 """
 

@@ -6,8 +6,11 @@ An entry point names a `typer.Typer`. Every command is loaded when it is called,
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -40,22 +43,29 @@ class Commands(TyperGroup):
         """Entry points by name."""
         return _others()
 
+    @cached_property
+    def summaries(self) -> dict[str, str]:
+        """What others' commands are, in words, by name."""
+        return dict(sorted(_listed()))
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the list of commands."""
-        _import_help()
-        super().format_help(ctx, formatter)
+        with _absent(_UNUSED):
+            import_module("typer.rich_utils")
+        with _absent({"rich._emoji_codes": ("EMOJI", {})}):
+            super().format_help(ctx, formatter)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
-        return [*self.commands, *(name for name in self.others if name not in self.commands)]
+        return [*self.commands, *(name for name in self.summaries if name not in self.commands)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return what a list shows of a command."""
         if own := TABLE.get(cmd_name):
             return TyperCommand(cmd_name, help=own.summary, rich_help_panel=own.panel)
-        if cmd_name not in self.others:
+        if cmd_name not in self.summaries:
             return None
-        return TyperCommand(cmd_name, help=_summary(self.others[cmd_name][0]), rich_help_panel=PANEL)
+        return TyperCommand(cmd_name, help=self.summaries[cmd_name], rich_help_panel=PANEL)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command itself and its arguments.
@@ -77,18 +87,43 @@ class Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
 
-def _import_help() -> None:
-    """Import what typer writes help with, but for what of rich takes longest and is not used for this."""
-    unused = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
-    absent = {name: cls for name, cls in unused.items() if name not in sys.modules}
-    for name, cls in absent.items():
+_UNUSED = {"rich.markdown": ("Markdown", None), "rich.traceback": ("Traceback", None)}
+
+
+@contextmanager
+def _absent(unused: Mapping[str, tuple[str, Any]]) -> Iterator[None]:
+    """In the block, do without what of rich takes longest to import and is not used for the list."""
+    absent = {name: attribute for name, attribute in unused.items() if name not in sys.modules}
+    for name, attribute in absent.items():
         sys.modules[name] = ModuleType(name)
-        setattr(sys.modules[name], cls, None)
+        setattr(sys.modules[name], *attribute)
     try:
-        import_module("typer.rich_utils")
+        yield
     finally:
         for name in absent:
             del sys.modules[name]
+
+
+def _listed() -> Iterator[tuple[str, str]]:
+    """Yield name and summary of each command in folders of the path, read as plain text.
+
+    To import what reads metadata takes as long as typer does, and only a call needs it.
+    """
+    for folder in dict.fromkeys(sys.path):
+        for file in sorted(Path(folder).glob("*-info/entry_points.txt"), reverse=True):
+            text = file.read_text("utf-8", "replace")
+            for line in text.partition(f"[{GROUP}]\n")[2].partition("\n[")[0].splitlines():
+                name, _, value = map(str.strip, line.partition("="))
+                if name:
+                    yield name, _summary(file.parent) or value
+
+
+def _summary(info: Path) -> str:
+    for file in (info / "METADATA", info / "PKG-INFO"):
+        if file.is_file():
+            head = file.read_text("utf-8", "replace").partition("\n\n")[0]
+            return head.partition("\nSummary:")[2].partition("\n")[0].strip()
+    return ""
 
 
 def _others() -> dict[str, list[EntryPoint]]:
@@ -116,7 +151,3 @@ def _load(name: str, points: list[EntryPoint]) -> TyperGroup:
 
 def _origin(point: EntryPoint) -> str:
     return f"{point.value} of {point.dist.name}" if point.dist is not None else point.value
-
-
-def _summary(point: EntryPoint) -> str:
-    return (point.dist.metadata["Summary"] if point.dist is not None else None) or point.value

@@ -1,8 +1,9 @@
 """Compile (or load from the disk cache) what a node runs, before the clock starts.
 
-Each node calls its own function when it is built: a robot that does not explore waits for no explorer. A
-function calls what is compiled with the types that it is called with later, in a room of 2 x 2 m, once per
-process; it imports that itself, for it is imported by nodes that need but one of them.
+Each node calls its own function when it is built: a robot that does not explore waits for no explorer, and
+nobody for anything in a run that is as fast as possible (`ahead.py`). A function calls what is compiled with
+the types that it is called with later, in a room of 2 x 2 m, once per process; it imports that itself, for it
+is imported by nodes that need but one of them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twin.geometry import Pose2
+from twin.navigation.ahead import ahead
 from twin.navigation.failures import ControlFailure
 from twin.navigation.maps.occupancy_map import OccupancyMap
 
@@ -24,12 +26,14 @@ if TYPE_CHECKING:
 _START, _GOAL = Pose2(1.0, 0.5, 0.0), Pose2(1.5, 1.5, 0.0)
 
 
+@ahead
 @cache
 def warm_up_costmap() -> None:
     """Let a scan into a costmap."""
     _costmap().update([[0.5, 1.0]], (1.0, 1.0), Pose2(1.0, 1.0, 0.0))
 
 
+@ahead
 @cache
 def warm_up_odometry_watch() -> None:
     """Let scans of a corner contradict odometry, so that their motion is looked for."""
@@ -42,12 +46,14 @@ def warm_up_odometry_watch() -> None:
     watch.take(lambda: corner, Pose2(0.0, 0.0, 1.0), 500_000_000)
 
 
+@ahead
 @cache
 def warm_up_ranges() -> None:
     """Let a reading of a range sensor into a costmap."""
     _costmap().update_range(Pose2(1.0, 1.0, 0.0), 0.3, (0.1, 0.5), 0.2)
 
 
+@ahead
 @cache
 def warm_up_keepout() -> None:
     """Lay a mask over a costmap."""
@@ -56,6 +62,7 @@ def warm_up_keepout() -> None:
     _costmap().set_keepout(KeepoutFilter(mask=_room()))
 
 
+@ahead
 @cache
 def warm_up_planning() -> None:
     """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
@@ -66,6 +73,7 @@ def warm_up_planning() -> None:
     SimpleSmoother().smooth(ThetaStar().create_plan(costmap, _START, _GOAL), costmap)
 
 
+@ahead
 @cache
 def warm_up_maneuver() -> None:
     """Look for a way on to a path, and begin to drive it."""
@@ -77,6 +85,7 @@ def warm_up_maneuver() -> None:
     maneuver.command(at, (0.0, 0.0), layered.costmap, 0.05)
 
 
+@ahead
 @cache
 def warm_up_behaviors() -> None:
     """Look whether a command collides."""
@@ -88,6 +97,7 @@ def warm_up_behaviors() -> None:
     DriveOnHeading().update(_START, 0.1, layered.costmap)
 
 
+@ahead
 @cache
 def warm_up_collision_monitor() -> None:
     """Look when two points are hit."""
@@ -96,6 +106,7 @@ def warm_up_collision_monitor() -> None:
     time_to_collision(np.ones((2, 2)), _costmap().config.polygon, 0.1, 0.1, 0.1, 0.1, 1)
 
 
+@ahead
 @cache
 def warm_up_docking() -> None:
     """Look for a wall."""
@@ -112,6 +123,7 @@ def warm_up_exploration() -> None:
     Explorer().update(_room(), _START, 0.0)
 
 
+@ahead
 @cache
 def warm_up_localisation() -> None:
     """Weigh two particles by a scan. The beam model compiles when it is first used."""
@@ -129,6 +141,7 @@ def warm_up_localisation() -> None:
     same_surface(np.ones((2, 2)), np.ones((2, 2)), 0.05)
 
 
+@ahead
 def warm_up_controller(controller: Controller) -> None:
     """Let a controller drive a few commands along a path that bends and ends, and forget them."""
     from twin.navigation.costmaps.layered_costmap import CostmapConfig, LayeredCostmap

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
+from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
@@ -68,6 +69,7 @@ class OpenRun:
         bag: Path | None = None,
         bag_hidden_topics: bool = False,
         save_model: Path | None = None,
+        workers: int = 0,
         savings: Savings = ALL,
     ) -> None:
         """Build everything, up to the first tick.
@@ -86,6 +88,7 @@ class OpenRun:
             bag: Folder for a bag of every message.
             bag_hidden_topics: Whether topics of actions are in the bag too.
             save_model: Folder for the compiled world as MJCF.
+            workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
 
         Raises:
@@ -105,11 +108,13 @@ class OpenRun:
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
         taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
-        with execution() as self._executed, ExitStack() as ending:
+        network = network or SessionConfig(listen=outside.endpoints(listen))
+        keeps_time = pace is not None or network.networked
+        with execution() as self._executed, ExitStack() as ending, kernels_ahead(keeps_time):
             parts = build(
                 scenario,
                 taps=[self._digest.on_sample, *taps],
-                network=network or SessionConfig(listen=outside.endpoints(listen)),
+                network=network,
                 outside=outside,
                 crash_folder=out,
                 savings=savings,
@@ -125,6 +130,8 @@ class OpenRun:
             self.run = Run(scenario, parts, self._sink, outside)
             if self.run.lockstep is not None:
                 ending.callback(self.run.lockstep.close)
+            if workers:
+                ending.callback(self.run.hire(workers).close)
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
@@ -156,17 +163,16 @@ class OpenRun:
                 run.tick()
                 if until is not None and until():
                     return True
-                simulated = run.world.time_ns * 1e-9
                 if self._pace is not None:
-                    self._pace.keep(simulated)
-                now = time.perf_counter()
-                if progress is not None and now - shown > _SHOWN_S:
-                    shown = now
+                    self._pace.keep(run.world.time_ns * 1e-9)
+                if progress is not None and time.perf_counter() - shown > _SHOWN_S:
+                    shown = time.perf_counter()
+                    simulated = run.world.time_ns * 1e-9
                     progress(
                         Progress(
                             time_s=simulated,
                             duration_s=run.scenario.duration,
-                            real_time_factor=simulated / (now - began),
+                            real_time_factor=simulated / (shown - began),
                             mission_state=run.parts.mission.state,
                         )
                     )
@@ -226,7 +232,7 @@ class OpenRun:
             metrics={
                 "sim_time_s": simulated,
                 "wall_time_s": self._wall_s,
-                "cpu_time_s": self._cpu_s,
+                "cpu_time_s": self._cpu_s + (run.workers.cpu_s if run.workers else 0.0),
                 "real_time_factor": simulated / self._wall_s if self._wall_s else 0.0,
                 **({} if pace is None else {"pace_losses": float(pace.losses), "pace_lost_s": pace.lost_s}),
                 "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
@@ -253,6 +259,7 @@ def run(
     bag: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     watch: Callable[[Run], bool] | None = None,
+    workers: int = 0,
     savings: Savings = ALL,
 ) -> Verdict:
     """Run a scenario to its verdict; see `OpenRun` and `OpenRun.advance_to_end`.
@@ -268,6 +275,7 @@ def run(
         listen=listen,
         outside=outside,
         bag=bag,
+        workers=workers,
         savings=savings,
     )
     try:

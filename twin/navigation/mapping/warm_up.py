@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from twin.geometry import Pose2
+from twin.navigation.ahead import ahead
 from twin.navigation.mapping.slam import Slam, SlamConfig
 
 
+@ahead
 def warm_up() -> None:
     """Take two scans of a flat wall through every compiled function."""
     slam = Slam(SlamConfig(minimum_travel_distance=0.0))
