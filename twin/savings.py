@@ -26,7 +26,7 @@ class Savings:
     """Checks and bumpers look closely only where something is new: other shapes touch than before, a load
     touches more than its robot, something lies elsewhere."""
     plane_of_rays: bool = True
-    """Rays pass over bodies that they do not see, those of a flat fan over scenery beside its plane, too."""
+    """Rays pass over bodies that they do not see or reach, those of a flat fan over what its plane misses."""
 
 
 ALL = Savings()

@@ -56,7 +56,7 @@ def costs(scenario: Scenario, limit: Replay, *, record: bool) -> dict[str, list[
         for name in ("run", "recorded") if record else ("run",):
             run = OpenRun(scenario, out=Path(folder), record=name == "recorded")
             ending.callback(run.close)
-            advance[name] = partial(_advance, run)
+            advance[name] = partial(advance, run)
         gc.freeze()  # as a run does
         ending.callback(gc.unfreeze)
         taken: dict[str, list[float]] = {name: [] for name in advance}
@@ -69,7 +69,8 @@ def costs(scenario: Scenario, limit: Replay, *, record: bool) -> dict[str, list[
     return taken
 
 
-def _advance(run: OpenRun, until_s: float) -> None:
+def advance(run: OpenRun, until_s: float) -> None:
+    """Tick a run up to a simulated time [s]."""
     run.advance(lambda: run.run.world.time_ns >= until_s * 1e9)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from twin.errors import RecordingError
 from twin.geometry import xyzw_from_wxyz
 from twin.recording.read_back import Recording, read
+from twin.recording.sink import RerunSink
 
 
 @pytest.fixture(scope="session")
@@ -137,9 +139,41 @@ def test_rasters_keep_their_time(content: Recording, recorded: Any) -> None:
     assert set(times.tolist()) <= published
 
 
-def test_equal_rasters_and_plans_are_kept_once(make_run: Any, tmp_path: Any) -> None:
-    from twin.recording.sink import RerunSink
+def test_updates_change_rasters(make_run: Any, tmp_path: Any) -> None:
+    """Of the grid of which they are, cell by cell; one that lies outside of it is left out."""
+    run = make_run(duration_s=0.5)
+    costs = (np.arange(12 * 8) % 100).astype(np.int8).reshape(8, 12)
+    sink = RerunSink(tmp_path / "updates.rrd")
+    sink.declare(run.world)
 
+    def update(x: int, y: int, cells: np.ndarray) -> None:
+        height, width = cells.shape
+        where = {"x": x, "y": y, "width": width, "height": height}
+        header = SimpleNamespace(frame_id="map")
+        sample = SimpleNamespace(
+            topic="/global_costmap/costmap_updates",
+            msgtype="map_msgs/msg/OccupancyGridUpdate",
+            time_ns=run.world.time_ns,
+            message=SimpleNamespace(header=header, **where, data=cells.ravel()),
+        )
+        sink.on_sample(sample)  # type: ignore[arg-type]
+
+    window = np.full((2, 3), 55, np.int8)
+    expected = [costs, costs.copy()]
+    expected[1][5:7, 4:7] = window
+    update(0, 0, window)
+    sink.on_sample(run.publish("/global_costmap/costmap", run.grid(costs, "map", 0.0, 0.0)))
+    for i, (x, y) in enumerate(((4, 5), (4, 5), (11, 5))):
+        run.world.time_ns = (i + 1) * 20_000_000
+        update(x, y, window)
+    sink.close()
+    column = read(tmp_path / "updates.rrd").column("/ros/global_costmap/costmap", "GridMap:data")
+    assert column.times_ns.tolist() == [0, 20_000_000]
+    for row, cells in zip(column.values, expected, strict=True):
+        assert bytes(row[0]) == cells[::-1].tobytes()
+
+
+def test_equal_rasters_and_plans_are_kept_once(make_run: Any, tmp_path: Any) -> None:
     run = make_run(duration_s=0.0)
     sink = RerunSink(tmp_path / "a.rrd")
     sink.declare(run.world)

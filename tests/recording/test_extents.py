@@ -99,6 +99,7 @@ def camera(path: Path) -> list[Any]:
     return eyes
 
 
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_a_screen_is_written_that_shows_where_the_robot_went(make_box: Any, tmp_path: Path) -> None:
     drive(tmp_path / "away.rrd", Leaving(make_box), close=True)
     targets = [target for _, target in camera(tmp_path / "away.rrd")]

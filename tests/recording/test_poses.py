@@ -25,7 +25,7 @@ def kept(poses: np.ndarray, blocks: list[int]) -> list[tuple[int, str, list[floa
     found = []
     for n in blocks:
         block, rows = rows[:n], rows[n:]
-        for _, (times,), (xyz, _, _, child) in sender.chunks(block):
+        for _, times, (xyz, _, _, child) in sender.chunks(block):
             at = times.as_arrow_array().cast("int64").to_pylist()
             x = [row[0][0] for row in xyz.as_arrow_array().to_pylist()]
             bodies = [row[0] for row in child.as_arrow_array().to_pylist()]

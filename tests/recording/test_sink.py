@@ -141,6 +141,25 @@ def test_unwritable_folder(make_world: Any, tmp_path: Path) -> None:
         RerunSink(tmp_path / "file" / "a.rrd").declare(make_world())
 
 
+def test_a_run_goes_on_while_a_block_is_written(
+    make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waits for no block at once, and sends none before the one before is in the file."""
+    sink, run = RerunSink(tmp_path / "a.rrd"), make_run(duration_s=3.0)
+    done: list[tuple[str, int]] = []
+    for name in ("begin_flush", "flush"):
+        monkeypatch.setattr(
+            f"twin.recording.stream.{name}", lambda *_, name=name: done.append((name, run.world.time_ns))
+        )
+    sink.declare(run.world)
+    for _ in run.ticks():
+        sink.on_tick(run.world)
+    assert [name for name, _ in done] == ["begin_flush", "flush"] * 4
+    assert [time_ns // 1_000_000 for _, time_ns in done] == [0, 100, 900, 1000, 1800, 1900, 2700, 2800]
+    monkeypatch.undo()
+    sink.close()
+
+
 def test_a_full_disk_ends_the_run(make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also if it fills up while the run is not looking: told with the block after, and again at the end."""
     sink = RerunSink(tmp_path / "a.rrd")

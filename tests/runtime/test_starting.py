@@ -29,14 +29,14 @@ def test_a_run_says_when_all_its_nodes_are_made(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen: list[list[str]] = []
-    build_mission = building.build_mission
+    build_missions = building.build_missions
 
     def look(*given: object) -> object:
         with live.join([endpoint]) as other:
             seen.append(alive(other.bus, starting_key(0)))
-        return build_mission(*given)  # type: ignore[arg-type]
+        return build_missions(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(building, "build_mission", look)
+    monkeypatch.setattr(building, "build_missions", look)
     run = make_run(scenario(IDLE), network=SessionConfig(listen=(endpoint,)))
     assert seen == [[starting_key(0, run.bus.session_id)]]
     with live.join([endpoint]) as other:

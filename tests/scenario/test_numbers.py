@@ -12,7 +12,7 @@ import pytest
 from twin.errors import Problem, ScenarioError
 from twin.scenario.schema import Scenario, json_schema, load
 from twin.strict_yaml.document import Document, Loc, apply_override
-from twin.strict_yaml.validate import validate
+from twin.strict_yaml.explain import validate
 
 _EXTREME = ("1e308", "1e-320", "1e400", "-0.0", "-1e15", "1e15", "1e-15", "1e-100", "nan", "9" * 5000)
 _WITH_UNIT = ("1e308 {}", "1e-320 {}", "-1e400 {}", "1e9 {}", "1e-9 {}", "0 {}", "1e999999999 {}")

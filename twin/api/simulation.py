@@ -51,6 +51,7 @@ class Simulation(Participant):
         bag: bool = False,
         bag_hidden_topics: bool = False,
         save_model: str | Path | None = None,
+        workers: int = 0,
         pace: float | None = None,
         listen: Sequence[str] = (),
         network: SessionConfig | None = None,
@@ -73,6 +74,7 @@ class Simulation(Participant):
             bag: Whether `out` gets a ROS 2 bag of every message.
             bag_hidden_topics: Whether topics of actions are in the bag, too.
             save_model: Folder for the compiled world as MJCF.
+            workers: Processes that run the nodes of several robots beside this one. Changes no result.
             pace: Simulated seconds per second; None is as fast as possible. Changes no result.
             listen: Endpoints at which other processes may join the bus, such as tcp/127.0.0.1:7447.
             network: How else the bus takes part in a network, instead of `listen`.
@@ -96,6 +98,7 @@ class Simulation(Participant):
         self._bag, self._bag_hidden_topics = bag, bag_hidden_topics
         self._save_model = None if save_model is None else Path(save_model)
         self._pace = pace
+        self._workers = workers
         self._listen, self._network = tuple(listen), network
         self._outside = partial(
             Outside, nodes=tuple(nodes), wait_for=tuple(wait_for), wait_timeout_s=wait_timeout, free=free
@@ -280,6 +283,7 @@ class Simulation(Participant):
             bag=self.folder / "bag" if self._bag and self.folder is not None else None,
             bag_hidden_topics=self._bag_hidden_topics,
             save_model=self._save_model,
+            workers=self._workers,
         )
         self._held.callback(self._run.close)
 

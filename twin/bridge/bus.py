@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Self
@@ -18,8 +18,8 @@ from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
-from twin.bridge.topics import Sample
-from twin.bridge.topics.in_process import InProcess
+from twin.bridge.topics import Endpoint, Sample
+from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.wire import Wire
 from twin.bridge.wire.external import Arrival, ExternalQueue
 from twin.bridge.wire.interrupts import guard
@@ -63,7 +63,17 @@ class Bus:
         """Called for everything from outside when it enters, before a node has it."""
         self.node_options: NodeOptions | None = None
         """Of nodes that are created without options: the program's command line."""
+        self.group = ""
+        """Of nodes that are created. What nodes tell another group arrives when all have run."""
+        self.running: Node | None = None
+        """The node that runs now."""
+        self.defer: Callable[[Member, Any], None] = self._put_off
+        """What becomes of what a running node tells another group."""
+        self.announced: Callable[[Endpoint], None] | None = None
+        """Called with every new endpoint."""
+        self._put_offs: list[tuple[Member, Any]] = []
         self._nodes: list[Node] = []
+        self._away: frozenset[str] = frozenset()
         self._ids = 0
         self._spun_ns = 0
         self.thread = threading.get_ident()
@@ -213,9 +223,35 @@ class Bus:
         now_ns = self.clock.now_ns
         everyone = now_ns < self._spun_ns or not self.savings.due  # set back, all timers look again
         self._spun_ns = now_ns
-        for node in self.nodes:
-            if node.inbox or node.due_ns <= now_ns or everyone:
-                node.spin()
+        try:
+            for node in self.nodes:
+                if (node.inbox or node.due_ns <= now_ns or everyone) and node.group not in self._away:
+                    self.running = node
+                    node.spin()
+        finally:
+            self.running = None
+        waiting, self._put_offs = self._put_offs, []
+        for receiver, data in waiting:
+            receiver.enqueue(data, False)
+
+    def leave(self, groups: Collection[str]) -> None:
+        """Run the nodes of these groups no more: another process does."""
+        self._away = frozenset(groups)
+
+    def is_away(self, group: str) -> bool:
+        """Whether another process runs the nodes of a group."""
+        return group in self._away
+
+    def deliver(self, receiver: Member, data: Any) -> None:
+        """Put data into an inbox of this process."""
+        running = self.running
+        if running is None or running.group == receiver.group:
+            receiver.enqueue(data, False)
+        else:
+            self.defer(receiver, data)
+
+    def _put_off(self, receiver: Member, data: Any) -> None:
+        self._put_offs.append((receiver, data))
 
     def tap(self, callback: Tap) -> None:
         """Call back for every sample that this process publishes, while it publishes it."""

@@ -24,9 +24,8 @@ from twin.bridge.programs.ros_args import parser_of, split
 from twin.bridge.wire import Wire
 from twin.bridge.wire.admission import Admission, read
 from twin.bridge.wire.interrupts import noted_signals
-from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.naming import Interface
-from twin.bridge.wire.session import direct
+from twin.bridge.wire.session import direct, session_to_join
 from twin.errors import TwinError
 
 _LONGEST_WAIT_S = 0.1

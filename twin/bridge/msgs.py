@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     CostmapFilterInfo: Any
     CostmapMetaData: Any
     CostmapUpdate: Any
+    OccupancyGridUpdate: Any
     BehaviorTreeLog: Any
     BehaviorTreeStatusChange: Any
     Particle: Any
@@ -142,6 +143,7 @@ _NAMES = {
         "CollisionMonitorState Costmap CostmapFilterInfo CostmapMetaData CostmapUpdate BehaviorTreeLog "
         "BehaviorTreeStatusChange Particle ParticleCloud SpeedLimit"
     ),
+    "map_msgs": "OccupancyGridUpdate",
     "explore_lite_msgs": "ExploreStatus",
     "control_msgs": "GripperCommand JointTolerance JointTrajectoryControllerState",
 }

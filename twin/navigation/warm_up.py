@@ -108,6 +108,14 @@ def warm_up_collision_monitor() -> None:
 
 @ahead
 @cache
+def warm_up_docking() -> None:
+    """Look for a wall."""
+    from twin.navigation.docking.faces import fit_wall
+
+    fit_wall(np.column_stack([np.ones(5), np.linspace(0.0, 1.0, 5)]))
+
+
+@cache
 def warm_up_exploration() -> None:
     """Look for what there is to explore."""
     from twin.navigation.exploration.explorer import Explorer

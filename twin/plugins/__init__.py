@@ -13,7 +13,7 @@ What ships is registered in the same way as what a user brings:
 
 from twin.plugins.execution import Execution as Execution
 from twin.plugins.execution import execution as execution
-from twin.plugins.files import Files as Files
 from twin.plugins.guard import require_finite as require_finite
+from twin.plugins.installed import Files as Files
 from twin.plugins.kind import Kind as Kind
 from twin.plugins.plugin import Plugin as Plugin

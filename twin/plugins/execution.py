@@ -73,8 +73,8 @@ class Execution:
         try:
             yield
         except (Exception, SystemExit) as error:
-            blamed = None if is_told(error) else self.blamed(error)
-            if blamed is None:
+            blamed = told(error)
+            if blamed is error:
                 raise
             raise blamed from error
         finally:
@@ -97,6 +97,12 @@ def execution(tell: Callable[[str], None] | None = None) -> Iterator[Execution]:
     current = Execution(tell)
     with current.going_on():
         yield current
+
+
+def told(error: BaseException) -> BaseException:
+    """Return an exception as the present execution tells it: what came through a plugin as `PluginError`."""
+    current = _CURRENT.get()
+    return error if current is None or is_told(error) else current.blamed(error) or error
 
 
 def run(plugin: Plugin[Any]) -> Any:

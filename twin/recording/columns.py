@@ -1,30 +1,71 @@
 """Columns of Rerun's components, made of whole arrays.
 
 Rerun's cost is per column, not per row: so rows wait for a block of simulated time, and become Arrow arrays
-at once. `columns` of Rerun's archetypes does the same at twice the cost of sending. Importing this module
-imports rerun (0.4 s): only a run that records does.
+at once. `columns` of Rerun's archetypes does the same at several times the cost of sending. Importing this
+module imports rerun (0.4 s): only a run that records does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
-from numpy.typing import ArrayLike, NDArray
+import rerun.chunk as rc
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 TIMELINE = "sim_time"
 """The one timeline: simulated time as a duration, from integer nanoseconds."""
-
-Chunk = tuple[str, list[rr.TimeColumn], list[rr.ComponentColumn]]
-"""Entity, index and columns: what `rr.send_columns` takes."""
+_DURATION = pa.duration("ns")
 
 
-def sim_time(times_ns: ArrayLike) -> list[rr.TimeColumn]:
+class Times(NamedTuple):
+    """The index of rows, as Rerun takes it."""
+
+    array: pa.Array
+
+    def timeline_name(self) -> str:
+        """Return what the index is called."""
+        return TIMELINE
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return a duration for each row."""
+        return self.array
+
+
+class Column(NamedTuple):
+    """One component of rows, as Rerun takes it."""
+
+    descriptor: Any
+    array: pa.Array
+
+    def component_descriptor(self) -> Any:
+        """Return the component's name, type and archetype."""
+        return self.descriptor
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return a list of instances for each row."""
+        return self.array
+
+
+Chunk = tuple[str, Times, Sequence[Column]]
+"""Entity, index and columns."""
+
+
+def send(recording: rr.RecordingStream, chunks: Iterable[Chunk]) -> None:
+    """Send chunks, all at once: to wake up Rerun's threads for each would cost as much again."""
+    recording.send_chunks(
+        # only the two methods of a `Column` are asked for
+        [rc.Chunk.from_columns(entity, (times,), columns) for entity, times, columns in chunks]  # type: ignore[arg-type]
+    )
+
+
+def sim_time(times_ns: ArrayLike) -> Times:
     """Return the index of rows at simulated times [ns], without rounding through seconds."""
-    return [rr.TimeColumn(TIMELINE, duration=np.array(times_ns, dtype="timedelta64[ns]"))]
+    return Times(_numbers(times_ns, np.int64, _DURATION))
 
 
 class Component:
@@ -37,41 +78,58 @@ class Component:
         (batch,) = (b for b in batches if b.component_descriptor().component == whole)
         self._descriptor = batch.component_descriptor()
         self._type = batch.as_arrow_array().type
+        self._rows = pa.list_(self._type)
 
-    def column(self, values: Any, lengths: ArrayLike | None = None) -> rr.ComponentColumn:
+    def column(self, values: Any, lengths: ArrayLike | None = None) -> Column:
         """Return values as a column, by default one in a row.
 
         Args:
-            values: One for each instance: texts, or numbers, shape (n, ...); an instance that is a list of
-                its own is an array in a list.
+            values: One for each instance: texts, structures as dictionaries, or numbers, shape (n, ...); an
+                instance that is a list of its own is an array in a list.
             lengths: How many instances each row has.
         """
         array = _arrow(values, self._type)
-        offsets = np.arange(len(array) + 1, dtype=np.int32) if lengths is None else _offsets(lengths)
-        return rr.ComponentColumn(self._descriptor, _Batch(array), offsets=offsets)
-
-
-class _Batch(NamedTuple):
-    array: pa.Array
-
-    def as_arrow_array(self) -> pa.Array:
-        return self.array
+        n, offsets = (len(array), _one_each(len(array))) if lengths is None else _offsets(lengths)
+        rows = pa.Array.from_buffers(self._rows, n, [None, offsets], children=[array])
+        return Column(self._descriptor, rows)
 
 
 def _arrow(values: Any, kind: pa.DataType) -> pa.Array:
+    if pa.types.is_primitive(kind):
+        return _numbers(values, kind.to_pandas_dtype(), kind)
     if pa.types.is_fixed_size_list(kind):
-        flat = np.asarray(values, dtype=kind.value_type.to_pandas_dtype()).ravel()
-        return pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind)
+        items = _arrow(values, kind.value_type)
+        return pa.Array.from_buffers(kind, len(items) // kind.list_size, [None], children=[items])
     if pa.types.is_list(kind):
+        n, offsets = _offsets([len(value) for value in values])
         items = _arrow(np.concatenate(values), kind.value_type)
-        return pa.ListArray.from_arrays(_offsets([len(value) for value in values]), items, type=kind)
+        return pa.Array.from_buffers(kind, n, [None, offsets], children=[items])
     return pa.array(values, kind)
 
 
-def _offsets(lengths: ArrayLike) -> NDArray[np.int32]:
-    """Return where each of consecutive lists begins, and where the last one ends."""
-    sums = np.cumsum(lengths, dtype=np.int32)
-    return np.concatenate((np.zeros(1, dtype=np.int32), sums))
+def _numbers(values: ArrayLike, dtype: DTypeLike, kind: pa.DataType) -> pa.Array:
+    """Return numbers of any shape, one after another, in memory that Arrow owns.
+
+    Rerun's threads let go of it: were it numpy's, each time they would have to wait for the run's thread.
+    """
+    values = np.asarray(values)
+    buffer = pa.allocate_buffer(values.size * np.dtype(dtype).itemsize)
+    np.frombuffer(buffer, dtype).reshape(values.shape)[...] = values
+    return pa.Array.from_buffers(kind, values.size, [None, buffer])
+
+
+def _offsets(lengths: ArrayLike) -> tuple[int, pa.Buffer]:
+    """Return how many consecutive lists there are, and where each begins and the last one ends."""
+    ends = np.cumsum(lengths, dtype=np.int32)
+    buffer = pa.allocate_buffer(4 * (len(ends) + 1))
+    offsets = np.frombuffer(buffer, np.int32)
+    offsets[0], offsets[1:] = 0, ends
+    return len(ends), buffer
+
+
+@lru_cache(maxsize=256)
+def _one_each(n: int) -> pa.Buffer:
+    return _offsets(np.ones(n, dtype=np.int32))[1]
 
 
 SCALARS = Component(rr.Scalars, "scalars")
@@ -82,25 +140,25 @@ _PARENT = Component(rr.Transform3D, "parent_frame")
 _CHILD = Component(rr.Transform3D, "child_frame")
 
 
-def scalars(index: list[rr.TimeColumn], series: Mapping[str, ArrayLike]) -> Iterator[Chunk]:
+def scalars(times: Times, series: Mapping[str, ArrayLike]) -> Iterator[Chunk]:
     """Yield series of numbers by entity, all at the same times."""
     for entity, values in series.items():
-        yield entity, index, [SCALARS.column(np.asarray(values, dtype=np.float64))]
+        yield entity, times, (SCALARS.column(values),)
 
 
 def transforms(
     entity: str,
-    index: list[rr.TimeColumn],
+    times: Times,
     parents: Sequence[str] | NDArray[np.object_],
     children: Sequence[str] | NDArray[np.object_],
     xyz: ArrayLike,
     quat_xyzw: ArrayLike,
 ) -> Chunk:
     """Return poses of named frames in their parents, one of each per row: shapes (n, 3) [m] and (n, 4)."""
-    columns = [
+    columns = (
         _TRANSLATION.column(xyz),
         _QUATERNION.column(quat_xyzw),
         _PARENT.column(parents),
         _CHILD.column(children),
-    ]
-    return entity, index, columns
+    )
+    return entity, times, columns

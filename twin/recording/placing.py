@@ -9,11 +9,6 @@ from twin.recording.columns import TIMELINE
 from twin.recording.frames import WORLD
 
 
-def set_time(recording: rr.RecordingStream, time_ns: int) -> None:
-    """Set the simulated time of the rows logged next."""
-    recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
-
-
 class Placed:
     """The frame that an entity is drawn in.
 
@@ -32,5 +27,5 @@ class Placed:
         """Say that what follows is in this frame."""
         if frame != self._frame:
             self._frame = frame
-            set_time(self._recording, time_ns)
+            self._recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
             self._recording.log(self._entity, rr.CoordinateFrame(frame))

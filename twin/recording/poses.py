@@ -11,7 +11,7 @@ from twin.geometry import Array
 from twin.recording.columns import Chunk, sim_time, transforms
 from twin.recording.extents import Stage
 from twin.recording.frames import WORLD
-from twin.recording.writer import Rows
+from twin.recording.rows import Rows
 
 
 class Poses(Rows[tuple[int, Array, Array]]):

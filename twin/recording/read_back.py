@@ -1,6 +1,6 @@
 """Reads a recording: for tests and tools, with nothing but rerun's chunk reader and pyarrow.
 
-Works on the file of a killed run too, which has no footer, up to its last complete block.
+Works on the file of a killed run too, up to its last complete block.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def read(path: Path) -> Recording:
     from rerun.error_utils import RerunWarning
 
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # of a killed run
+        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # it needs none
         reader = rc.RrdReader(check_recording(path))
     stores = reader.recordings()
     if not stores:

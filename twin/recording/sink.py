@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
 from twin.recording.frames import Frames
-from twin.recording.writer import Rows, Writer
+from twin.recording.rows import Rows
 
 if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays for it
     import rerun as rr
@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays f
 
 _NS = 1_000_000_000
 _COLLECTING = 0.9
-"""Part of what a killed run loses during which rows are collected; the rest of it is for writing them."""
+"""Part of what a killed run loses during which rows are collected; in the rest of it they are written."""
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 
 
@@ -60,8 +60,9 @@ class RerunSink:
     """Turns a world and the samples of its bus into a Rerun recording.
 
     The simulator's truth is drawn in `world`; a lidar's points lie where it truly saw them; what the robot
-    believes is a ghost with a trail of its own. The run only puts rows aside: a writer makes columns of them
-    and sends them, a block of simulated time at once. Order: construct, `bus.tap(sink.on_sample)`,
+    believes is a ghost with a trail of its own. The run puts rows aside, and makes columns of a block of
+    simulated time at once, which Rerun's threads encode and write while the run goes on. At most one block is
+    under way: a run waits for a slow disk, and loses nothing. Order: construct, `bus.tap(sink.on_sample)`,
     `declare(world)`, then `on_tick(world)` after every tick and `close(verdict)`.
     """
 
@@ -91,6 +92,7 @@ class RerunSink:
         self._period = period_of(self._config.poses_hz)
         self._block_ns = round(_NS * _COLLECTING * self._config.loss_s)
         self._writing_ns = round(_NS * (1.0 - _COLLECTING) * self._config.loss_s)
+        self._under_way = False
         self._closed = False
 
     def declare(self, world: World, wheels: Mapping[str, Collection[str]] = NO_WHEELS) -> None:
@@ -138,7 +140,6 @@ class RerunSink:
         declare_frames(self._recording, frames)
         self._set_stage()
         declare_shapes(self._recording, shapes, world.pose)
-        self._writer = Writer(self._recording, self._end_block)
         self._next_pose_ns = self._next_block_ns = self._written_ns = world.time_ns
         self.on_tick(world)
         self._takers.clear()
@@ -156,7 +157,7 @@ class RerunSink:
             take(sample)
 
     def on_tick(self, world: World) -> None:
-        """Sample the poses when they are due, and have the block written when it is full.
+        """Sample the poses when they are due, send the block when it is full, see that it was written.
 
         Raises:
             RecordingError: A block could not be written.
@@ -166,14 +167,14 @@ class RerunSink:
             self._next_pose_ns = next_due(self._period, time_ns)
             self._poses.rows.append((time_ns, *world.body_poses()))
         if time_ns >= self._next_block_ns:
-            self._writer.write(self._sources)
+            self._send()
             self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
             self._written_ns = time_ns + self._writing_ns
-        elif time_ns >= self._written_ns:
-            self._writer.wait()
+        elif self._under_way and time_ns >= self._written_ns:
+            self._wait()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
-        """Write what waits, the verdict (as in `verdict.json`) and the footer; the rest is ignored.
+        """Write what waits, the verdict (as in `verdict.json`) and the last screen; the rest is ignored.
 
         Raises:
             RecordingError: The file is not whole.
@@ -187,8 +188,7 @@ class RerunSink:
         self._takers.clear()
         self._poses.rows.append((self._world.time_ns, *self._world.body_poses()))
         try:
-            self._writer.write(self._sources)
-            self._writer.wait()
+            self._send()
             if verdict is not None:
                 log_verdict(self._recording, verdict)
             self._stage.fit()
@@ -198,7 +198,6 @@ class RerunSink:
             with handed_over(blueprint):
                 self._recording.send_blueprint(blueprint)
         finally:
-            self._writer.close()
             end_recording(self._recording, self._path)
 
     def _taker(self, topic: str, msgtype: str) -> _Take | None:
@@ -220,13 +219,25 @@ class RerunSink:
         kept = {name: getattr(sample, name) for name in ("topic", "msgtype", "time_ns", "payload")}
         self._early.append(SimpleNamespace(**kept, message=deepcopy(sample.message)))
 
-    def _end_block(self) -> None:
-        """Make room for robots that left the stage, and see to it that all is in the file."""
-        from twin.recording.stream import flush
+    def _send(self) -> None:
+        """Send what waits, and make room for robots that left the stage."""
+        from twin.recording.columns import send
+        from twin.recording.stream import begin_flush
 
+        self._wait()
+        send(self._recording, (chunk for source in self._sources for chunk in source.take_chunks()))
         if self._stage.grow():
             self._set_stage()
-        flush(self._recording, self._path)
+        begin_flush(self._recording)
+        self._under_way = True
+
+    def _wait(self) -> None:
+        """Wait until what was sent is in the file."""
+        from twin.recording.stream import flush
+
+        if self._under_way:
+            self._under_way = False
+            flush(self._recording, self._path)
 
     def _set_stage(self) -> None:
         """Log what depends on how much floor there is to see; it takes the place of what was."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +25,6 @@ FLUSH_TIMEOUT_S = 60
 """Longest wait for a disk that is slow."""
 _abandoned: list[Any] = []
 """Streams whose writer has ended."""
-_FOOTER = b"RRF2FOOT"
-"""Begins the last twelve bytes of a file that was closed."""
 
 
 def open_recording(
@@ -36,6 +33,7 @@ def open_recording(
     """Return a stream into a new file.
 
     Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
+    It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
 
     Raises:
         RecordingError: The file cannot be written.
@@ -57,7 +55,7 @@ def open_recording(
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
     with handed_over(blueprint):
-        recording.save(path, default_blueprint=blueprint)
+        recording.save(path, default_blueprint=blueprint, write_footer=False)
     return recording
 
 
@@ -84,6 +82,12 @@ def end_threads() -> None:
     """End the threads of recordings that nobody holds any more."""
     for _ in range(2):  # the first look finds what the second ends
         rerun_bindings.flush_and_cleanup_orphaned_recordings()
+
+
+def begin_flush(recording: rr.RecordingStream) -> None:
+    """Have everything so far written, meanwhile; what goes wrong is told by the next `flush`."""
+    with suppress(RuntimeError):
+        recording.flush(timeout_sec=0.0)
 
 
 def flush(recording: rr.RecordingStream, path: Path) -> None:
@@ -117,7 +121,7 @@ def _has_room(folder: Path) -> bool:
 
 
 def end_recording(recording: rr.RecordingStream, path: Path) -> None:
-    """Write the footer and close the file.
+    """See that all is in the file, and close it.
 
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
 
@@ -126,10 +130,6 @@ def end_recording(recording: rr.RecordingStream, path: Path) -> None:
     """
     flush(recording, path)
     recording.disconnect()
-    with path.open("rb") as file:
-        file.seek(-min(len(_FOOTER) + 4, path.stat().st_size), os.SEEK_END)
-        if not file.read().startswith(_FOOTER):
-            raise _not_whole(path)
 
 
 @contextmanager

@@ -22,12 +22,11 @@ from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.sensors import SENSORS
 from twin.models.shapes import Box
-from twin.nodes.missions.mission_node import MissionNode
 from twin.runtime.defaults.drives import with_drive
 from twin.runtime.events.obstacles import hidden_pose, standing_pose
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished_scans
 from twin.runtime.stacks.context import StackContext
-from twin.runtime.stacks.missions import IdleMission, build_mission
+from twin.runtime.stacks.missions import AnyMission, build_missions
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
 from twin.savings import ALL, Savings
@@ -67,7 +66,7 @@ class Parts:
     bus: Bus
     clock: Clock
     stacks: Mapping[str, RobotStack]
-    mission: MissionNode | IdleMission
+    mission: AnyMission
     checks: CheckContext
     control_period_ns: int
 
@@ -105,7 +104,7 @@ def build(
     placements, heights, ratios = [], {}, {}
     for robot in scenario.robots:
         described = load(robot.model, replace(reading, args=robot.args))
-        description = with_drive(described, robot, scenario.mission)
+        description = with_drive(described, robot, scenario.tasks)
         conversion = convert(description, base=robot.base, timestep=timestep)
         heights[robot.id] = conversion.spawn_height
         ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)
@@ -118,7 +117,7 @@ def build(
             )
         )
     scene = _scene(scenario, _as_it_is(scenario, arena))
-    maps = {robot.id: _map(robot, arena) for robot in scenario.robots}
+    maps = _maps(scenario.robots, arena)
     world = World.compose(
         scene,
         placements,
@@ -144,7 +143,7 @@ def build(
                     config=robot,
                     handle=world.robots[robot.id],
                     start=starts[robot.id],
-                    map=maps[robot.id],
+                    map=maps.get(robot.id),
                     seed=scenario.seed,
                     control_period_ns=control_period_ns,
                     spawn_height=heights[robot.id],
@@ -154,8 +153,8 @@ def build(
             )
             for robot in scenario.robots
         }
-        mission = build_mission(scenario.mission, stacks, arena)
-        bus.node_options = None
+        mission = build_missions(scenario.tasks, stacks, arena)
+        bus.node_options, bus.group = None, ""
         for place in outside.nodes:
             create_nodes(bus, place)
         warn_of_unpublished_scans(bus)
@@ -197,9 +196,10 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
     if arena is None:
         return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed)
-    tasks = scenario.mission.tasks if isinstance(scenario.mission, PickAndPlace) else ()
+    carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
+    totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
-    scene = arena.scene({*given, *(task.tote for task in tasks)}, seed=scenario.seed, obstacles=statics)
+    scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
     return replace(scene, goods=(*goods, *movable), placed=placed)
 
@@ -215,21 +215,30 @@ def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
     return kind(name=name, T_world_body=pose, shapes=shapes, friction=friction)
 
 
-def _map(robot: RobotConfig, arena: Arena | None) -> OccupancyMap | None:
-    """Return the map a robot localises on, or None.
+def _maps(robots: Sequence[RobotConfig], arena: Arena | None) -> dict[str, OccupancyMap]:
+    """Return the maps on which robots localise; those that are given the same one share it."""
+    named = {
+        robot.id: robot.localisation.map
+        for robot in robots
+        if isinstance(robot.localisation, AmclLocalisation)
+    }
+    read = {name: _map(name, arena) for name in dict.fromkeys(named.values())}
+    return {robot: read[name] for robot, name in named.items()}
+
+
+def _map(name: str | None, arena: Arena | None) -> OccupancyMap:
+    """Return a map by its name or path, or that of the arena.
 
     Raises:
         MapError: It cannot be read, or does not cover the arena.
     """
-    if not isinstance(robot.localisation, AmclLocalisation):
-        return None
     from twin.navigation.maps.occupancy_map import OccupancyMap
     from twin.warehouse.map_files import map_of_arena, named_map
 
-    if robot.localisation.map is None:
+    if name is None:
         assert arena is not None  # as the scenario's checks say
         return map_of_arena(arena)
-    path = named_map(robot.localisation.map)
+    path = named_map(name)
     grid = OccupancyMap.load(path)
     if arena is not None:
         height, width = grid.data.shape

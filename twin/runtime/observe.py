@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twin.geometry import Pose3
-from twin.nodes.missions.mission_node import MissionNode
 from twin.runtime.defaults.from_description import GRASP_FRAME
 from twin.runtime.payload import Payload
-from twin.runtime.stacks.missions import IdleMission
+from twin.runtime.stacks.missions import AnyMission
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.observation import ContactObservation, Held, Observation, RobotObservation
 from twin.sim.contacts import Contact
@@ -29,7 +28,7 @@ class Observer:
         self,
         world: World,
         stacks: Sequence[RobotStack],
-        mission: MissionNode | IdleMission,
+        mission: AnyMission,
         goods: Sequence[str],
     ) -> None:
         self._world = world

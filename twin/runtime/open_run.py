@@ -69,6 +69,7 @@ class OpenRun:
         bag: Path | None = None,
         bag_hidden_topics: bool = False,
         save_model: Path | None = None,
+        workers: int = 0,
         savings: Savings = ALL,
     ) -> None:
         """Build everything, up to the first tick.
@@ -87,6 +88,7 @@ class OpenRun:
             bag: Folder for a bag of every message.
             bag_hidden_topics: Whether topics of actions are in the bag too.
             save_model: Folder for the compiled world as MJCF.
+            workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
 
         Raises:
@@ -128,6 +130,8 @@ class OpenRun:
             self.run = Run(scenario, parts, self._sink, outside)
             if self.run.lockstep is not None:
                 ending.callback(self.run.lockstep.close)
+            if workers:
+                ending.callback(self.run.hire(workers).close)
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
@@ -159,17 +163,16 @@ class OpenRun:
                 run.tick()
                 if until is not None and until():
                     return True
-                simulated = run.world.time_ns * 1e-9
                 if self._pace is not None:
-                    self._pace.keep(simulated)
-                now = time.perf_counter()
-                if progress is not None and now - shown > _SHOWN_S:
-                    shown = now
+                    self._pace.keep(run.world.time_ns * 1e-9)
+                if progress is not None and time.perf_counter() - shown > _SHOWN_S:
+                    shown = time.perf_counter()
+                    simulated = run.world.time_ns * 1e-9
                     progress(
                         Progress(
                             time_s=simulated,
                             duration_s=run.scenario.duration,
-                            real_time_factor=simulated / (now - began),
+                            real_time_factor=simulated / (shown - began),
                             mission_state=run.parts.mission.state,
                         )
                     )
@@ -229,7 +232,7 @@ class OpenRun:
             metrics={
                 "sim_time_s": simulated,
                 "wall_time_s": self._wall_s,
-                "cpu_time_s": self._cpu_s,
+                "cpu_time_s": self._cpu_s + (run.workers.cpu_s if run.workers else 0.0),
                 "real_time_factor": simulated / self._wall_s if self._wall_s else 0.0,
                 **({} if pace is None else {"pace_losses": float(pace.losses), "pace_lost_s": pace.lost_s}),
                 "recoveries": float(sum(navigator.recoveries for navigator in navigators)),
@@ -256,6 +259,7 @@ def run(
     bag: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     watch: Callable[[Run], bool] | None = None,
+    workers: int = 0,
     savings: Savings = ALL,
 ) -> Verdict:
     """Run a scenario to its verdict; see `OpenRun` and `OpenRun.advance_to_end`.
@@ -271,6 +275,7 @@ def run(
         listen=listen,
         outside=outside,
         bag=bag,
+        workers=workers,
         savings=savings,
     )
     try:

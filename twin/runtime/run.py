@@ -18,6 +18,7 @@ from twin.scenario.schema import Scenario
 if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
+    from twin.runtime.workers import Workers
 
 _OBSERVED_TICKS = 5
 """Checks see one observation in so many control ticks; the contacts of the others are in it."""
@@ -42,7 +43,7 @@ class Run:
         goods = [good.name for good in self.world.scene.goods]
         self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
         self._sink = sink
-        self._schedule = SensorSchedule(
+        self.schedule = SensorSchedule(
             [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
         )
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
@@ -54,10 +55,11 @@ class Run:
             from twin.runtime.outside import Lockstep
 
             self.lockstep = Lockstep(self.bus, outside)
+        self.workers: Workers | None = None
         self._obstacles = ObstacleSchedule(
             self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
         )
-        self._faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
+        self.faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
@@ -67,6 +69,17 @@ class Run:
     def over(self) -> bool:
         """Whether the time is up, or the mission has been over for a moment."""
         return self.world.time_ns >= self._end_ns
+
+    def hire(self, count: int) -> Workers:
+        """Let so many workers, at most, run the nodes of robots from now on; close them before the bus.
+
+        Raises:
+            ScenarioError: This run, or this system, cannot have any.
+        """
+        from twin.runtime.workers import Workers
+
+        self.workers = Workers(self, count)
+        return self.workers
 
     def tick(self) -> None:
         """Advance by one tick."""
@@ -82,7 +95,10 @@ class Run:
 
     def nodes(self) -> None:
         """2. Nodes run: inboxes, timers due, actions; in order of creation, then those waited for."""
-        self.bus.spin()
+        if self.workers is None:
+            self.bus.spin()
+        else:
+            self.workers.spin()
         if self.lockstep is not None:
             self.lockstep.step()
 
@@ -93,11 +109,11 @@ class Run:
         if self._obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
             self._obstacles.update(bases)
-        self._faults.update()
+        self.faults.update()
 
     def step(self) -> None:
         """4. Physics; a sensor due on the way samples and publishes there."""
-        world, schedule = self.world, self._schedule
+        world, schedule = self.world, self.schedule
         end = world.step_count + self._substeps
         while schedule.next_step < end:
             world.step(schedule.next_step - world.step_count)
@@ -108,13 +124,15 @@ class Run:
     def sense(self) -> None:
         """5. Sensors due publish, stamped with the new time."""
         self.parts.clock.now_ns = self.world.time_ns
-        self._schedule.fire(self.world.step_count)
+        self.schedule.fire(self.world.step_count)
 
     def clock(self) -> None:
         """6. `/clock`."""
         self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)), frozen=True)
 
     def _check(self) -> None:
+        if self.workers is not None:
+            self.workers.observe()
         observation = self._observer.observe()
         for check in self.checks:
             check.observe(observation)

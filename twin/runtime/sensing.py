@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.periods import Period, latest, next_due
@@ -25,6 +25,8 @@ class SensorSchedule:
         self._steps = [self._step_after(period, 0) for period in self._periods]
         self.next_step = min(self._steps, default=sys.maxsize)
         """The physics step at which a sensor fires next."""
+        self.prepare: Callable[[Sequence[SensorPublisher], int], None] | None = None
+        """Called with the sensors that are about to fire, and the time [ns]."""
         self._tell_lateness()
 
     def fire(self, step: int) -> None:
@@ -32,6 +34,8 @@ class SensorSchedule:
         if step < self.next_step:
             return
         time_ns = step * self._timestep_ns
+        if self.prepare is not None:
+            self.prepare([s for i, s in enumerate(self._sensors) if step >= self._steps[i]], time_ns)
         for i, sensor in enumerate(self._sensors):
             if step >= self._steps[i]:
                 sensor.publish(time_ns)

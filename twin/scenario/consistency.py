@@ -21,6 +21,7 @@ from twin.strict_yaml import Fault, Loc
 
 if TYPE_CHECKING:
     from twin.scenario.checks import CheckEntry
+    from twin.scenario.missions import Mission, Task
     from twin.scenario.robots import RobotConfig
     from twin.scenario.schema import Scenario
 
@@ -30,7 +31,7 @@ def faults(scenario: Scenario) -> Iterator[Fault]:
     yield from _names(scenario)
     yield from _periods(scenario)
     yield from _arena(scenario)
-    yield from _mission(scenario)
+    yield from _missions(scenario)
     yield from _faults(scenario)
     yield from _checks(scenario)
 
@@ -63,8 +64,9 @@ def _periods(scenario: Scenario) -> Iterator[Fault]:
     poses_hz = scenario.recording.poses_hz
     if scenario.recording.enabled:
         rates.append((("recording", "poses_hz"), "the rate of the recorded poses", poses_hz))
-    if isinstance(scenario.mission, R2D2StatePublisher):
-        rates.append((("mission", "rate"), "the rate of the publisher", scenario.mission.rate))
+    for at, mission in _tasks(scenario):
+        if isinstance(mission, R2D2StatePublisher):
+            rates.append(((*at, "rate"), "the rate of the publisher", mission.rate))
     for loc, what, rate in rates:
         if period_of(rate) < nanoseconds(control):
             most = f"at most {1.0 / control:.6g} Hz, one per control period ({control * 1e3:g} ms)"
@@ -91,8 +93,9 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
             yield Fault(("robots", i, "localisation"), f"amcl without a map {message}, or a map")
     for i, good in enumerate(scenario.world.goods):
         yield Fault(("world", "goods", i), f"the good '{good.name}' {message}")
-    if isinstance(scenario.mission, PickAndPlace):
-        yield Fault(("mission",), f"pick_and_place {message}")
+    for at, mission in _tasks(scenario):
+        if isinstance(mission, PickAndPlace):
+            yield Fault(at, f"pick_and_place {message}")
     for i, entry in enumerate(scenario.checks):
         if entry.kind == "delivered":
             yield Fault(("checks", i), f"delivered {message}")
@@ -101,12 +104,28 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
             yield Fault(("faults", i), f"displacement {message}")
 
 
-def _mission(scenario: Scenario) -> Iterator[Fault]:
-    mission = scenario.mission
-    if isinstance(mission, Idle):
-        return
+def _tasks(scenario: Scenario) -> Iterator[tuple[Loc, Mission]]:
+    """Yield each mission, and where it stands."""
+    for i, mission in enumerate(scenario.tasks):
+        yield ("missions", i) if scenario.missions else ("mission",), mission
+
+
+def _missions(scenario: Scenario) -> Iterator[Fault]:
+    if scenario.missions and not isinstance(scenario.mission, Idle):
+        yield Fault(("missions",), "give the robots either a mission or a list of missions, not both")
+    busy: set[str] = set()
+    for loc, mission in _tasks(scenario):
+        if isinstance(mission, Idle):
+            continue
+        yield from _mission(scenario, mission, loc)
+        if mission.robot in busy:
+            yield Fault(loc, f"robot '{mission.robot}' has a mission already; valid is one for each robot")
+        busy.add(mission.robot or "")
+
+
+def _mission(scenario: Scenario, mission: Task, loc: Loc) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
-    yield from _robot(mission.robot, robots, ("mission",), "the mission")
+    yield from _robot(mission.robot, robots, loc, "the mission")
     if mission.robot not in robots:
         return
     index = robots.index(mission.robot)
@@ -122,7 +141,7 @@ def _mission(scenario: Scenario) -> Iterator[Fault]:
     if isinstance(mission, RandomGoals) and not isinstance(robot.localisation, AmclLocalisation):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
     if isinstance(mission, Behaviors):
-        yield from _behaviors(mission, robot)
+        yield from _behaviors(mission, robot, loc)
 
 
 def _robot(name: str | None, robots: list[str], loc: Loc, what: str) -> Iterator[Fault]:
@@ -133,10 +152,10 @@ def _robot(name: str | None, robots: list[str], loc: Loc, what: str) -> Iterator
         yield Fault((*loc, "robot"), f"unknown robot '{name}'; {nearest(name, robots)}")
 
 
-def _behaviors(mission: Behaviors, robot: RobotConfig) -> Iterator[Fault]:
+def _behaviors(mission: Behaviors, robot: RobotConfig, loc: Loc) -> Iterator[Fault]:
     docks = robot.navigation.docking.docks if robot.navigation is not None else {}
     for i, step in enumerate(mission.steps):
-        at = ("mission", "steps", i)
+        at = (*loc, "steps", i)
         if robot.navigation is None and step.kind in ("navigate_to_pose", "dock_robot", "undock_robot"):
             yield Fault(at, f"{step.kind} needs a navigation of robot '{robot.id}'")
         elif step.dock_robot is not None and step.dock_robot.dock not in docks:
@@ -159,8 +178,9 @@ def _faults(scenario: Scenario) -> Iterator[Fault]:
 def _checks(scenario: Scenario) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
     by_name = {robot.id: robot for robot in scenario.robots}
-    mission = scenario.mission
-    totes = [task.tote for task in mission.tasks] if isinstance(mission, PickAndPlace) else []
+    carriers = [mission for mission in scenario.tasks if isinstance(mission, PickAndPlace)]
+    totes = [task.tote for mission in carriers for task in mission.tasks]
+    idle = all(isinstance(mission, Idle) for mission in scenario.tasks)
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
@@ -169,7 +189,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
         subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
         if subject is not None and "robot" in subjects:
             yield from _lacking(entry, subject, loc)
-        if isinstance(mission, Idle) and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
+        if idle and entry.kind in ("mission_succeeded", "mission_failed", "time_limit"):
             yield Fault(loc, f"{entry.kind} needs a mission that ends, not 'idle'")
         tote = subjects.get("tote")
         if entry.kind == "tote_slip" and tote is not None and tote not in totes:

@@ -264,10 +264,13 @@ class _OrAUsers:
         return UserMission.model_validate({**data, "type": used.reference}, strict=True)
 
 
-_Ships = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Idle
+_Tasks = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore
+_Ships = _Tasks | Idle
 _BY_NAME = {get_args(one.model_fields["type"].annotation)[0]: one for one in get_args(_Ships)}
 for _name in _BY_NAME:
     MISSIONS.register(_name, f"twin.runtime.stacks.missions:{_name}")
 
 
 Mission = Annotated[_Ships | UserMission, _OrAUsers()]
+Task = _Tasks | UserMission
+"""What a robot does."""

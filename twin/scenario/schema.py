@@ -43,7 +43,9 @@ class Scenario(StrictModel):
     robots: Annotated[tuple[RobotConfig, ...], Field(min_length=1)]
     """The robots."""
     mission: Mission = Idle(type="idle")
-    """What they are to do."""
+    """What one of them is to do."""
+    missions: tuple[Mission, ...] = ()
+    """What several of them are to do, one each, instead of `mission`; over when all are."""
     faults: tuple[FaultEntry, ...] = ()
     """What goes wrong, and when."""
     sensors: tuple[Annotated[str, reference(SENSORS)], ...] = ()
@@ -54,6 +56,11 @@ class Scenario(StrictModel):
     """What goes into the Rerun recording."""
 
     _parts_fit = faultless(consistency.faults)
+
+    @property
+    def tasks(self) -> tuple[Mission, ...]:
+        """The missions, however many there are."""
+        return self.missions or (self.mission,)
 
     def with_params_file(self, path: Path) -> Scenario:
         """Return the scenario with one Nav2 parameter file for every robot that navigates.

@@ -40,6 +40,10 @@ class HardwareConfig:
     """Of all other joints [rad/s] or [m/s]."""
 
 
+Orders = tuple[tuple[float, ...], tuple[tuple[str, float], ...]]
+"""Commands of all actuators, and limits of effort by joint."""
+
+
 class JointReading(NamedTuple):
     """Measured joints in the order of `Hardware.joint_names`, each of shape (n,) and read-only."""
 
@@ -134,6 +138,8 @@ class Hardware:
         )
         limited = model.actuator_forcelimited[self._actuators].astype(bool)
         self._strongest = np.where(limited, model.actuator_forcerange[self._actuators, 1], math.inf)
+        self._limits: dict[str, float] = {}
+        """Of effort, by joint, as far as they were set."""
         self._ratios = [drive_ratio(description, name) for name in names]
         self.refused = 0
         """Commands ignored because they were not finite."""
@@ -190,10 +196,24 @@ class Hardware:
             SimulationError: No actuator moves this joint.
         """
         index = self._drive(joint)
+        self._limits[joint] = effort
         strongest = min(effort * self._ratios[index], self._strongest[index])
         actuator = self._actuators[index]
         self._model.actuator_forcelimited[actuator] = math.isfinite(strongest)
         self._model.actuator_forcerange[actuator] = -strongest, strongest
+
+    @property
+    def orders(self) -> Orders:
+        """What was commanded, for the `obey` of the same robot in another process."""
+        return tuple(self._commands), tuple(self._limits.items())
+
+    def obey(self, orders: Orders) -> None:
+        """Take what was commanded in another process."""
+        commands, limits = orders
+        self._commands[:] = commands
+        for joint, effort in limits:
+            if self._limits.get(joint) != effort:
+                self.limit_effort(joint, effort)
 
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""

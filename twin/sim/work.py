@@ -25,9 +25,9 @@ class WorkMeter:
         on_joints = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
         joints = sorted(set(model.actuator_trnid[on_joints, 0].tolist()))
         owners = [model.joint(joint).name.partition("/")[0] for joint in joints]
-        self._dofs = model.jnt_dofadr[joints]
-        self._of = {robot: np.array([owner == robot for owner in owners], dtype=bool) for robot in robots}
-        self._work = np.zeros(len(joints))
+        dofs = model.jnt_dofadr[joints]
+        self._of = {robot: dofs[[owner == robot for owner in owners]] for robot in robots}
+        self._work = np.zeros(model.nv)
         # Force and velocity before physics steps, then after each: as bytes an array is copied for least.
         self._noted: list[bytes] = []
         self._steps, self._arrays = 0, 2
@@ -50,9 +50,8 @@ class WorkMeter:
         whole = len(self._noted) - len(self._noted) % self._arrays  # without a call that was interrupted
         states = np.frombuffer(b"".join(self._noted[:whole]))
         states = states.reshape(whole // self._arrays, self._steps + 1, 2, len(self._force))
-        driven = states[..., self._dofs]  # shape (calls, states, 2, joints)
-        velocities = driven[:, :, 1]
-        powers = driven[:, 1:, 0] * (velocities[:, :-1] + velocities[:, 1:])
+        velocities = states[:, :, 1]  # shape (calls, states, nv)
+        powers = states[:, 1:, 0] * (velocities[:, :-1] + velocities[:, 1:])
         np.maximum(powers, 0.0, out=powers)
         for work in self._half_step * np.add.reduce(powers, axis=1):
             self._work += work

@@ -20,8 +20,8 @@ from twin.strict_yaml.document import Loc as Loc
 from twin.strict_yaml.document import apply_override, read
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults
-from twin.strict_yaml.validate import findings as findings
-from twin.strict_yaml.validate import validate
+from twin.strict_yaml.explain import findings as findings
+from twin.strict_yaml.explain import validate
 
 M = TypeVar("M", bound=BaseModel)
 

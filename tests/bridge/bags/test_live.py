@@ -20,11 +20,11 @@ from twin.bridge.cdr.codec import codec
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import Clock, LaserScan, String, TFMessage, Twist, new, ns, stamp
 from twin.bridge.node.options import BARE
+from twin.bridge.node.services import GetTypeDescription
 from twin.bridge.qos import LATCHED, SENSOR_DATA, QoS
 from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.bridge.types import ServiceType
 from twin.bridge.types.description import describe
-from twin.bridge.types.description_service import GetTypeDescription
 from twin.errors import RecordingError
 
 Both = tuple[LiveBus, LiveBus]

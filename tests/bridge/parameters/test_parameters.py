@@ -11,6 +11,7 @@ from twin.bridge.clock import Clock
 from twin.bridge.msgs import ParameterDescriptor, ParameterEvent, SetParametersResult
 from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
+from twin.bridge.node.services import GetTypeDescription
 from twin.bridge.parameters.errors import (
     InvalidParameterValueException,
     ParameterImmutableException,
@@ -27,7 +28,6 @@ from twin.bridge.srvs import (
     SetParametersAtomically,
 )
 from twin.bridge.types.default_values import new
-from twin.bridge.types.description_service import GetTypeDescription
 from twin.errors import BridgeError
 
 IntegerRange = types.get("rcl_interfaces/msg/IntegerRange")

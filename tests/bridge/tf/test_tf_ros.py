@@ -28,10 +28,10 @@ from twin.bridge.tf import (
 )
 from twin.bridge.tf.report import frame_infos, graphviz, svg, text_tree
 from twin.bridge.tf.rigid import Rigid
-from twin.bridge.tf.throttle import ThrottleConfig, TransformThrottle
 from twin.bridge.tf.walk import solve
 from twin.errors import BridgeError
 from twin.geometry import Pose3
+from twin.nodes.tf_throttle import ThrottleConfig, TransformThrottle
 
 S = 1_000_000_000
 identity = Pose3.from_xyz_rpy()

@@ -31,8 +31,7 @@ from twin.bridge.msgs import (
     new,
 )
 from twin.bridge.tf import ExtrapolationError, TransformBuffer
-from twin.bridge.tf.laser import project_laser
-from twin.bridge.tf.transforms import QuaternionStamped, _coordinates, do_transform
+from twin.bridge.tf.transforms import QuaternionStamped, _coordinates, do_transform, project_laser
 from twin.errors import BridgeError
 from twin.geometry import Pose3
 

@@ -19,9 +19,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import String
-from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.router import router_session, run_router
-from twin.bridge.wire.session import SessionConfig, open_session
+from twin.bridge.wire.session import SessionConfig, open_session, session_to_join
 from twin.errors import BridgeError
 
 ROOT = Path(__file__).parents[3]

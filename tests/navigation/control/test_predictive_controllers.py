@@ -24,7 +24,7 @@ from twin.navigation.control.mppi.config import (
     VelocityDeadbandCriticConfig,
 )
 from twin.navigation.control.mppi.controller import MPPI
-from twin.navigation.control.mppi.sent_commands import SentCommands
+from twin.navigation.control.mppi.controls import SentCommands
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
 from twin.navigation.control.regulated_pure_pursuit.controller import RegulatedPurePursuit
 from twin.navigation.control.rotation_shim_config import RotationShimConfig

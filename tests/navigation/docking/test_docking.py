@@ -8,10 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.geometry import Pose2
+from twin.geometry import Pose2, wrap_angles
 from twin.navigation.docking.config import DockEstimateConfig, LineApproachConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
-from twin.navigation.docking.faces import BoxFace, BoxFaces, BoxFacesConfig, find_box_faces, fit_wall
+from twin.navigation.docking.faces import (
+    BoxFace,
+    BoxFaces,
+    BoxFacesConfig,
+    _best_line,
+    find_box_faces,
+    fit_wall,
+)
 from twin.navigation.docking.line_approach import MISSED, LineApproach
 from twin.navigation.recovery import TIMEOUT
 
@@ -334,3 +341,23 @@ def test_the_face_is_the_median_of_its_sights(sights: int) -> None:
         wall = np.column_stack([np.full(60, 2.0 + offset), np.linspace(-0.6, 0.6, 60)])
         assert estimate.take_scan(wall, Pose2(0.0, 0.0, 0.0))
     assert estimate.face.x == pytest.approx(2.0 + np.median(offsets), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_line_that_most_points_lie_on_is_the_cheapest_of_all_pairs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    wall = np.column_stack([1.0 + rng.normal(scale=0.005, size=25), np.linspace(-0.4, 0.4, 25)])
+    points = np.concatenate([wall, rng.uniform((0.5, -1.0), (2.0, 1.0), size=(12, 2))])
+    facing, max_yaw = 0.3, 0.6
+    i, j = np.triu_indices(len(points), k=1)
+    along = points[j] - points[i]
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    offsets = (normals * points[i]).sum(axis=1)
+    normals, offsets = normals * np.where(offsets < 0.0, -1.0, 1.0)[:, None], np.abs(offsets)
+    costs = np.minimum((normals @ points.T - offsets[:, None]) ** 2, 0.02**2).sum(axis=1)
+    turned = wrap_angles(np.arctan2(normals[:, 1], normals[:, 0]) - facing)
+    costs[(np.hypot(*along.T) <= 0.04) | (np.abs(turned) > max_yaw)] = math.inf
+    best = int(np.argmin(costs))
+    normal, offset = _best_line(points, facing, max_yaw) or (None, None)
+    assert normal == pytest.approx(normals[best])
+    assert offset == pytest.approx(offsets[best])

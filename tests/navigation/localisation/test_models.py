@@ -11,9 +11,8 @@ import pytest
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.localisation.amcl import Amcl
 from twin.navigation.localisation.amcl_config import AmclConfig
-from twin.navigation.localisation.beam_model import BeamModel
 from twin.navigation.localisation.hit_calibration import HitCalibration
-from twin.navigation.localisation.laser_models import without_strangers
+from twin.navigation.localisation.laser_models import BeamModel, without_strangers
 from twin.navigation.localisation.laser_scan import Beams, chosen_beams
 from twin.navigation.localisation.likelihood_field import LikelihoodField
 from twin.navigation.localisation.motion_models import sample_omni_motion

@@ -11,9 +11,9 @@ from twin.bridge import types
 from twin.bridge.bags import definitions
 from twin.bridge.graph import EndpointInfo
 from twin.bridge.node import Node
+from twin.bridge.node.services import GetTypeDescription
 from twin.bridge.services import Client, Future
 from twin.bridge.types import description as type_description
-from twin.bridge.types.description_service import GetTypeDescription
 from twin.errors import BridgeError
 
 _PATIENCE_S = 0.4

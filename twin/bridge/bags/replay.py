@@ -40,7 +40,7 @@ class Replayed:
 
     @property
     def difference(self) -> str | None:
-        """The first difference, of topics, times, if the bag tells turns, and bytes: a clause, or None."""
+        """The first difference as a clause: topics, times, order if a bag tells turns, bytes; None: none."""
         again, before = _plain(self.published), _plain(self.recorded)
         if not self.in_turns:
             again, before = _by_topic(again), _by_topic(before)

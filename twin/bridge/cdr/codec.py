@@ -24,6 +24,10 @@ class Codec(Generic[M]):
 
     def __init__(self, msg_type: type[M] | str) -> None:
         self._given = msg_type
+        # Attributes that the first message replaces: a `cached_property` takes longer to look up.
+        self.is_exact: Callable[[Any], bool] = self._first_is_exact
+        """Tells whether a message is what would be decoded from its bytes; see `exactness`."""
+        self._encode: Callable[[Any], bytes] = self._first_encode
         self.msgtype: str = msg_type if isinstance(msg_type, str) else msg_type.__msgtype__  # type: ignore[attr-defined]
         """package/msg/Name."""
 
@@ -32,15 +36,6 @@ class Codec(Generic[M]):
         """The messages' class."""
         return types.get(self._given) if isinstance(self._given, str) else self._given
 
-    @cached_property
-    def is_exact(self) -> Callable[[Any], bool]:
-        """Tells whether a message is what would be decoded from its bytes; see `exactness`."""
-        return exactness(self.msgtype)
-
-    @cached_property
-    def _encoder(self) -> Callable[[Any], bytes]:
-        return encoder(self.msgtype)
-
     def encode(self, message: M) -> bytes:
         """Return a message as CDR; what can be repaired, such as a list of numbers, is.
 
@@ -48,9 +43,17 @@ class Codec(Generic[M]):
             BridgeError: a field has a value that it cannot hold; names the field.
         """
         try:
-            return self._encoder(message)
+            return self._encode(message)
         except Exception:
-            return self._encoder(checked(message))
+            return self._encode(checked(message))
+
+    def _first_is_exact(self, message: Any) -> bool:
+        self.is_exact = exactness(self.msgtype)
+        return self.is_exact(message)
+
+    def _first_encode(self, message: Any) -> bytes:
+        self._encode = encoder(self.msgtype)
+        return self._encode(message)
 
     def read(self, payload: bytes) -> tuple[M, int]:
         """Return the message that a payload begins with, and where it ends.

@@ -113,8 +113,11 @@ class _Encoder(Maker):
     def _array(self, field: Field, value: str) -> str:
         many, dtype = self._variable(value), types.dtype_of(field.base)
         self._count(field, f"{many}.size")
-        # Those of bytes may be signed or not.
-        raw = self._variable(f"raw({many}, {self._new(dtype) if field.base != 'byte' else None})")
+        if field.base == "byte":  # signed or not
+            raw = self._variable(f"raw({many}, None)")
+        else:
+            known = self._new(dtype)
+            raw = self._variable(f"{many}.tobytes() if {many}.dtype is {known} else raw({many}, {known})")
         self._bytes(raw, dtype.itemsize, f"len({raw})")
         return ""
 

@@ -14,12 +14,11 @@ import zenoh
 
 from twin.bridge import types
 from twin.bridge.bus import Bus
-from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.graph import EndpointInfo, NodeInfo, alive, parse_token
 from twin.bridge.lockstep.protocol import Entry, Questions, ask, carried, entry
 from twin.bridge.qos import QoS
 from twin.bridge.services.questions import ZenohQuestion
-from twin.bridge.topics import Sample, declare_publisher, declare_subscriber
+from twin.bridge.topics import ReceivedSample, declare_publisher, declare_subscriber
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import NodeToken, gid, parse_attachment, topic_key
 from twin.bridge.wire.session import direct
@@ -45,33 +44,6 @@ class MirroredPublisher:
     msgtype: str
     qos: QoS
     gid: bytes
-
-
-class MirroredSample(Sample[Any]):
-    """A message that a node of another process published; decoded when first looked at."""
-
-    __slots__ = ("_decoded",)
-
-    def __init__(self, publisher: MirroredPublisher, sequence: int, time_ns: int, payload: bytes) -> None:
-        self.publisher: Any = publisher
-        self.sequence = sequence
-        self.topic = publisher.name
-        self.msgtype = publisher.msgtype
-        self.time_ns = time_ns
-        self._payload = payload
-        self._decoded: Any = None
-
-    @property
-    def message(self) -> Any:
-        """The message.
-
-        Raises:
-            BridgeError: this process does not know its type.
-        """
-        if self._decoded is None:
-            decoder: Codec[Any] = codec(types.get(self.msgtype))
-            self._decoded = decoder.decode(self._payload or b"")
-        return self._decoded
 
 
 def mirrored_publisher(bus: Bus, info: EndpointInfo) -> MirroredPublisher:
@@ -156,7 +128,7 @@ class Mirror:
         source = parse_attachment(attachment)
         sequence = source.sequence if source else 0
         if self._bus.taps:
-            sample = MirroredSample(mirrored, sequence, self._bus.clock.now_ns, payload)
+            sample = ReceivedSample(mirrored, sequence, self._bus.clock.now_ns, payload)
             for tap in self._bus.taps:
                 tap(sample)
         publisher.put(payload, attachment=attachment)

@@ -33,9 +33,8 @@ from twin.bridge.lockstep.protocol import (
 )
 from twin.bridge.msgs import ns
 from twin.bridge.node.services import StandardServices
-from twin.bridge.wire.joining import session_to_join
 from twin.bridge.wire.keys import gid, pack_attachment, parse_attachment
-from twin.bridge.wire.session import direct, open_session
+from twin.bridge.wire.session import direct, open_session, session_to_join
 from twin.errors import BridgeError
 
 

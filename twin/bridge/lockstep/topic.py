@@ -12,10 +12,10 @@ import zenoh
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.graph import EndpointInfo, Graph, NodeInfo
-from twin.bridge.lockstep.mirror import MirroredSample, mirrored_publisher
+from twin.bridge.lockstep.mirror import mirrored_publisher
 from twin.bridge.lockstep.protocol import carried
 from twin.bridge.lockstep.stepper import patience
-from twin.bridge.topics import Sample
+from twin.bridge.topics import ReceivedSample, Sample
 from twin.bridge.wire.keys import parse_attachment
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
@@ -106,14 +106,14 @@ class AnswerTopic:
         for entity in (self._subscriber, self._publisher, self._probe):
             entity.undeclare()
 
-    def _sample(self, payload: bytes, attachment: bytes) -> MirroredSample:
+    def _sample(self, payload: bytes, attachment: bytes) -> ReceivedSample:
         source = parse_attachment(attachment)
         assert source is not None
         known = [e for e in self._graph.publishers(self.config.topic) if e.gid == source.gid]
         # Who declares no tokens is told as a nameless node.
         info = known[0] if known else replace(self._listener, node=_NAMELESS, gid=source.gid)
         mirrored = mirrored_publisher(self._bus, info)
-        return MirroredSample(mirrored, source.sequence, self._bus.clock.now_ns, payload)
+        return ReceivedSample(mirrored, source.sequence, self._bus.clock.now_ns, payload)
 
     def _late(self, tick: int) -> str:
         config = self.config

@@ -62,7 +62,10 @@ class Node(NodeParameters, NodeGraph):
         self.due_ns = 0
         """When `spin` has something to do, whether or not something arrives [ns]; 0: the next time."""
         self.is_destroyed = self._closing = False
-        self.token = NodeToken(bus.domain_id, bus.session_id, bus.next_id(), self.namespace, self.name)
+        self.number = bus.next_id()
+        """Larger than those of nodes and endpoints that were created before it."""
+        self.group: str = bus.group if bus.running is None else bus.running.group
+        self.token = NodeToken(bus.domain_id, bus.session_id, self.number, self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
         self._liveliness: Any = bus.wire.declare_token(str(self.token))
         self.action_clients = 0

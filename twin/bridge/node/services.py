@@ -6,18 +6,28 @@ network they are declared when the first client of one of them is made; on a net
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from twin.bridge.parameters import services as parameter_services
+import numpy as np
+
+from twin.bridge import srvs, types
+from twin.bridge.msgs import SetParametersResult
+from twin.bridge.parameters.errors import ParameterException
+from twin.bridge.parameters.parameters import Parameters
+from twin.bridge.parameters.values import Parameter
 from twin.bridge.types import ServiceType
-from twin.bridge.types import description_service as type_description_service
+from twin.bridge.types.default_values import new
+from twin.errors import BridgeError
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
 
+GetTypeDescription = ServiceType("type_description_interfaces/srv/GetTypeDescription")
 Offered = dict[str, tuple[ServiceType, Callable[[Any], Any]]]
+"""Name below the node -> type and callback."""
 
+_NOT_IN_USE = "Type not currently in use by this node"  # rcl's words, in node.c
 _NAMES = {
     "describe_parameters",
     "get_parameter_types",
@@ -64,10 +74,79 @@ def offer(node: Node) -> None:
         node.get_logger().advertise()
     if node.options.start_parameter_services:
         node.advertise_parameter_events()
-        offered |= parameter_services.offered(node)
+        offered |= _of_parameters(node)
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered
     if node.get_parameter("start_type_description_service").value:
-        offered |= type_description_service.offered()
+        offered["get_type_description"] = (GetTypeDescription, _described)
     for name, (srv_type, callback) in offered.items():
         node.create_service(srv_type, f"~/{name}", callback)
+
+
+def _of_parameters(node: Parameters) -> Offered:
+    """Return the six services through which others see and change parameters; answers as rclpy's.
+
+    Where one name of a request is not declared, the whole answer is empty.
+    """
+
+    def describe(request: Any) -> Any:
+        return srvs.DescribeParameters.Response(_all_or_none(node.describe_parameter, request.names))
+
+    def get(request: Any) -> Any:
+        found = _all_or_none(node.get_parameter, request.names)
+        return srvs.GetParameters.Response([parameter.get_parameter_value() for parameter in found])
+
+    def types(request: Any) -> Any:
+        found = _all_or_none(node.get_parameter_type, request.names)
+        return srvs.GetParameterTypes.Response(np.array([kind.value for kind in found], np.uint8))
+
+    def listed(request: Any) -> Any:
+        return srvs.ListParameters.Response(node.list_parameters(request.prefixes, int(request.depth)))
+
+    def change(request: Any) -> Any:
+        return srvs.SetParameters.Response([_changed(node, [message]) for message in request.parameters])
+
+    def change_atomically(request: Any) -> Any:
+        return srvs.SetParametersAtomically.Response(_changed(node, request.parameters))
+
+    return {
+        "describe_parameters": (srvs.DescribeParameters, describe),
+        "get_parameter_types": (srvs.GetParameterTypes, types),
+        "get_parameters": (srvs.GetParameters, get),
+        "list_parameters": (srvs.ListParameters, listed),
+        "set_parameters": (srvs.SetParameters, change),
+        "set_parameters_atomically": (srvs.SetParametersAtomically, change_atomically),
+    }
+
+
+def _changed(node: Parameters, messages: Sequence[Any]) -> SetParametersResult:
+    try:
+        return node.set_parameters_atomically([Parameter.from_parameter_msg(m) for m in messages])
+    except BridgeError as error:
+        return SetParametersResult(
+            False, error.reason if isinstance(error, ParameterException) else str(error)
+        )
+
+
+def _all_or_none(read: Callable[[str], Any], names: Sequence[str]) -> list[Any]:
+    try:
+        return [read(name) for name in names]
+    except ParameterException:
+        return []
+
+
+def _described(request: Any) -> Any:
+    """Answer what a type is, for who knows only its name and hash (REP-2016)."""
+    from twin.bridge.types import description as type_description
+
+    response = GetTypeDescription.Response
+    if request.type_hash and not request.type_hash.startswith("RIHS01_"):
+        return new(response, failure_reason="Failed to parse type hash")
+    try:
+        if request.type_hash and types.rihs01(request.type_name) != request.type_hash:
+            return new(response, failure_reason=_NOT_IN_USE)
+        description = type_description.describe(request.type_name)
+        sources = type_description.sources(request.type_name) if request.include_type_sources else []
+    except BridgeError as error:
+        return new(response, failure_reason=f"{_NOT_IN_USE}: {error}")
+    return new(response, successful=True, type_description=description, type_sources=sources)

@@ -180,7 +180,7 @@ class Client(Endpoint):
 
         def deliver(data: Any) -> None:
             if bus.in_own_thread():
-                self.enqueue(data, False)
+                bus.deliver(self, data)
             else:
                 bus.external.push(Arrival(source, self, data))
 
@@ -201,7 +201,7 @@ class Client(Endpoint):
 
         payload = self._requests.encode(request)
         if self._short and self._services.is_direct and bus.in_own_thread():
-            InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers)
+            InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers, bus.deliver)
         else:
             self._querier.get(
                 direct(on_reply, on_end),

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import zenoh
 
-from twin.bridge.wire.external import Receiver
+from twin.bridge.topics.in_process import Member
 from twin.bridge.wire.keys import Attachment, pack_attachment
 from twin.bridge.wire.naming import parse_key
+
+
+class Question(Protocol):
+    """A request as a service sees it."""
+
+    @property
+    def payload(self) -> bytes:
+        """The request as CDR."""
+
+    def reply(self, payload: bytes, now_ns: int) -> None:
+        """Answer at a time [ns] with a response as CDR."""
+
+    def drop(self) -> None:
+        """Answer never."""
 
 
 class ZenohQuestion:
@@ -47,11 +62,11 @@ class InProcessQuestion:
         self._on_response, self._on_end = on_response, on_end
         self._open = 1
 
-    def ask(self, services: Sequence[Receiver]) -> None:
-        """Put it into the inboxes of all services of the name: mostly one."""
+    def ask(self, services: Sequence[Member], deliver: Callable[[Member, Any], None]) -> None:
+        """Put it into the inboxes of all services of the name, mostly one, by a bus's `deliver`."""
         self._open += len(services)
         for service in services:
-            service.enqueue(self, False)
+            deliver(service, self)
         self.drop()
 
     def reply(self, payload: bytes, _now_ns: int) -> None:
@@ -64,6 +79,3 @@ class InProcessQuestion:
         self._open -= 1
         if not self._open:
             self._on_end()
-
-
-Question = ZenohQuestion | InProcessQuestion

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.conversions import transform_from_pose2, transform_from_pose3
@@ -145,10 +146,19 @@ class Broadcaster:
 
     def __str__(self) -> str:
         if self._name is None:
-            endpoints = Graph.snapshot(self._bus).endpoints
-            names = (endpoint.node.full_name for endpoint in endpoints if endpoint.gid == self._gid)
-            self._name = next(names, UNKNOWN_AUTHORITY)
+            self._name = next(chain(self._here(), self._anywhere()), UNKNOWN_AUTHORITY)
         return self._name
+
+    def _here(self) -> Iterator[str]:
+        """Yield the name of a node of this process; asking the graph takes as long as there are endpoints."""
+        for node in self._bus.nodes:
+            if any(getattr(endpoint, "gid", None) == self._gid for endpoint in node.endpoints):
+                yield node.fully_qualified_name
+
+    def _anywhere(self) -> Iterator[str]:
+        for endpoint in Graph.snapshot(self._bus).endpoints:
+            if endpoint.gid == self._gid:
+                yield endpoint.node.full_name
 
 
 def _as_list(transforms: TransformStamped | Iterable[TransformStamped]) -> list[TransformStamped]:

@@ -8,10 +8,9 @@ from twin.bridge.msgs import LaserScan, Quaternion, Time, Transform, TransformSt
 from twin.bridge.services import Future
 from twin.bridge.tf.core import BufferCore
 from twin.bridge.tf.errors import TransformError, TransformTimeoutError, seconds
-from twin.bridge.tf.laser import transform_laser_scan
 from twin.bridge.tf.report import frame_infos, frames_as_string, frames_as_yaml
 from twin.bridge.tf.rigid import Rigid
-from twin.bridge.tf.transforms import do_transform
+from twin.bridge.tf.transforms import do_transform, transform_laser_scan
 from twin.errors import BridgeError
 
 M = TypeVar("M")

@@ -13,6 +13,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.topics.sample import ReceivedSample as ReceivedSample
 from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
@@ -58,6 +59,7 @@ class Endpoint:
         self.name: str = name
         """Absolute name of the topic or service."""
         self.node = node
+        self.group: str = node.group
         self.qos = qos
         self.key = bus.naming.key(self.interface)
         self.gid = gid(token)
@@ -68,6 +70,8 @@ class Endpoint:
         """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
         if self._token is not None:
             self._declared.append(self.node.bus.wire.declare_token(self._token))
+        if self.node.bus.announced is not None:
+            self.node.bus.announced(self)
 
     def destroy(self) -> None:
         """Leave the graph; nothing arrives any more. Harmless when repeated."""
@@ -85,6 +89,7 @@ class Publisher(Endpoint, Generic[M]):
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
         self.msgtype = self.codec.msgtype
+        self._cls: type[M] | None = None
         self._sequence = 0
         self._latched = qos.durability == "transient_local"
         self._zenoh: Any = declare_publisher(node.bus.wire, self.key, qos)
@@ -116,7 +121,9 @@ class Publisher(Endpoint, Generic[M]):
             TypeError: a message of another type.
             BridgeError: the publisher is destroyed.
         """
-        if type(message) is not self.codec.cls:
+        if type(message) is not self._cls:
+            self._cls = self.codec.cls  # made for the first message
+        if type(message) is not self._cls:
             raise TypeError(f"{self.name} carries {self.codec.msgtype}, not {type(message).__name__}")
         if not self._declared:
             raise BridgeError(f"the publisher of {self.name} is destroyed")
@@ -137,14 +144,31 @@ class Publisher(Endpoint, Generic[M]):
             if latched:
                 self._retained.append(sample)
             for receiver in receivers:
-                receiver.enqueue(sample, False)
+                bus.deliver(receiver, sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
         elif bus.taps or self.has_subscribers:
             self._put(sample)
 
+    def relay(self, sequence: int, time_ns: int, payload: bytes) -> None:
+        """Publish what this publisher has said in another process, where its group has heard it."""
+        assert self._listeners is not None
+        self._sequence = sequence
+        sample = ReceivedSample(self, sequence, time_ns, payload)
+        for tap in self._bus.taps:
+            tap(sample)
+        if self._latched:
+            self._retained.append(sample)
+        for receiver in self._listeners.receivers:
+            if receiver.group != self.group:
+                receiver.enqueue(sample, False)
+
     def retained(self, most: int) -> list[Sample[M]]:
         """Return the last samples that those who come later are to hear, at most so many."""
         return list(self._retained)[-most:]
+
+    def forget_retained(self) -> None:
+        """Have nothing for those who come later."""
+        self._retained.clear()
 
     def put_retained(self) -> None:
         """Put these into Zenoh, of which nobody there knows yet."""

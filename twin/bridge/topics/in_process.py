@@ -8,6 +8,13 @@ from typing import Any, Protocol
 from twin.bridge.wire.external import Receiver
 
 
+class Member(Receiver, Protocol):
+    """A receiver of a group of nodes."""
+
+    group: str
+    """Of its node."""
+
+
 class Latched(Protocol):
     """A publisher whose last messages are for those who come later, too."""
 
@@ -25,7 +32,7 @@ class Listeners:
 
     def __init__(self, every: InProcess) -> None:
         self.every = every
-        self.receivers: list[Receiver] = []
+        self.receivers: list[Member] = []
         """Those who can be given a message directly; Zenoh reaches them too."""
         self.latched: list[Latched] = []
         """Who has something for those who come later."""
@@ -58,6 +65,11 @@ class InProcess:
     def listeners(self, key: str) -> Listeners:
         """Return who hears a key, now and later."""
         return self._listeners.setdefault(key, Listeners(self))
+
+    @property
+    def keys(self) -> tuple[Listeners, ...]:
+        """Who hears each key."""
+        return tuple(self._listeners.values())
 
     def go_public(self) -> None:
         """Let Zenoh carry all from now on, and keep what those who come later are to hear."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from twin.bridge import types
+from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.wire.keys import Attachment
 
 if TYPE_CHECKING:
@@ -57,3 +59,30 @@ class Sample(Generic[M]):
         if self._payload is None:
             self._payload = self.publisher.codec.encode(self.message)
         return self._payload
+
+
+class ReceivedSample(Sample[Any]):
+    """A message that was published in another process; decoded when first looked at."""
+
+    __slots__ = ("_decoded",)
+
+    def __init__(self, publisher: Any, sequence: int, time_ns: int, payload: bytes) -> None:
+        self.publisher = publisher
+        self.sequence = sequence
+        self.topic = publisher.name
+        self.msgtype = publisher.msgtype
+        self.time_ns = time_ns
+        self._payload = payload
+        self._shared = self._decoded = None
+
+    @property
+    def message(self) -> Any:
+        """The message.
+
+        Raises:
+            BridgeError: this process does not know its type.
+        """
+        if self._decoded is None:
+            decoder: Codec[Any] = codec(types.get(self.msgtype))
+            self._decoded = decoder.decode(self.payload)
+        return self._decoded

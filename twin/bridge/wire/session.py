@@ -1,11 +1,14 @@
-"""One Zenoh session: no scouting, no listener unless asked for, an id that depends on its name only."""
+"""One Zenoh session: no scouting, no listener unless asked for, an id that depends on its name only.
+
+And which graph a process joins: what it is told, else what the environment says, as ROS does it.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,10 +16,50 @@ from typing import Any, Literal
 import xxhash
 import zenoh
 
-from twin.bridge.wire import Wire
+from twin.bridge.wire import DEFAULT_ENDPOINT, Wire
 from twin.bridge.wire.interrupts import from_zenoh
 from twin.errors import BridgeError, NobodyAnswersError
 from twin.files.reading import refusal
+
+
+def session_to_join(
+    connect: Sequence[str] | None = None,
+    *,
+    listen: Sequence[str] = (),
+    config: Path | None = None,
+    domain_id: int | None = None,
+    timeout_s: float = 3.0,
+    wire: Wire = "rmw_zenoh",
+) -> SessionConfig:
+    """Return a Zenoh client without a listener, or a peer if it is to listen; arguments as of `live.join`.
+
+    Nothing to connect to is added where `listen` or the file says enough.
+
+    Raises:
+        BridgeError: the file or ROS_DOMAIN_ID cannot be used.
+    """
+    uri = os.environ.get("ZENOH_SESSION_CONFIG_URI")
+    file = config or (Path(uri) if uri else None)
+    if connect is None:
+        enough = listen or (file and (endpoints(file, "connect") or endpoints(file, "listen")))
+        connect = () if enough else (os.environ.get("TWIN_CONNECT") or DEFAULT_ENDPOINT,)
+    return SessionConfig(
+        mode="peer" if listen else "client",
+        wire=wire,
+        listen=tuple(listen),
+        connect=tuple(connect),
+        file=file,
+        timeout_s=timeout_s,
+        domain_id=_domain_id() if domain_id is None else domain_id,
+    )
+
+
+def _domain_id() -> int:
+    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+    if not text.isdecimal() or int(text) > 232:
+        raise BridgeError(f"ROS_DOMAIN_ID is {text!r}; valid is a number from 0 to 232")
+    return int(text)
+
 
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 """rmw_zenoh's: 'key=value;key=value', values in JSON5 (zenoh_config.cpp)."""

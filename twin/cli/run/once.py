@@ -38,6 +38,7 @@ def run_once(options: RunOptions) -> int:
         bag_hidden_topics=options.include_hidden_topics,
         save_model=options.save_model,
         pace=options.speed,
+        workers=options.workers,
         network=options.network,
         nodes=options.node or (),
         wait_for=options.wait_for or (),

@@ -96,6 +96,9 @@ class RunOptions:
     save_model: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the compiled world as MJCF.")
     ] = None
+    workers: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Let N processes run the nodes of several robots.")
+    ] = 0
     json: Annotated[bool, typer.Option("--json", help="Print verdict.json instead of the table.")] = False
 
     def __post_init__(self) -> None:

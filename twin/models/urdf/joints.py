@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar, get_args
 
@@ -144,7 +144,9 @@ def check_tree(
         message = f"the robot has {len(roots)} root links ({shortened(roots)}); connect all but one by joints"
         report.add(None, message, code="several-roots")
     else:
-        _check_reachable(links, parent_joint, elements, report)
+        for loop in _loops(links, lambda link: parent_joint[link].parent if link in parent_joint else ""):
+            _add_cycle(loop[0], parent_joint, elements, report)
+            break
     return roots[0] if roots else ""
 
 
@@ -165,25 +167,6 @@ def _parent_joints(
             report.add(element, message, code="two-parents")
         parent_joint.setdefault(joint.child, joint)
     return parent_joint
-
-
-def _check_reachable(
-    links: Mapping[str, Link],
-    parent_joint: Mapping[str, Joint],
-    elements: Mapping[str, Element],
-    report: Report,
-) -> None:
-    safe: set[str] = set()
-    for name in links:
-        path: dict[str, None] = {}
-        link = name
-        while link in parent_joint and link not in safe and link not in path:
-            path[link] = None
-            link = parent_joint[link].parent
-        if link in path:
-            _add_cycle(link, parent_joint, elements, report)
-            return
-        safe.update(path)
 
 
 def _add_cycle(
@@ -225,16 +208,23 @@ def without_idle_mimics(
 
 
 def _check_mimics(joints: Mapping[str, Joint], elements: Mapping[str, Element], report: Report) -> None:
+    def leader(name: str) -> str:
+        mimic = joints[name].mimic
+        return mimic.joint if mimic is not None and mimic.joint in joints else ""
+
+    for loop in _loops(joints, leader):
+        shown = " -> ".join([*loop[:SHOWN], *["..."] * (len(loop) > SHOWN), loop[0]])
+        report.add(elements[loop[0]], f"joint '{loop[0]}' mimics itself: {shown}", code="mimic-cycle")
+
+
+def _loops(names: Iterable[str], following: Callable[[str], str]) -> Iterator[list[str]]:
+    """Yield the loops that names lead into, each once, from where it was entered; '' follows the last one."""
     known: set[str] = set()
-    for joint in joints.values():
+    for name in names:
         path: dict[str, None] = {}
-        name = joint.name
-        while name in joints and name not in path and name not in known:
+        while name and name not in path and name not in known:
             path[name] = None
-            mimic = joints[name].mimic
-            name = "" if mimic is None else mimic.joint
+            name = following(name)
         if name in path:
-            loop = [*path][[*path].index(name) :]
-            shown = " -> ".join([*loop[:SHOWN], *["..."] * (len(loop) > SHOWN), name])
-            report.add(elements[name], f"joint '{name}' mimics itself: {shown}", code="mimic-cycle")
+            yield [*path][[*path].index(name) :]
         known.update(path)

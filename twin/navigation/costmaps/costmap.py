@@ -57,7 +57,8 @@ class Costmap:
     def cost_at(self, x: float, y: float) -> int:
         """Return the cost at a point [m]; 255 (unknown) outside."""
         column, row = self.world_to_cell(x, y)
-        return int(self.costs[row, column]) if self.contains(x, y) else NO_INFORMATION
+        height, width = self.costs.shape
+        return self.costs.item(row, column) if 0 <= row < height and 0 <= column < width else NO_INFORMATION
 
     def cost_within(self, distance: float) -> int:
         """Return the cost of a cell so far [m] from the nearest lethal one, without an inflation radius."""

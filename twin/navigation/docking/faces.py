@@ -9,13 +9,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
+from twin.geometry import Array, Pose2, wrap_angle
+from twin.navigation._jit import jit
 from twin.parameters import Metres, Positive
 
 CORNER = 0.02
@@ -87,32 +87,40 @@ def fit_wall(
 
 def _best_line(points: Array, facing: float, max_yaw: float) -> tuple[Array, float] | None:
     """Return unit normal and offset [m] of the line through two points that most lie on; see `fit_wall`."""
-    some = points[np.linspace(0, len(points) - 1, min(HYPOTHESIS_POINTS, len(points))).astype(np.int64)]
-    i, j = _pairs(len(some))
-    along = some[j] - some[i]
-    length = np.hypot(along[:, 0], along[:, 1])
-    apart = length > 2.0 * _ON_LINE
-    i, along, length = i[apart], along[apart], length[apart]
-    normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
-    offsets = np.einsum("ij,ij->i", normals, some[i])
-    normals[offsets < 0.0] *= -1.0
-    offsets = np.abs(offsets)
-    turned = wrap_angles(np.arctan2(normals[:, 1], normals[:, 0]) - facing)
-    may_be = np.abs(turned) <= max_yaw
-    if not may_be.any():
-        return None
-    normals, offsets = normals[may_be], offsets[may_be]
-    squared = normals @ some.T
-    squared -= offsets[:, None]
-    squared *= squared
-    best = int(np.argmin(np.minimum(squared, _ON_LINE**2, out=squared).sum(axis=1)))
-    return normals[best], float(offsets[best])
+    count = min(HYPOTHESIS_POINTS, len(points))
+    some = points[np.linspace(0, len(points) - 1, count).astype(np.int64)]
+    cost, x, y, offset = _line_of_most(some, float(facing), float(max_yaw))
+    return (np.array((x, y)), offset) if cost < math.inf else None
 
 
-@lru_cache
-def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices of every pair of so many things."""
-    return np.triu_indices(count, k=1)
+@jit
+def _line_of_most(points: Array, facing: float, max_yaw: float) -> tuple[float, float, float, float]:
+    """Return the cost of the best line through two points, shape (n, 2), its unit normal, and its offset.
+
+    The cost is inf if no line faces so.
+    """
+    least, best_x, best_y, best_offset = math.inf, 0.0, 0.0, 0.0
+    for i in range(points.shape[0]):
+        for j in range(i + 1, points.shape[0]):
+            x, y = points[i, 1] - points[j, 1], points[j, 0] - points[i, 0]
+            length = math.hypot(x, y)
+            if length <= 2.0 * _ON_LINE:
+                continue
+            x, y = x / length, y / length
+            offset = x * points[i, 0] + y * points[i, 1]
+            if offset < 0.0:
+                x, y, offset = -x, -y, -offset
+            turned = (math.atan2(y, x) - facing + math.pi) % (2.0 * math.pi) - math.pi
+            if abs(turned) > max_yaw:
+                continue
+            cost = 0.0
+            for k in range(points.shape[0]):
+                cost += min((x * points[k, 0] + y * points[k, 1] - offset) ** 2, _ON_LINE**2)
+                if cost >= least:
+                    break
+            if cost < least:
+                least, best_x, best_y, best_offset = cost, x, y, offset
+    return least, best_x, best_y, best_offset
 
 
 def find_box_faces(points: ArrayLike, width: float, *, width_tolerance: float = 0.03) -> list[BoxFace]:

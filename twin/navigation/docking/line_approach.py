@@ -43,7 +43,7 @@ class LineApproach:
         """
         self.config = config
         self.backward = backward
-        self._goal = goal
+        self._T_goal_odom = goal.inverse()
         self._v = 0.0
         self._w = 0.0
         self._elapsed = 0.0
@@ -51,11 +51,11 @@ class LineApproach:
 
     def retarget(self, goal: Pose2) -> None:
         """Correct the goal on the way, as newer scans see the dock better."""
-        self._goal = goal
+        self._T_goal_odom = goal.inverse()
 
     def errors(self, pose: Pose2) -> tuple[float, float, float]:
         """Return the way left along the line [m], the lateral error [m] and the yaw error [rad] of `pose`."""
-        error = self._goal.inverse() @ pose
+        error = self._T_goal_odom @ pose
         return (error.x if self.backward else -error.x), error.y, error.yaw
 
     def halt(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
@@ -30,7 +31,7 @@ class RandomGoalsNode(MissionNode):
         robot_pose: RobotPose,
         config: RandomGoalsConfig,
         *,
-        seed: int,
+        seed: int | Sequence[int],
         namespace: str = "",
     ) -> None:
         super().__init__(bus, namespace=namespace)

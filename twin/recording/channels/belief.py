@@ -8,14 +8,13 @@ that odometry is drawn in the right place and its drift can be seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from functools import lru_cache, partial
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import rerun as rr
 
-from twin.geometry import Pose2, Pose3, yaw_from_quat_wxyz
+from twin.geometry import Array, Pose2, Pose3, wrap_angles
 from twin.periods import next_due
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.columns import STRIPS, Chunk, scalars, sim_time, transforms
@@ -39,30 +38,37 @@ FLOOR_HEIGHT = 0.03
 _LEVELS = {"truth": FLOOR_HEIGHT - 0.01, "odometry": FLOOR_HEIGHT, "estimate": FLOOR_HEIGHT + 0.01}
 _RING_RADIUS = 0.3
 """Around the estimated pose of a robot that has no body [m]."""
+_NOWHERE = (math.nan, math.nan, math.nan)
 
 _Point = tuple[float, float, float]
+_Numbers = tuple[float, float, float, float, float, float, float]
 
 
 class Link(NamedTuple):
+    """Two frames of the robot's belief."""
+
+    parent: str
+    """Of the recording, as `child` is."""
+    child: str
+    is_odometry: bool = False
+    is_correction: bool = False
+    """`map` -> `odom`."""
+    body: str | None = None
+    """That odometry moves."""
+
+
+class Seen(NamedTuple):
     """A transform of the robot's belief."""
 
     time_ns: int
-    parent: str
-    """Frame id as in the message."""
-    child: str
-    xyz: tuple[float, float, float]
-    quat_xyzw: tuple[float, float, float, float]
+    link: Link
+    pose: _Numbers
+    """x, y, z [m], and quaternion (x, y, z, w)."""
     truth: Pose3 | None = None
     """Of the body that odometry moves, in `world`."""
 
-    @property
-    def pose(self) -> Pose2:
-        """In the plane."""
-        x, y, z, w = self.quat_xyzw
-        return Pose2(self.xyz[0], self.xyz[1], yaw_from_quat_wxyz((w, x, y, z)))
 
-
-class BeliefChannel(Channel[Link]):
+class BeliefChannel(Channel[Seen]):
     """tf2_msgs/TFMessage: estimated pose, trails and localisation error of one robot.
 
     Only what hangs below `map` and `odom`: the robot's links are drawn where they truly are.
@@ -72,9 +78,9 @@ class BeliefChannel(Channel[Link]):
         """Start without knowing anything."""
         super().__init__(context, namespace, topic)
         self._next_ns = 0
-        self._name = lru_cache(maxsize=256)(partial(context.frames.belief, namespace))
-        self._anchor: Pose2 | None = None
-        self._T_map_odom: Pose2 | None = None
+        self._links: dict[tuple[str, str], Link | None] = {}
+        self._anchor: Array | None = None
+        self._T_map_odom = np.full((1, 3), np.nan)
         self._ghost = f"/estimate/{self.robot}"
         self._placed = Placed(self.recording, self._ghost, context.start_ns)
         self._trails = {name: f"/trails/{self.robot}/{name}" for name in TRAILS}
@@ -94,86 +100,105 @@ class BeliefChannel(Channel[Link]):
     def take(self, sample: Sample[Any]) -> None:
         """Keep transforms whose parent is `map` or `odom`; odometry when it is due."""
         for stamped in sample.message.transforms:
-            parent, child = stamped.header.frame_id, stamped.child_frame_id
-            if _last(parent) not in BELIEF_FRAMES:
+            frames = stamped.header.frame_id, stamped.child_frame_id
+            if frames not in self._links:
+                self._links[frames] = self._link(*frames)
+            link = self._links[frames]
+            if link is None:
                 continue
             truth = None
-            if _is_odometry(parent, child):
+            if link.is_odometry:
                 if sample.time_ns < self._next_ns:
                     continue
                 self._next_ns = next_due(self.context.period, sample.time_ns)
-                body = self.context.frames.body(self.namespace, child)
-                truth = None if body is None else self.context.true_pose(body)
+                truth = None if link.body is None else self.context.true_pose(link.body)
             t, q = stamped.transform.translation, stamped.transform.rotation
-            self.rows.append(
-                Link(sample.time_ns, parent, child, (t.x, t.y, t.z), (q.x, q.y, q.z, q.w), truth)
-            )
+            self.rows.append(Seen(sample.time_ns, link, (t.x, t.y, t.z, q.x, q.y, q.z, q.w), truth))
 
-    def chunks(self, rows: list[Link]) -> Iterator[Chunk]:
+    def _link(self, parent: str, child: str) -> Link | None:
+        """Return what is shown of a transform, if anything; frame ids are those of the message."""
+        if _last(parent) not in BELIEF_FRAMES:
+            return None
+        frames = self.context.frames
+        of, to = (frames.belief(self.namespace, frame_id) for frame_id in (parent, child))
+        is_odometry = _last(parent) == "odom" != _last(child)
+        body = frames.body(self.namespace, child) if is_odometry else None
+        return Link(of, to, is_odometry, _last(child) == "odom", body)
+
+    def chunks(self, rows: list[Seen]) -> Iterator[Chunk]:
         """Yield the transforms, and what follows from them."""
-        links: list[Link] = []
-        errors: list[tuple[int, float, float]] = []
-        segments: dict[str, list[tuple[int, _Point, _Point]]] = {name: [] for name in TRAILS}
-        for link in rows:
-            if _is_odometry(link.parent, link.child):
-                if self._anchor is None:
-                    self._anchor = self._start(link)
-                    if self._T_map_odom is None:
-                        links.append(_map_to_odom(link, self._anchor))
-                poses = self._poses(link, self._anchor)
-                for name, pose in poses.items():
-                    self._extend(segments[name], name, link.time_ns, pose)
-                if "truth" in poses and "estimate" in poses:
-                    error = poses["truth"].inverse() @ poses["estimate"]
-                    errors.append((link.time_ns, math.hypot(error.x, error.y), error.yaw))
-            elif _last(link.child) == "odom":
-                self._T_map_odom = link.pose
-            links.append(link)
-        times, parents, children, xyz, quat_xyzw, _ = zip(*links, strict=True)
-        parents, children = (tuple(map(self._name, frame_ids)) for frame_ids in (parents, children))
-        yield transforms(f"/tf_belief/{self.robot}", sim_time(times), parents, children, xyz, quat_xyzw)
-        for name, segment in segments.items():
-            if segment:
-                times, *points = zip(*segment, strict=True)
-                yield self._trails[name], sim_time(times), [STRIPS.column(np.stack(points, axis=1))]
-        if errors:
-            times, *values = zip(*errors, strict=True)
-            yield from scalars(sim_time(times), dict(zip(self._errors, values, strict=True)))
+        if self._anchor is None:
+            rows = self._begin(rows)
+        times, links, poses, truths = zip(*rows, strict=True)
+        numbers = np.array(poses)
+        parents, children, *_ = zip(*links, strict=True)
+        entity = f"/tf_belief/{self.robot}"
+        yield transforms(entity, sim_time(times), parents, children, numbers[:, :3], numbers[:, 3:])
 
-    def _poses(self, link: Link, T_map_anchor: Pose2) -> dict[str, Pose2]:
-        """Return where the robot was, as far as that is known, by the name of the trail."""
-        T_odom_base = link.pose
-        poses = {"odometry": T_map_anchor @ T_odom_base}
-        if self._T_map_odom is not None:
-            poses["estimate"] = self._T_map_odom @ T_odom_base
-        if link.truth is not None:
-            poses["truth"] = link.truth.to_pose2()
-        return poses
+        T_map_odom = np.concatenate((self._T_map_odom, _planar(numbers[[x.is_correction for x in links]])))
+        self._T_map_odom = T_map_odom[-1:]
+        at = np.flatnonzero([link.is_odometry for link in links])
+        if len(at) == 0 or self._anchor is None:
+            return
+        T_odom_base = _planar(numbers[at])
+        newest = np.cumsum([link.is_correction for link in links])[at]
+        times_at = [times[i] for i in at]
+        walked = {
+            "truth": np.array([_NOWHERE if truths[i] is None else truths[i].to_pose2() for i in at]),
+            "odometry": _compose(self._anchor, T_odom_base),
+            "estimate": _compose(T_map_odom[newest], T_odom_base),
+        }
+        for name, path in walked.items():
+            segments = list(self._segments(name, zip(times_at, path.tolist(), strict=True)))
+            if segments:
+                when, ends = zip(*segments, strict=True)
+                yield self._trails[name], sim_time(when), (STRIPS.column(ends),)
+        error = walked["estimate"] - walked["truth"]
+        known = np.isfinite(error[:, 0])
+        if known.any():
+            values = np.hypot(*error[known, :2].T), wrap_angles(error[known, 2])
+            when = np.array(times_at)[known]
+            yield from scalars(sim_time(when), dict(zip(self._errors, values, strict=True)))
 
-    def _extend(
-        self, segments: list[tuple[int, _Point, _Point]], name: str, time_ns: int, pose: Pose2
-    ) -> None:
-        """Add to a path travelled, unless the pose is less than a step away from its end."""
-        point = (pose.x, pose.y, _LEVELS[name])
-        end = self._ends.setdefault(name, point)
-        if math.dist(point, end) >= self.context.trail_step_m:
-            segments.append((time_ns, end, point))
-            self._ends[name] = point
+    def _segments(self, name: str, path: Iterable[tuple[int, list[float]]]) -> Iterator[tuple[int, Array]]:
+        """Yield when a path has become a step longer, and the ends of the step."""
+        for time_ns, (x, y, _) in path:
+            if math.isnan(x):
+                continue
+            point = (x, y, _LEVELS[name])
+            end = self._ends.setdefault(name, point)
+            if math.dist(point, end) >= self.context.trail_step_m:
+                yield time_ns, np.array((end, point))
+                self._ends[name] = point
 
-    def _start(self, link: Link) -> Pose2:
-        """Draw the ghost, and return where odometry began: `odom` in `map`."""
-        self._draw_ghost(link)
-        if link.truth is None:
-            return self._T_map_odom or Pose2(0.0, 0.0, 0.0)
-        return link.truth.to_pose2() @ link.pose.inverse()
+    def _begin(self, rows: list[Seen]) -> list[Seen]:
+        """Draw the ghost at the first odometry, and see where it began: `odom` in `map`."""
+        i = next((i for i, row in enumerate(rows) if row.link.is_odometry), None)
+        if i is None:
+            return rows
+        first = rows[i]
+        self._draw_ghost(first)
+        corrections = [row for row in rows[:i] if row.link.is_correction]
+        T_map_odom = _planar(np.array([corrections[-1].pose])) if corrections else self._T_map_odom
+        is_localised = bool(np.isfinite(T_map_odom).all())
+        if first.truth is not None:
+            T_odom_base = Pose2(*_planar(np.array([first.pose]))[0].tolist())
+            T_map_odom = np.array([first.truth.to_pose2() @ T_odom_base.inverse()])
+        self._anchor = np.nan_to_num(T_map_odom)
+        if is_localised:
+            return rows
+        x, y, yaw = self._anchor[0].tolist()
+        link = Link(self.context.frames.belief(self.namespace, "map"), first.link.parent)
+        anchor = Seen(first.time_ns, link, (x, y, 0.0, 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
+        return [*rows[:i], anchor, *rows[i:]]
 
-    def _draw_ghost(self, link: Link) -> None:
+    def _draw_ghost(self, first: Seen) -> None:
         """Draw the ring and its arrow on the floor."""
         radius = self.context.radii.get(self.robot, _RING_RADIUS)
         angles = np.linspace(0.0, 2.0 * math.pi, 33)
         ring = radius * np.stack((np.cos(angles), np.sin(angles), np.zeros(33)), axis=1)
-        floor = (0.0, 0.0, FLOOR_HEIGHT - link.xyz[2])
-        self._placed.attach(self._name(link.child), link.time_ns)
+        floor = (0.0, 0.0, FLOOR_HEIGHT - first.pose[2])
+        self._placed.attach(first.link.child, first.time_ns)
         self.recording.log(
             self._ghost,
             rr.LineStrips3D([ring + floor], colors=[ESTIMATE_COLOUR], radii=[0.03 * radius]),
@@ -186,18 +211,19 @@ class BeliefChannel(Channel[Link]):
         )
 
 
-def _map_to_odom(link: Link, T_map_odom: Pose2) -> Link:
-    """Return the anchor as a transform at the time of the first odometry."""
-    half = T_map_odom.yaw / 2.0
-    xyz, quat_xyzw = (T_map_odom.x, T_map_odom.y, 0.0), (0.0, 0.0, math.sin(half), math.cos(half))
-    return Link(link.time_ns, "map", link.parent, xyz, quat_xyzw)
+def _planar(poses: Array) -> Array:
+    """Return x, y [m] and yaw [rad] of poses, shape (n, 7)."""
+    x, y, _, i, j, k, w = poses.T
+    return np.stack((x, y, np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))), axis=1)
 
 
-def _is_odometry(parent: str, child: str) -> bool:
-    return _last(parent) == "odom" != _last(child)
+def _compose(a: Array, b: Array) -> Array:
+    """Return `T_a @ T_b` of poses in the plane, shapes (n, 3) or (1, 3); yaws are not wrapped."""
+    (ax, ay, yaw), (bx, by, turn) = a.T, b.T
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.stack((ax + c * bx - s * by, ay + s * bx + c * by, yaw + turn), axis=1)
 
 
-@lru_cache(maxsize=256)
 def _last(frame_id: str) -> str:
     """Return a frame's name without a namespace."""
     return frame_id.rsplit("/", 1)[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import rerun as rr
@@ -12,10 +12,11 @@ import rerun as rr
 from twin.geometry import Pose3
 from twin.periods import Period
 from twin.recording.frames import Frames
-from twin.recording.writer import Row, Rows
+from twin.recording.rows import Row, Rows
 
 if TYPE_CHECKING:
     from twin.bridge.topics import Sample
+    from twin.recording.channels.spatial import GridChannel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,8 @@ class Context:
     """Of robots, on the floor [m]."""
     wheels: Mapping[str, Collection[str]]
     """By robot: joints that are not worth a plot, as they turn without end."""
+    grids: dict[str, GridChannel] = field(default_factory=dict)
+    """By topic: those that are open."""
 
 
 class Channel(Rows[Row]):

@@ -129,7 +129,7 @@ class StateChannel(Channel[tuple[int, str]]):
         for entity, changes in ((self.topic, rows), (self._task_entity, tasks)):
             if changes:
                 times, states = zip(*changes, strict=True)
-                yield entity, sim_time(times), [_STATE.column(states)]
+                yield entity, sim_time(times), (_STATE.column(states),)
 
 
 def _action(label: str) -> str:
@@ -153,4 +153,4 @@ class LogChannel(Channel[tuple[int, str, str]]):
     def chunks(self, rows: list[tuple[int, str, str]]) -> Iterator[Chunk]:
         """Yield the lines."""
         times, texts, levels = zip(*rows, strict=True)
-        yield "/log", sim_time(times), [_TEXT.column(texts), _LEVEL.column(levels)]
+        yield "/log", sim_time(times), (_TEXT.column(texts), _LEVEL.column(levels))

@@ -17,7 +17,7 @@ from twin.geometry import Pose3
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.columns import STRIPS, Chunk, Component, sim_time, transforms
 from twin.recording.frames import WORLD
-from twin.recording.placing import Placed, set_time
+from twin.recording.placing import Placed
 
 if TYPE_CHECKING:
     from twin.bridge.topics import Sample
@@ -32,6 +32,15 @@ PARTICLE_LENGTH = 0.12
 """Of the arrow of a particle [m]."""
 _POSITIONS = Component(rr.Points3D, "positions")
 _ORIGINS, _VECTORS = (Component(rr.Arrows3D, name) for name in ("origins", "vectors"))
+_CELLS, _FORMAT, _CELL_SIZE, _CORNER, _TURN, _COLORMAP, _OPACITY = (
+    Component(rr.GridMap, name)
+    for name in ("data", "format", "cell_size", "translation", "quaternion", "colormap", "opacity")
+)
+_GREY = {
+    "color_model": rr.ColorModel.L.value,
+    "channel_datatype": rr.ChannelDatatype.U8.value,
+}
+"""Of an image with one byte for each cell."""
 
 Floats = NDArray[np.float32]
 Shown = TypeVar("Shown")
@@ -41,9 +50,10 @@ class Placement(NamedTuple, Generic[Shown]):
     """What is shown of a message, and where; None if it is what was shown before."""
 
     time_ns: int
-    frame_id: str
+    frame: str
+    """Of the recording."""
     body_pose: Pose3 | None
-    """Of the body that the frame is fixed to, in `world`; None for a frame of the robot's belief."""
+    """Of the body that the message's frame is fixed to, in `world`; None: of the robot's belief."""
     shown: Shown | None
 
 
@@ -60,7 +70,7 @@ class _SpatialChannel(Channel[Placement[Shown]]):
         self.entity = f"/ros{topic}"
         self._placed = Placed(context.recording, self.entity, context.start_ns)
         self._origin = f"origin of {topic}"
-        self._bodies: dict[str, str | None] = {}
+        self._frames: dict[str, tuple[str, str | None]] = {}
 
     @abstractmethod
     def draw(self, rows: list[tuple[int, Shown]]) -> Iterable[Chunk]:
@@ -69,17 +79,21 @@ class _SpatialChannel(Channel[Placement[Shown]]):
     def put(self, sample: Sample[Any], shown: Shown | None) -> None:
         """Keep what is shown of a message that has a header."""
         frame_id = sample.message.header.frame_id
-        if frame_id not in self._bodies:
-            self._bodies[frame_id] = self.context.frames.body(self.namespace, frame_id)
-        body = self._bodies[frame_id]
+        if frame_id not in self._frames:
+            self._frames[frame_id] = self._frame(frame_id)
+        frame, body = self._frames[frame_id]
         pose = None if body is None else self.context.true_pose(body)
-        self.rows.append(Placement(sample.time_ns, frame_id, pose, shown))
+        self.rows.append(Placement(sample.time_ns, frame, pose, shown))
+
+    def _frame(self, frame_id: str) -> tuple[str, str | None]:
+        """Return the recording's name of a frame, and the body it is fixed to."""
+        body = self.context.frames.body(self.namespace, frame_id)
+        return (self.context.frames.belief(self.namespace, frame_id) if body is None else self._origin), body
 
     def chunks(self, rows: list[Placement[Shown]]) -> Iterator[Chunk]:
         """Yield the places, and what is shown there."""
         for row in rows:
-            belief = self.context.frames.belief(self.namespace, row.frame_id)
-            self._placed.attach(belief if row.body_pose is None else self._origin, row.time_ns)
+            self._placed.attach(row.frame, row.time_ns)
         fixed = [(row.time_ns, *row.body_pose) for row in rows if row.body_pose is not None]
         if fixed:
             times, xyz, quat_wxyz = zip(*fixed, strict=True)
@@ -129,7 +143,7 @@ class ScanChannel(_SpatialChannel[Scan]):
             hit = (ranges >= range_min) & (ranges <= range_max)
             directions = _directions(angle_min, angle_increment, beams)
             points = directions[np.nonzero(hit)[1]] * ranges[hit][:, np.newaxis]
-            yield self.entity, sim_time(times), [_POSITIONS.column(points, np.count_nonzero(hit, axis=1))]
+            yield self.entity, sim_time(times), (_POSITIONS.column(points, np.count_nonzero(hit, axis=1)),)
 
 
 @lru_cache(maxsize=8)
@@ -138,47 +152,95 @@ def _directions(angle_min: float, angle_increment: float, beams: int) -> Floats:
     return np.stack((np.cos(angles), np.sin(angles), np.zeros(beams)), axis=1).astype(np.float32)
 
 
-class GridChannel(_SpatialChannel[rr.GridMap]):
+class Raster(NamedTuple):
+    """What is shown of an OccupancyGrid."""
+
+    size: tuple[int, int]
+    """Columns and rows."""
+    resolution: float
+    xyz: tuple[float, float, float]
+    """Of the origin, where the last row begins [m]."""
+    quat_xyzw: tuple[float, float, float, float]
+    frame_id: str
+    cells: bytes
+    """Row by row from the far side, as Rerun's images are."""
+
+
+class GridChannel(_SpatialChannel[Raster]):
     """nav_msgs/OccupancyGrid as a raster on the floor; sent only when it changed."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
         name = context.frames.split(topic)[1]
         self._height = LAYER_HEIGHTS.get(name, -0.01)
-        self._is_map = not name.endswith("costmap")
-        self._opacity = LAYER_OPACITIES.get(name, 1.0 if self._is_map else 0.6)
-        self._last: tuple[Any, ...] | None = None
+        is_map = not name.endswith("costmap")
+        self._opacity = LAYER_OPACITIES.get(name, 1.0 if is_map else 0.6)
+        colormap = rr.components.Colormap
+        self._colormap = (colormap.RvizMap if is_map else colormap.RvizCostmap).value
+        self._last: Raster | None = None
+        context.grids[topic] = self
 
     def take(self, sample: Sample[Any]) -> None:
-        """Keep the raster: row 0 of the message is at its origin, row 0 of Rerun's image at the far side."""
+        """Keep the raster."""
         grid = sample.message
         info = grid.info
         data = np.asarray(grid.data, dtype=np.int8)
-        cells = data.reshape(info.height, info.width)[::-1].tobytes()
         at, q = info.origin.position, info.origin.orientation
-        key = (info.width, info.height, info.resolution, at.x, at.y, grid.header.frame_id, cells)
-        if key == self._last or not cells:
-            self.put(sample, None)
-            return
-        self._last = key
-        raster = rr.GridMap(
-            data=cells,
-            format=rr.components.ImageFormat(
-                width=info.width, height=info.height, color_model="L", channel_datatype="U8"
-            ),
-            cell_size=info.resolution,
-            translation=[at.x, at.y, at.z + self._height],
-            quaternion=rr.Quaternion(xyzw=[q.x, q.y, q.z, q.w]),
-            colormap="RvizMap" if self._is_map else "RvizCostmap",
-            opacity=self._opacity,
+        raster = Raster(
+            (info.width, info.height),
+            info.resolution,
+            (at.x, at.y, at.z + self._height),
+            (q.x, q.y, q.z, q.w),
+            grid.header.frame_id,
+            data.reshape(info.height, info.width)[::-1].tobytes(),
         )
-        self.put(sample, raster)
+        self._show(sample, raster)
 
-    def draw(self, rows: list[tuple[int, rr.GridMap]]) -> tuple[()]:
-        """Log the rasters: they are few and large."""
-        for time_ns, raster in rows:
-            set_time(self.recording, time_ns)
-            self.recording.log(self.entity, raster)
+    def take_update(self, sample: Sample[Any]) -> None:
+        """Keep the raster with what a map_msgs/OccupancyGridUpdate changes of it."""
+        if self._last is None:
+            return
+        update, (width, height) = sample.message, self._last.size
+        cells = np.frombuffer(bytearray(self._last.cells), np.int8).reshape(height, width)
+        window = cells[::-1][update.y : update.y + update.height, update.x : update.x + update.width]
+        if window.size != len(update.data):
+            return  # of another grid
+        window[...] = np.asarray(update.data, dtype=np.int8).reshape(window.shape)
+        self._show(sample, self._last._replace(cells=cells.tobytes()))
+
+    def _show(self, sample: Sample[Any], raster: Raster) -> None:
+        changed = raster != self._last and bool(raster.cells)
+        if changed:
+            self._last = raster
+        self.put(sample, raster if changed else None)
+
+    def draw(self, rows: list[tuple[int, Raster]]) -> Iterator[Chunk]:
+        """Yield the rasters."""
+        times, rasters = zip(*rows, strict=True)
+        sizes, resolutions, xyz, quat_xyzw, _, cells = zip(*rasters, strict=True)
+        columns = (
+            _CELLS.column([np.frombuffer(row, np.uint8) for row in cells]),
+            _FORMAT.column([{**_GREY, "width": width, "height": height} for width, height in sizes]),
+            _CELL_SIZE.column(resolutions),
+            _CORNER.column(xyz),
+            _TURN.column(quat_xyzw),
+            _COLORMAP.column([self._colormap] * len(rows)),
+            _OPACITY.column([self._opacity] * len(rows)),
+        )
+        yield self.entity, sim_time(times), columns
+
+
+class GridUpdateChannel(Channel[Any]):
+    """map_msgs/OccupancyGridUpdate on `<topic>_updates`: changes what is shown of `<topic>`."""
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Hand it to the channel of the whole grids, if there is one."""
+        grids = self.context.grids.get(self.topic.removesuffix("_updates"))
+        if grids is not None:
+            grids.take_update(sample)
+
+    def chunks(self, rows: list[Any]) -> tuple[()]:
+        """Yield nothing: there are no rows."""
         return ()
 
 
@@ -201,7 +263,7 @@ class PathChannel(_SpatialChannel[Floats]):
     def draw(self, rows: list[tuple[int, Floats]]) -> Iterator[Chunk]:
         """Yield the lines."""
         times, lines = zip(*rows, strict=True)
-        yield self.entity, sim_time(times), [STRIPS.column(lines)]
+        yield self.entity, sim_time(times), (STRIPS.column(lines),)
 
 
 class PoseArrayChannel(_SpatialChannel[NDArray[np.float64]]):
@@ -228,8 +290,8 @@ class PoseArrayChannel(_SpatialChannel[NDArray[np.float64]]):
         x, y, z, w = poses[:, 3:].T
         forward = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)), axis=1)
         lengths = [len(cloud) for cloud in clouds]
-        columns = [
+        columns = (
             _ORIGINS.column(poses[:, :3] + np.array((0.0, 0.0, 0.01)), lengths),
             _VECTORS.column(PARTICLE_LENGTH * forward, lengths),
-        ]
+        )
         yield self.entity, sim_time(times), columns

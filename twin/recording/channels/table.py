@@ -7,11 +7,18 @@ from typing import Any
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.channels.series import JointChannel, LogChannel, StateChannel, VelocityChannel
-from twin.recording.channels.spatial import GridChannel, PathChannel, PoseArrayChannel, ScanChannel
+from twin.recording.channels.spatial import (
+    GridChannel,
+    GridUpdateChannel,
+    PathChannel,
+    PoseArrayChannel,
+    ScanChannel,
+)
 
 _BY_TYPE: dict[str, type[Any]] = {
     "sensor_msgs/msg/LaserScan": ScanChannel,
     "nav_msgs/msg/OccupancyGrid": GridChannel,
+    "map_msgs/msg/OccupancyGridUpdate": GridUpdateChannel,
     "nav_msgs/msg/Path": PathChannel,
     "geometry_msgs/msg/PoseArray": PoseArrayChannel,
     "rcl_interfaces/msg/Log": LogChannel,

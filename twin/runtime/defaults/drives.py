@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from twin.errors import Problem, ScenarioError
@@ -11,7 +12,9 @@ from twin.scenario.missions import Behaviors, Idle, Mission, R2D2StatePublisher,
 from twin.scenario.robots import RobotConfig
 
 
-def with_drive(description: RobotDescription, robot: RobotConfig, mission: Mission) -> RobotDescription:
+def with_drive(
+    description: RobotDescription, robot: RobotConfig, missions: Sequence[Mission]
+) -> RobotDescription:
     """Return a robot with the drive that its wheels suggest if its file has none.
 
     Raises:
@@ -19,7 +22,7 @@ def with_drive(description: RobotDescription, robot: RobotConfig, mission: Missi
     """
     if description.drive is None and robot.base == "free" and not description.static:
         description = replace(description, drive=guess_drive(description))
-    task = _task(robot, mission)
+    task = next(filter(None, (_task(robot, mission) for mission in missions)), "")
     if description.drive is None and task:
         why, line = lack_of_drive(description)
         message = f"robot '{robot.id}' has no drive, which {task} needs: {why}; {VALID_DRIVES}"

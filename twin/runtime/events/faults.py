@@ -41,13 +41,13 @@ class FaultSchedule:
         self._events = sorted(events, key=lambda event: event.time_ns)
         self._logger = bus.create_node("faults").get_logger() if events else None
 
-    def update(self) -> None:
-        """Let happen what is due at the world's present time; takes effect with the next step."""
+    def update(self, *, tell: bool = True) -> None:
+        """Let happen what is due at the world's time, and tell it; takes effect with the next step."""
         while self._events and self._events[0].time_ns <= self._world.time_ns:
             event = self._events.pop(0)
             event.happen()
-            assert self._logger is not None
-            self._logger.warn(event.text)
+            if self._logger is not None and tell:
+                self._logger.warn(event.text)
 
 
 def _events(entry: FaultEntry, stacks: Mapping[str, RobotStack]) -> Iterator[_Event]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,7 @@ from twin.scenario.missions import (
     PickAndPlace,
     R2D2StatePublisher,
     RandomGoals,
+    Task,
     UserMission,
     VelocityProfile,
 )
@@ -55,6 +56,39 @@ class IdleMission:
     reason = ""
 
 
+class Missions:
+    """Those of several robots: over when all are, a success if all are."""
+
+    def __init__(self, missions: Mapping[str, MissionNode]) -> None:
+        self.of = missions
+        """The mission of each robot."""
+
+    @property
+    def state(self) -> str:
+        """What each is at: `a: goal 3; b: done`."""
+        return "; ".join(f"{name}: {mission.state}" for name, mission in self.of.items())
+
+    @property
+    def done(self) -> bool:
+        """Whether all are over."""
+        return all(mission.done for mission in self.of.values())
+
+    @property
+    def succeeded(self) -> bool | None:
+        """Whether all have succeeded; None while that is open."""
+        ends = [mission.succeeded for mission in self.of.values()]
+        return False if False in ends else None if None in ends else True
+
+    @property
+    def reason(self) -> str:
+        """Why some have failed."""
+        failed = [(name, m) for name, m in self.of.items() if m.done and not m.succeeded]
+        return "; ".join(f"{name}: {mission.reason or mission.state}" for name, mission in failed)
+
+
+AnyMission = MissionNode | IdleMission | Missions
+
+
 @dataclass(frozen=True, kw_only=True)
 class MissionContext:
     """What a mission is made with."""
@@ -69,12 +103,16 @@ class MissionContext:
     control_period_ns: int
 
 
-def build_mission(
-    mission: Mission, stacks: Mapping[str, RobotStack], arena: Arena | None
-) -> MissionNode | IdleMission:
-    """Return the scenario's mission as a node on the bus."""
-    if isinstance(mission, Idle):
-        return IdleMission()
+def build_missions(
+    missions: Sequence[Mission], stacks: Mapping[str, RobotStack], arena: Arena | None
+) -> AnyMission:
+    """Return the scenario's missions, each a node on the bus."""
+    tasks = [mission for mission in missions if not isinstance(mission, Idle)]
+    built = {task.robot or next(iter(stacks)): _build(task, stacks, arena) for task in tasks}
+    return Missions(built) if len(built) > 1 else next(iter(built.values()), IdleMission())
+
+
+def _build(mission: Task, stacks: Mapping[str, RobotStack], arena: Arena | None) -> MissionNode:
     robot = stacks[mission.robot or next(iter(stacks))]
     context = MissionContext(
         bus=robot.context.bus,
@@ -84,10 +122,12 @@ def build_mission(
         seed=robot.context.seed,
         control_period_ns=robot.context.control_period_ns,
     )
+    context.bus.group = context.namespace
     plugin = MISSIONS.find(mission.type)
     if not isinstance(mission, UserMission):
-        return plugin.create(context, mission)
-    made = plugin.create(context, mission.use.config(plugin))
+        shipped: MissionNode = plugin.create(context, mission)
+        return shipped
+    made: MissionNode = plugin.create(context, mission.use.config(plugin))
     if not hasattr(made, "done"):
         raise plugin.error("does not call super().__init__(context.bus, namespace=context.namespace)")
     return made
@@ -106,7 +146,9 @@ def random_goals(context: MissionContext, mission: RandomGoals) -> MissionNode:
 
     goals = RandomGoalsConfig(**{name: getattr(mission, name) for name in fields_of(RandomGoalsConfig)})
     pose = context.robot.robot_pose
-    return RandomGoalsNode(context.bus, pose, goals, seed=context.seed, namespace=context.namespace)
+    # Several robots do not all go to the same places.
+    seed = (context.seed, *context.namespace.encode()) if context.namespace else context.seed
+    return RandomGoalsNode(context.bus, pose, goals, seed=seed, namespace=context.namespace)
 
 
 def velocity_profile(context: MissionContext, mission: VelocityProfile) -> MissionNode:

@@ -30,6 +30,7 @@ class RobotStack:
 
     def __init__(self, context: StackContext) -> None:
         bus, handle, namespace = context.bus, context.handle, context.namespace
+        bus.group = namespace
         description = handle.description
         self.name = handle.name
         self.handle = handle

@@ -2,7 +2,8 @@
 
 Every pair of speeds that can be reached within `sim_time` is driven ahead with the drive's accelerations; the
 critics score where that ends, and the best pair is the command. Distances to the path and to its end are
-exact ones, not counted in cells as by Nav2, so that small errors are steered out too.
+exact ones, not counted in cells as by Nav2, so that small errors are steered out too. To change sign
+again and again on the spot is forbidden, as by DWB's OscillationCritic.
 """
 
 from __future__ import annotations
@@ -12,16 +13,60 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.geometry import Array, Pose2, wrap_angles
+from twin.geometry import Array, Pose2, wrap_angle, wrap_angles
 from twin.navigation.control.controller import Controller, Situation
 from twin.navigation.control.critic import Trajectories
 from twin.navigation.control.dwb import kernels
-from twin.navigation.control.dwb.config import DWBConfig, ObstacleConfig
-from twin.navigation.control.dwb.oscillation import Oscillation
+from twin.navigation.control.dwb.config import DWBConfig, ObstacleConfig, OscillationConfig
 from twin.navigation.control.footprint_cover import CoverOf
 from twin.navigation.control.path_handler import LocalPath, PathHandler
 from twin.navigation.failures import NoValidControl
 from twin.navigation.plugins import own_critics
+
+
+class Oscillation:
+    """After a change of sign the old sign is forbidden until the robot has got somewhere."""
+
+    def __init__(self, config: OscillationConfig) -> None:
+        self.config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every change."""
+        self._signs = [0.0, 0.0]
+        self._only = [0.0, 0.0]
+        self._since: Pose2 | None = None
+        self._age = 0.0
+
+    def allowed(self, samples: Array) -> NDArray[np.bool_]:
+        """Return which commands (v, w), shape (n, 2), are not forbidden."""
+        only = np.array(self._only)
+        against: NDArray[np.bool_] = ((samples * only) < 0.0).any(axis=1)
+        return ~against
+
+    def note(self, command: tuple[float, float], pose: Pose2, dt: float) -> None:
+        """Take the command that was chosen at a pose, `dt` [s] after the last one."""
+        config = self.config
+        axes = (0, 1) if abs(command[0]) <= config.x_only_threshold else (0,)
+        changed = False
+        for axis in axes:
+            sign = math.copysign(1.0, command[axis]) if command[axis] else 0.0
+            if sign * self._signs[axis] < 0.0:
+                self._only[axis], changed = sign, True
+            self._signs[axis] = sign or self._signs[axis]
+        self._age += dt
+        if changed:
+            self._since, self._age = pose, 0.0
+        elif self._since is not None and self._moved(self._since, pose):
+            self.reset()
+
+    def _moved(self, before: Pose2, now: Pose2) -> bool:
+        config = self.config
+        return (
+            before.distance(now) > config.oscillation_reset_dist
+            or abs(wrap_angle(now.yaw - before.yaw)) > config.oscillation_reset_angle
+            or 0.0 <= config.oscillation_reset_time < self._age
+        )
 
 
 class DWB(Controller):

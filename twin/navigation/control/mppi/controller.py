@@ -19,12 +19,11 @@ from twin.navigation.control.footprint_cover import F32, CoverOf
 from twin.navigation.control.mppi import controls
 from twin.navigation.control.mppi.arrays import Ground
 from twin.navigation.control.mppi.config import MPPIConfig
-from twin.navigation.control.mppi.noise import NoiseBank
+from twin.navigation.control.mppi.controls import NoiseBank, SentCommands
 from twin.navigation.control.mppi.pursuit import pursue
 from twin.navigation.control.mppi.rollouts import Rollouts
 from twin.navigation.control.mppi.scene import Scene, expected_speed, limits_of
 from twin.navigation.control.mppi.scoring import cost_tables
-from twin.navigation.control.mppi.sent_commands import SentCommands
 from twin.navigation.control.path_handler import PathHandlerConfig
 from twin.navigation.failures import NoValidControl
 

@@ -1,4 +1,8 @@
-"""What becomes of the controls: moved by the noise that did well, smoothed, limited; where they lead."""
+"""What becomes of the controls: moved by the noise that did well, smoothed, limited; where they lead.
+
+The noise is drawn once and used again and again. Commands that were sent last are kept at multiples of the
+model's time step.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from numpy.typing import NDArray
 from twin.navigation._jit import fast_jit
 from twin.navigation.control.footprint_cover import F32, collides
 from twin.navigation.control.mppi.arrays import Ground, Limits, Number
+from twin.navigation.control.mppi.config import MPPIConfig
 
 
 @fast_jit
@@ -149,3 +154,72 @@ def first_collision(trajectory: NDArray[np.float64], ground: Ground, steps: int)
             if collides(costs, cost, cover, cover.outline, np.float32(x), np.float32(y), c, s):
                 return t
     return -1
+
+
+_BLOCKS = 8
+"""So many different noises are drawn for `regenerate_noises`."""
+
+
+class NoiseBank:
+    """Noise of vx and wz for a batch of rollouts; a function of the parameters, seed included.
+
+    Every draw is there with all four pairs of signs: the noise has no mean, which the same noise in every
+    cycle would add up to a turn on a straight path, or to a slower drive. The first rollouts are no noise but
+    what `MPPI` puts there.
+    """
+
+    def __init__(self, config: MPPIConfig) -> None:
+        generator = np.random.Generator(np.random.Philox(config.seed))
+        blocks = _BLOCKS if config.regenerate_noises else 1
+        batch, quarter = config.batch_size, (config.batch_size + 3) // 4
+        drawn = generator.standard_normal((blocks, 2, config.time_steps, quarter), dtype=np.float32)
+        keep = math.exp(-config.model_dt / config.noise_time_constant) if config.noise_time_constant else 0.0
+        for t in range(1, config.time_steps):
+            drawn[:, :, t] = keep * drawn[:, :, t - 1] + math.sqrt(1.0 - keep * keep) * drawn[:, :, t]
+        # The price is u' S^-1 e: slow noise has by this factor less weight in S^-1 than white noise.
+        price = config.gamma * (1.0 - keep) / (1.0 + keep)
+        self.gains: F32 = np.array([price / config.vx_std**2, price / config.wz_std**2], dtype=np.float32)
+        """What `average` charges for the noise of vx and wz."""
+        drawn[:, 0] *= config.vx_std
+        drawn[:, 1] *= config.wz_std
+        signs = np.array([(1, 1), (-1, -1), (1, -1), (-1, 1)], dtype=np.float32)
+        mirrored = [drawn * pair[None, :, None, None] for pair in signs]
+        self._blocks: F32 = np.ascontiguousarray(np.concatenate(mirrored, axis=-1)[..., :batch])
+        self._next = 0
+
+    def draw(self) -> F32:
+        """Return the next noise, shape (2, time_steps, batch_size), and its first columns to write to."""
+        block = self._blocks[self._next]
+        self._next = (self._next + 1) % len(self._blocks)
+        return block
+
+    def reset(self) -> None:
+        """Begin with the first block again."""
+        self._next = 0
+
+
+class SentCommands:
+    """Commands come once per control period; the model looks back in steps of its own."""
+
+    def __init__(self, steps: int, model_dt: float) -> None:
+        """Look `steps` steps of `model_dt` [s] back; before the first command the robot stood."""
+        # A rounding error is no reason to take the command before.
+        self._ages = np.arange(steps, 0, -1) * model_dt * (1.0 - 1e-9)
+        self._periods = np.zeros(0)
+        self._commands = np.zeros((2, 0), dtype=np.float32)
+
+    def add(self, command: tuple[float, float], period: float) -> None:
+        """Take a command (v [m/s], w [rad/s]) that holds for one control period [s]."""
+        self._periods = np.concatenate([[period], self._periods])
+        self._commands = np.concatenate(
+            [np.array(command, dtype=np.float32)[:, None], self._commands], axis=1
+        )
+        kept = int(np.searchsorted(np.cumsum(self._periods), self._ages[0])) + 1
+        self._periods, self._commands = self._periods[:kept], self._commands[:, :kept]
+
+    def latest(self, steps: int) -> F32:
+        """Return what held `steps`, ..., 2, 1 steps before the next command, shape (2, steps)."""
+        at = np.searchsorted(np.cumsum(self._periods), self._ages[len(self._ages) - steps :])
+        standing = np.zeros((2, 1), dtype=np.float32)
+        known = np.concatenate([self._commands, standing], axis=1)
+        return np.ascontiguousarray(known[:, np.minimum(at, known.shape[1] - 1)])

@@ -32,4 +32,6 @@ class CostmapNodeConfig:
     update_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 200_000_000
     """Rate of updates."""
     publish_period_ns: Annotated[PeriodNs, Positive, Le(100.0)] = 1_000_000_000
-    """Rate at which the whole grid is published."""
+    """Rate at which the grid, or what has changed of it, is published."""
+    always_send_full_costmap: bool = False
+    """Whether it is always the whole grid."""

@@ -7,7 +7,6 @@ from functools import lru_cache, partial
 import numpy as np
 
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import Costmap as CostmapMessage
 from twin.bridge.msgs import (
     DiagnosticArray,
     DiagnosticStatus,
@@ -28,7 +27,8 @@ from twin.navigation.odometry_watch import OdometryWatch
 from twin.navigation.warm_up import warm_up_costmap, warm_up_odometry_watch, warm_up_ranges
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filters import KeepoutFilterPart, SpeedFilterPart
-from twin.nodes.navigation.costmaps.messages import costmap_msg, occupancy_grid, polygon_msg
+from twin.nodes.navigation.costmaps.messages import polygon_msg
+from twin.nodes.navigation.costmaps.publisher import CostmapPublisher
 from twin.nodes.navigation.costmaps.services import CostmapServices
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
@@ -74,7 +74,7 @@ class _ScanSource:
 
 
 class CostmapNode:
-    """`/<name>/<name>`: takes `map`, scans and ranges; publishes `<name>/costmap`."""
+    """`/<name>/<name>`: takes `map`, scans and ranges; publishes `<name>/costmap` and its updates."""
 
     def __init__(
         self, bus: Bus, robot_pose: RobotPose, config: CostmapNodeConfig, *, namespace: str = ""
@@ -93,8 +93,9 @@ class CostmapNode:
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
         own = f"{namespace}/{config.name}"
-        self._publisher = node.create_publisher(OccupancyGrid, f"{own}/costmap", LATCHED)
-        self._raw_publisher = node.create_publisher(CostmapMessage, f"{own}/costmap_raw", LATCHED)
+        self._publisher = CostmapPublisher(
+            node, own, config.frame, always_send_full=config.always_send_full_costmap
+        )
         self._footprint_publisher = node.create_publisher(PolygonStamped, f"{own}/published_footprint", 1)
         self._known = np.zeros((0, 2))
         on_map = self._on_known_map if config.layers.rolling_window else self._on_map
@@ -250,9 +251,7 @@ class CostmapNode:
     def _publish(self) -> None:
         grid = self.costmap
         if grid is not None:
-            frame, now = self.config.frame, self.node.now_ns
-            self._publisher.publish(occupancy_grid(grid, frame, now))
-            self._raw_publisher.publish(costmap_msg(grid, frame, now))
+            self._publisher.publish(grid, self.node.now_ns)
         if contradiction := self._contradiction:
             name = f"{self.node.fully_qualified_name}: odometry"
             error = DiagnosticStatus(

@@ -8,7 +8,17 @@ import numpy as np
 
 from twin.bridge.conversions import pose_from_pose2
 from twin.bridge.msgs import Costmap as CostmapMessage
-from twin.bridge.msgs import CostmapMetaData, OccupancyGrid, Point32, Polygon, PolygonStamped, header, stamp
+from twin.bridge.msgs import (
+    CostmapMetaData,
+    CostmapUpdate,
+    OccupancyGrid,
+    OccupancyGridUpdate,
+    Point32,
+    Polygon,
+    PolygonStamped,
+    header,
+    stamp,
+)
 from twin.geometry import Array, Pose2
 from twin.navigation.costmaps.costmap import (
     FREE_SPACE,
@@ -17,6 +27,7 @@ from twin.navigation.costmaps.costmap import (
     NO_INFORMATION,
     Costmap,
 )
+from twin.navigation.costmaps.window import Window
 from twin.nodes.navigation.mapping.map_server import grid_msg
 
 _OCCUPANCY = (1 + (97 * (np.arange(256) - 1)) // 251).astype(np.int8)
@@ -42,6 +53,34 @@ def costmap_msg(grid: Costmap, frame: str, time_ns: int) -> Any:
         origin=pose_from_pose2(Pose2(*grid.origin, 0.0)),
     )
     return CostmapMessage(header=header(time_ns, frame), metadata=metadata, data=grid.costs.flatten())
+
+
+def occupancy_grid_update(grid: Costmap, window: Window, frame: str, time_ns: int) -> Any:
+    """Return the cells of a window as `costmap_updates` shows them."""
+    cells = _OCCUPANCY.take(grid.costs[window.slices])
+    height, width = cells.shape
+    return OccupancyGridUpdate(
+        header=header(time_ns, frame),
+        x=window.x0,
+        y=window.y0,
+        width=width,
+        height=height,
+        data=cells.ravel(),
+    )
+
+
+def costmap_update(grid: Costmap, window: Window, frame: str, time_ns: int) -> Any:
+    """Return the cells of a window as `costmap_raw_updates` shows them."""
+    cells = grid.costs[window.slices]
+    size_y, size_x = cells.shape
+    return CostmapUpdate(
+        header=header(time_ns, frame),
+        x=window.x0,
+        y=window.y0,
+        size_x=size_x,
+        size_y=size_y,
+        data=cells.flatten(),
+    )
 
 
 def polygon_msg(corners: Array, frame: str, time_ns: int) -> PolygonStamped:

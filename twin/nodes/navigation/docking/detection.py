@@ -12,6 +12,7 @@ from twin.geometry import Pose2
 from twin.navigation.docking.config import DockEstimateConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.docks import DockType
+from twin.navigation.warm_up import warm_up_docking
 from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
 from twin.nodes.navigation.scan_input import ScanInput
@@ -21,6 +22,7 @@ class DockDetection:
     """Looks at what sensors say between `begin` and `end`."""
 
     def __init__(self, node: Node, robot_pose: RobotPose, config: DockEstimateConfig, boxes: str) -> None:
+        warm_up_docking()
         self._node, self._robot_pose, self._config = node, robot_pose, config
         self._type = DockType()
         self._expected = Pose2(0.0, 0.0, 0.0)
