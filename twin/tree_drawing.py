@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import TypeVar
-from xml.sax.saxutils import escape
 
 _Key = TypeVar("_Key", bound=Hashable)
 _ROW, _MARGIN, _CHARACTER, _LINE, _GAP = 56.0, 20.0, 7.2, 14.0, 34.0
@@ -60,11 +60,11 @@ def svg(
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         'font-family="monospace" font-size="12">',
-        f"<title>{escape(title)}</title>",
+        f"<title>{escape(title, quote=False)}</title>",
         '<rect width="100%" height="100%" fill="white"/>',
         *(_arrow(boxes[start], boxes[end]) for start, end in arrows),
         *map(_drawn, boxes.values()),
-        f'<text x="{_MARGIN}" y="{height - 6.0:.1f}">{escape(note)}</text>' if note else "",
+        f'<text x="{_MARGIN}" y="{height - 6.0:.1f}">{escape(note, quote=False)}</text>' if note else "",
         "</svg>",
     ]
     return "\n".join(filter(None, lines)) + "\n"
@@ -129,6 +129,6 @@ def _drawn(box: _Box) -> str:
         y = box.y + _LINE * (number - (len(box.node.lines) - 1) / 2.0) + 4.0
         parts.append(
             f'<text x="{box.x + box.width / 2.0:.1f}" y="{y:.1f}" text-anchor="middle" fill="{colour}">'
-            f"{escape(line)}</text>"
+            f"{escape(line, quote=False)}</text>"
         )
     return "\n".join(parts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from twin.api.truth import Truth
 from twin.errors import RecordingError, SimulationError, TwinError
 from twin.files.writing import check_file, make_folder, written_alone
 from twin.plugins import Execution
+from twin.savings import uncollected
 from twin.scenario.outside import Outside
 
 if TYPE_CHECKING:
@@ -252,7 +252,7 @@ class Simulation(Participant):
         return self._run
 
     def _start(self) -> None:
-        with _uncollected():
+        with uncollected():
             self._open()
 
     def _open(self) -> None:
@@ -347,18 +347,6 @@ def run(
     """
     with Simulation(scenario, overrides=overrides, seed=seed, out=out) as simulation:
         return simulation.run()
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Look for no garbage in the block: a start makes a million objects that stay."""
-    looks = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if looks:
-            gc.enable()
 
 
 def _reason(error: BaseException) -> str:

@@ -23,7 +23,7 @@ from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.threads import end_threads
-from twin.savings import ALL, Savings
+from twin.savings import ALL, Savings, uncollected
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -109,8 +109,9 @@ class OpenRun:
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
         taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
         network = network or SessionConfig(listen=outside.endpoints(listen))
-        keeps_time = pace is not None or network.networked
-        with execution() as self._executed, ExitStack() as ending, kernels_ahead(keeps_time):
+        # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
+        needed = pace is not None or network.networked or workers > 0
+        with execution() as self._executed, ExitStack() as ending, uncollected(), kernels_ahead(needed):
             parts = build(
                 scenario,
                 taps=[self._digest.on_sample, *taps],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -130,9 +129,11 @@ class Lidar(Sensor):
     def to_message(cls, spec: LidarSpec, header: Header, reading: LidarReading) -> LaserScan:
         """Return a scan, read-only, with every number as precise as it will be on the wire."""
         increment = (spec.angle_max - spec.angle_min) / max(1, spec.samples - 1)
-        low, high, increment, period, nearest, farthest = _single(
-            spec.angle_min, spec.angle_max, increment, 1.0 / spec.rate_hz, spec.range_min, spec.range_max
+        numbers = np.array(
+            [spec.angle_min, spec.angle_max, increment, 1.0 / spec.rate_hz, spec.range_min, spec.range_max],
+            np.float32,
         )
+        low, high, increment, period, nearest, farthest = numbers.tolist()
         ranges = reading.ranges.astype(np.float32)
         ranges.flags.writeable = False
         return LaserScan(
@@ -160,9 +161,3 @@ class Lidar(Sensor):
             angles = np.linspace(spec.angle_min, spec.angle_max, spec.samples)
             turns = [quat_wxyz_from_yaw(float(angle)) for angle in angles]
             yield from add_rangefinders(model, spec, turns, cutoff=spec.range_max, noise=spec.noise_stddev)
-
-
-@lru_cache
-def _single(*numbers: float) -> list[float]:
-    """Return numbers as precise as float32."""
-    return np.array(numbers, np.float32).tolist()

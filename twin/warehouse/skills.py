@@ -98,8 +98,7 @@ class MobileManipulationNode(MissionNode):
         self._robot_pose = robot_pose
         self._frames = robot_pose.frames
         self._totes: list[Pose2] = []
-        self._joints: dict[str, float] = {}
-        self._efforts: dict[str, float] = {}
+        self._joint_states = new(JointState)
         self._grip_effort = 0.0
         node = self.node
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
@@ -112,8 +111,12 @@ class MobileManipulationNode(MissionNode):
         node.create_subscription(PoseArray, "tote_poses", self._on_tote_poses, self.skills.samples)
 
     def _on_joint_states(self, message: JointState) -> None:
-        self._joints = dict(zip(message.name, message.position.tolist(), strict=True))
-        self._efforts = dict(zip(message.name, message.effort.tolist(), strict=False))  # empty: not measured
+        self._joint_states = message
+
+    def _measured(self, what: str) -> dict[str, float]:
+        """Return the joints' `position` or `effort`; none if that is not measured."""
+        state = self._joint_states
+        return dict(zip(state.name, getattr(state, what).tolist(), strict=False))
 
     def _on_tote_poses(self, message: PoseArray) -> None:
         totes = [pose2_from_pose(pose) for pose in message.poses]
@@ -222,7 +225,7 @@ class MobileManipulationNode(MissionNode):
         return self._call(name, self._trajectory, goal)
 
     def _trajectory_goal(self, target: dict[str, float], speed: float) -> Any:
-        trajectory = plan_joint_move(self._joints, target, self._arm.limits, speed=speed)
+        trajectory = plan_joint_move(self._measured("position"), target, self._arm.limits, speed=speed)
         way = zip(trajectory.times, trajectory.positions, trajectory.velocities, strict=True)
         points = [
             new(
@@ -273,8 +276,8 @@ class MobileManipulationNode(MissionNode):
 
     def _grip_fault(self, width: float) -> str | None:
         """Return what the finger's encoder and drive tell against a grip, if anything."""
-        finger = self._joints.get(self._gripper_joint, 0.0)
-        effort = self._efforts.get(self._gripper_joint)
+        finger = self._measured("position").get(self._gripper_joint, 0.0)
+        effort = self._measured("effort").get(self._gripper_joint)
         if abs(finger - width / 2.0) > self.skills.grip_tolerance:
             return f"finger at {finger:.3f} m instead of {width / 2.0:.3f} m"
         if effort is not None and abs(effort) < self.skills.least_grip * self._grip_effort:

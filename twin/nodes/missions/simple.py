@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
@@ -15,8 +15,10 @@ from twin.bridge.types import ActionType
 from twin.navigation.behavior_trees.node import TreeNode
 from twin.nodes.missions.leaves import CallAction, Do, WaitUntil, sequence
 from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
-from twin.nodes.navigation.exploration.explorer import ExplorerNode
 from twin.periods import next_due
+
+if TYPE_CHECKING:
+    from twin.nodes.navigation.exploration.explorer import ExplorerNode
 
 _SETTLE_NS = 1_000_000_000
 """After the last velocity, until the robot stands [ns]."""

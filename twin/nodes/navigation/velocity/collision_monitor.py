@@ -152,6 +152,8 @@ class CollisionMonitorNode:
                 found.append((here.inverse() @ T_odom_sensor).apply(reading.points))
             elif timeout:
                 return None
+        if len(found) == 1:
+            return found[0]
         return np.concatenate(found) if found else np.zeros((0, 2))
 
     def _measured_from(self, reading: _Reading | None, timeout_ns: int) -> Pose2 | None:
