@@ -92,7 +92,8 @@ def test_the_graph_names_types_qos_and_owners(endpoint: str) -> None:
         publisher = node.create_publisher(String, "map", LATCHED)
         node.create_subscription(Twist, "/cmd_vel", print, 1)
         node.create_service(AddTwoInts, "~/add", lambda request: None)
-        assert process.spin(until=lambda: "/robot/amcl/add" in graph.services(), timeout_s=10)
+        named = {"/cmd_vel", "/robot/map", "/robot/amcl/add"}  # they are told in no order
+        assert process.spin(until=lambda: named <= {*graph.topics(), *graph.services()}, timeout_s=10)
         assert graph.topics()["/cmd_vel"] == ("geometry_msgs/msg/Twist",)
         assert graph.topics()["/robot/map"] == ("std_msgs/msg/String",)
         assert graph.services()["/robot/amcl/add"] == ("example_interfaces/srv/AddTwoInts",)
