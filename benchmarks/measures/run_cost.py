@@ -52,16 +52,16 @@ def costs(scenario: Scenario, limit: Replay, *, record: bool) -> dict[str, list[
     """Return the CPU time [s] of limit, run and, if wanted, recorded run, block by block in turns."""
     limit.rewind()
     with tempfile.TemporaryDirectory() as folder, ExitStack() as ending:
-        advance: dict[str, Callable[[float], object]] = {"limit": limit.advance}
+        turns: dict[str, Callable[[float], object]] = {"limit": limit.advance}
         for name in ("run", "recorded") if record else ("run",):
             run = OpenRun(scenario, out=Path(folder), record=name == "recorded")
             ending.callback(run.close)
-            advance[name] = partial(advance, run)
+            turns[name] = partial(advance, run)
         gc.freeze()  # as a run does
         ending.callback(gc.unfreeze)
-        taken: dict[str, list[float]] = {name: [] for name in advance}
+        taken: dict[str, list[float]] = {name: [] for name in turns}
         for block in range(1, math.ceil(limit.simulated_s / BLOCK_S) + 1):
-            for name, until in advance.items():
+            for name, until in turns.items():
                 began = time.process_time()
                 until(block * BLOCK_S)
                 time.sleep(SETTLE_S)

@@ -12,18 +12,23 @@ from benchmarks.measures import run_cost
 from benchmarks.measures.layers import LAYERS, picture
 from benchmarks.measures.replay import Replay
 from benchmarks.measures.run_cost import SCENARIOS
-from twin.scenario.schema import load
+from twin.scenario.schema import Scenario, load
 
 
 @pytest.fixture(scope="module")
 def replay() -> Replay:
     """One of a second in which a cart passes and the robot is carried elsewhere."""
+    return run_cost.replay(second())
+
+
+def second() -> Scenario:
+    """A second of a drive."""
     overrides = {
         "duration": "1 s",
         "faults": "[{kidnapping: {at: 0.5 s, to: {x: 1 m, yaw: 90 deg}}}]",
         "world.obstacles": "[{name: cart, pose: {x: 1.5, y: 1}, size: [1, 1, 1], route: [[3, 2]]}]",
     }
-    return run_cost.replay(load(SCENARIOS / "diff_bot_figure8.yaml", overrides))
+    return load(SCENARIOS / "diff_bot_figure8.yaml", overrides)
 
 
 def test_a_replay_ends_as_the_run_did_and_can_be_done_again(replay: Replay) -> None:
@@ -33,6 +38,13 @@ def test_a_replay_ends_as_the_run_did_and_can_be_done_again(replay: Replay) -> N
     replay.advance(math.inf)
     replay.rewind()
     replay.advance(math.inf)
+
+
+def test_runs_and_their_limit_take_turns_to_the_end(replay: Replay) -> None:
+    taken = run_cost.costs(second(), replay, record=True)
+    assert list(taken) == ["limit", "run", "recorded"]
+    assert {len(blocks) for blocks in taken.values()} == {math.ceil(1.0 / run_cost.BLOCK_S)}
+    assert all(sum(blocks) > 0.0 for blocks in taken.values())
 
 
 def test_a_replay_that_leaves_something_out_is_no_limit(replay: Replay) -> None:
