@@ -37,6 +37,7 @@ WALL_CLOCK = {
     "twin/runtime/open_run.py": {"perf_counter", "process_time"},  # how long the run took
     "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
+    "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock
     "twin/bridge/graph.py": {"monotonic", "sleep"},  # waits for other processes to say who they are

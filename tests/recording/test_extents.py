@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -37,10 +38,12 @@ class Leaving:
 
 
 def drive(path: Path, world: Leaving, *, close: bool) -> Recording:
+    """Record eight seconds, in real time."""
     sink = RerunSink(path)
-    sink.declare(world)
-    for world.time_ns in range(0, 8_000_000_001, 40_000_000):
-        sink.on_tick(world)
+    with patch("twin.recording.sink.monotonic_ns", lambda: world.time_ns):
+        sink.declare(world)
+        for world.time_ns in range(0, 8_000_000_001, 40_000_000):
+            sink.on_tick(world)
     if close:
         sink.close()
     return read(path)

@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic_ns
 from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
@@ -31,6 +32,22 @@ _COLLECTING = 0.9
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 
 
+class _Moment(NamedTuple):
+    """A time that is over when both clocks say so, since a run may be slower or faster than the wall's."""
+
+    simulated_ns: int
+    wall_ns: int
+
+    @classmethod
+    def after(cls, time_ns: int, wait_ns: int) -> _Moment:
+        """Return the moment so long [ns] after a simulated time [ns], which is now."""
+        return cls(time_ns + wait_ns, monotonic_ns() + wait_ns)
+
+    def is_over(self, time_ns: int) -> bool:
+        """Whether it is over at a simulated time [ns], which is now."""
+        return time_ns >= self.simulated_ns and monotonic_ns() >= self.wall_ns
+
+
 @dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
     """What a recording keeps."""
@@ -38,7 +55,7 @@ class RecordingConfig:
     poses_hz: float = 25.0
     """Rate at which poses of bodies, trails and errors are sampled; only what moved is kept."""
     loss_s: float = 1.0
-    """A killed run loses at most so much simulated time at its end [s]."""
+    """A killed run loses at most so much of its end [s]: simulated, or of wall time if it is faster."""
     move_tolerance: float = 1e-4
     """A body has moved when a coordinate [m] or quaternion component differs by more from what was kept."""
     trail_step_m: float = 0.05
@@ -61,7 +78,7 @@ class RerunSink:
 
     The simulator's truth is drawn in `world`; a lidar's points lie where it truly saw them; what the robot
     believes is a ghost with a trail of its own. The run puts rows aside, and makes columns of a block of
-    simulated time at once, which Rerun's threads encode and write while the run goes on. At most one block is
+    time at once, which Rerun's threads encode and write while the run goes on. At most one block is
     under way: a run waits for a slow disk, and loses nothing. Order: construct, `bus.tap(sink.on_sample)`,
     `declare(world)`, then `on_tick(world)` after every tick and `close(verdict)`.
     """
@@ -92,6 +109,7 @@ class RerunSink:
         self._period = period_of(self._config.poses_hz)
         self._block_ns = round(_NS * _COLLECTING * self._config.loss_s)
         self._writing_ns = round(_NS * (1.0 - _COLLECTING) * self._config.loss_s)
+        self._block_end = self._written = _Moment(0, 0)
         self._under_way = False
         self._closed = False
 
@@ -140,7 +158,7 @@ class RerunSink:
         declare_frames(self._recording, frames)
         self._set_stage()
         declare_shapes(self._recording, shapes, world.pose)
-        self._next_pose_ns = self._next_block_ns = self._written_ns = world.time_ns
+        self._next_pose_ns = world.time_ns
         self.on_tick(world)
         self._takers.clear()
         early, self._early = self._early, []
@@ -166,11 +184,11 @@ class RerunSink:
         if time_ns >= self._next_pose_ns:
             self._next_pose_ns = next_due(self._period, time_ns)
             self._poses.rows.append((time_ns, *world.body_poses()))
-        if time_ns >= self._next_block_ns:
+        if self._block_end.is_over(time_ns):
             self._send()
-            self._next_block_ns += self._block_ns * (1 + (time_ns - self._next_block_ns) // self._block_ns)
-            self._written_ns = time_ns + self._writing_ns
-        elif self._under_way and time_ns >= self._written_ns:
+            self._block_end = _Moment.after(time_ns, self._block_ns)
+            self._written = _Moment.after(time_ns, self._writing_ns)
+        elif self._under_way and self._written.is_over(time_ns):
             self._wait()
 
     def close(self, verdict: dict[str, Any] | None = None) -> None:
