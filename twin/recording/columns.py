@@ -1,8 +1,8 @@
 """Columns of Rerun's components, made of whole arrays.
 
-Rerun's cost is per column, not per row: so rows wait for a block of simulated time, and become Arrow arrays
-at once. `columns` of Rerun's archetypes does the same at several times the cost of sending. Importing this
-module imports rerun (0.4 s): only a run that records does.
+Rerun's cost is per column, not per row: so rows wait for a block of time, and become Arrow arrays at once.
+`columns` of Rerun's archetypes does the same at several times the cost of sending. Importing this module
+imports rerun (0.4 s): only a run that records does.
 """
 
 from __future__ import annotations
