@@ -1,0 +1,1 @@
+"""Gymnasium environments: vectors of small worlds at the speed of physics, and any scenario as one."""
