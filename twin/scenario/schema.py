@@ -13,6 +13,7 @@ from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
+from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
@@ -54,6 +55,8 @@ class Scenario(StrictModel):
     """What must hold for the run to pass."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
+    test: CasesConfig = CasesConfig()
+    """With which seeds and values it is a test; `twin run` does not look at it."""
 
     _parts_fit = faultless(consistency.faults)
 

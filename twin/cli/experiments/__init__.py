@@ -1,0 +1,1 @@
+"""Commands about many runs, and what there is to say of one."""
