@@ -108,7 +108,10 @@ def read(path: Path) -> Recording:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # it needs none
         reader = rc.RrdReader(check_recording(path))
-    stores = reader.recordings()
+    try:
+        stores = reader.recordings()
+    except RuntimeError as fault:
+        raise RecordingError(f"{path}: the recording is damaged: {fault}") from fault
     if not stores:
         raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
     store = stores[0]
