@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 """As `typing` has it, which need not be imported for it: Ctrl-C finds nothing to interrupt here."""
 if TYPE_CHECKING:
     from twin.api.bags import Bag, read_bag
-    from twin.api.files import load_arena, load_scenario, read_recording
+    from twin.api.files import load_arena, load_scenario, read_recording, read_runs
     from twin.api.robot import Robot, load_robot
     from twin.api.simulation import Simulation, run
     from twin.api.truth import Truth
@@ -47,6 +47,7 @@ __all__ = [
     "msgs",
     "read_bag",
     "read_recording",
+    "read_runs",
     "run",
     "srvs",
 ]
@@ -72,6 +73,7 @@ _HOMES = {
     "load_scenario": "twin.api.files",
     "read_bag": "twin.api.bags",
     "read_recording": "twin.api.files",
+    "read_runs": "twin.api.files",
     "run": "twin.api.simulation",
 }
 _MODULES = {"actions": "twin.bridge.action_types", "msgs": "twin.bridge.msgs", "srvs": "twin.bridge.srvs"}
