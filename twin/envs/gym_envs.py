@@ -28,7 +28,8 @@ class NavigationEnv(gym.Env[Observation, Observation]):
     def __init__(self, navigation: Navigation, render_mode: str | None = None) -> None:
         self.navigation = navigation
         self.render_mode = _known(render_mode)
-        self.action_space, self.observation_space = navigation.spaces
+        self.action_space = navigation.agent.action_space
+        self.observation_space = navigation.agent.observation_space
         self._seed = self._episode = -1
 
     def reset(
@@ -68,7 +69,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
             raise GymError(f"max_episode_steps is {max_episode_steps}; valid: a whole number from 1 on")
         self.navigation, self.num_envs = navigation, navigation.count
         self.render_mode = _known(render_mode)
-        self.single_action_space, self.single_observation_space = navigation.spaces
+        self.single_action_space = navigation.agent.action_space
+        self.single_observation_space = navigation.agent.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._longest = max_episode_steps or np.iinfo(np.int64).max

@@ -6,13 +6,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from twin.envs import kernels
+from twin.envs.agent import DrivingAgent
 from twin.envs.kernels import Floats32
 from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
@@ -106,6 +106,9 @@ class Outcome(NamedTuple):
 class Navigation:
     """n environments on one course, without any convention of gymnasium's on top."""
 
+    POINTS: ClassVar[int] = 1
+    """That robots drive to."""
+
     def __init__(self, config: NavigationConfig, course: Course, robot: DrivenRobot, n: int, threads: int):
         self.config, self.course, self.count = config, course, n
         self.simulations = Simulations(
@@ -118,13 +121,9 @@ class Navigation:
             threads=threads,
         )
         self._ticks = round(config.decision_period / config.control_period)
-        drive = robot.drive
-        self._fastest = np.array([drive.linear.max_velocity, drive.angular.max_velocity])
-        self._low, self._high = self._bounds(robot)
-        actions: Space[Any] = Box(-1.0, 1.0, (2,), np.float32)
-        observations: Space[Any] = Box(self._low, self._high, dtype=np.float32)
-        self.spaces = actions, observations
-        """Of one environment."""
+        self.agent = DrivingAgent(
+            robot.drive, robot.lidar, beams=config.beams, points=self.POINTS, farthest=config.goal_range
+        )
         self._episodes = [Episode(0, 0)] * n
         self.steps = np.zeros(n, np.int64)
         """Steps since the start of each episode."""
@@ -133,13 +132,6 @@ class Navigation:
         self._goals, self._starts = np.zeros((n, 2)), np.zeros((n, 3))
         self._actions, self._distance = np.zeros((n, 2)), np.zeros(n)
         self._noise = np.zeros((n, config.beams))
-
-    def _bounds(self, robot: DrivenRobot) -> tuple[Floats32, Floats32]:
-        v, w = 1.5 * self._fastest
-        low = np.concatenate(([0.0, -1.0, -1.0, -v, -w, -1.0, -1.0], np.zeros(self.config.beams)))
-        far = np.full(self.config.beams, robot.lidar.range_max)
-        high = np.concatenate(([self.config.goal_range, 1.0, 1.0, v, w, 1.0, 1.0], far))
-        return low.astype(np.float32), high.astype(np.float32)
 
     def begin(self, i: int, episode: Episode, options: Mapping[str, Any] | None = None) -> None:
         """Let environment `i` begin an episode; `options` may say where `start` and `goal` are."""
@@ -164,7 +156,7 @@ class Navigation:
         """
         simulations, reward = self.simulations, self.config.reward
         self._actions = np.clip(actions, -1.0, 1.0)
-        wanted = self._actions * self._fastest
+        wanted = self.agent.velocities(self._actions)
         collision = np.zeros(self.count, np.bool_)
         for _ in range(self._ticks):
             collision |= simulations.tick(wanted)
@@ -190,11 +182,20 @@ class Navigation:
         for row, i in zip(noise, which, strict=True):
             row[:] = self._episodes[i].normal(int(self.steps[i]), len(row))
         ranges = simulations.scan(simulations.hits(rows), noise, rows)
-        odometry = simulations.states.odometry[rows]
-        polar = np.empty((len(odometry), 3))
-        kernels.locate(self._starts[rows], odometry, self._goals[rows], polar)
-        found = np.concatenate((polar, odometry[:, 3:], self._actions[rows], ranges), axis=1)
-        return np.clip(found.astype(np.float32), self._low, self._high)
+        poses, points = self._believed(rows), self._points(rows)
+        speeds = simulations.states.odometry[rows, 3:]
+        return self.agent.observe(poses, points, speeds, self._actions[rows], ranges)
+
+    def _believed(self, rows: Rows) -> Array:
+        """Return where robots believe that they are in the world, shape (n, 3); here: by dead reckoning."""
+        starts = self._starts[rows]
+        poses = np.empty_like(starts)
+        kernels.compose(starts, self.simulations.states.odometry[rows], poses)
+        return poses
+
+    def _points(self, rows: Rows) -> Array:
+        """Return the points that robots drive to, shape (n, POINTS, 2) [m]; here: their goals."""
+        return self._goals[rows, None]
 
 
 def _with_options(layout: Layout, options: Mapping[str, Any] | None) -> Layout:
