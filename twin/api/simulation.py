@@ -289,7 +289,7 @@ class Simulation(Participant):
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""
-        from twin.runtime.kept_run import HASHES
+        from twin.recording.hashes import HASHES
         from twin.scenario.verdict import VERDICT
 
         self._held.enter_context(written_alone(make_folder(folder)))

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
+HASHES = "hashes.json"
+"""The file of a run's folder that has them."""
 PERIOD_NS = 1_000_000_000
 """What one hash covers [ns] of simulated time."""
 

@@ -10,11 +10,9 @@ from typing import Self
 from twin.errors import RecordingError
 from twin.files.reading import absence, read_text
 from twin.files.writing import write_whole
-from twin.recording.hashes import RunHashes
+from twin.recording.hashes import HASHES, RunHashes
 from twin.scenario.provenance import Provenance
 
-HASHES = "hashes.json"
-"""The file in a run's folder."""
 _FORMAT = 1
 _MOST_BYTES = 100_000_000
 

@@ -16,7 +16,8 @@ from twin.errors import RecordingError
 from twin.experiments.diff import Difference, Side, compare, made_again, of_path
 from twin.experiments.diff.changes import since
 from twin.experiments.diff.difference import PHYSICS
-from twin.runtime.kept_run import HASHES, KeptRun
+from twin.recording.hashes import HASHES
+from twin.runtime.kept_run import KeptRun
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import load
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from twin.errors import RecordingError
 from twin.plugins import execution
-from twin.runtime.kept_run import HASHES, KeptRun
+from twin.recording.hashes import HASHES
+from twin.runtime.kept_run import KeptRun
 from twin.runtime.open_run import OpenRun
 from twin.scenario import catalogue
 from twin.scenario.outside import Outside
