@@ -289,11 +289,12 @@ class Simulation(Participant):
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""
+        from twin.recording.hashes import HASHES
         from twin.scenario.verdict import VERDICT
 
         self._held.enter_context(written_alone(make_folder(folder)))
         self.folder = folder
-        for file in (folder / "junit.xml", folder / VERDICT):
+        for file in (folder / "junit.xml", folder / HASHES, folder / VERDICT):
             check_file(file, "--out")
             file.unlink(missing_ok=True)
 

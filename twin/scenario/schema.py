@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
@@ -20,9 +21,9 @@ from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
+from twin.scenario.source import NOWHERE, Source
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import StrictModel
-from twin.strict_yaml import load as load_yaml
+from twin.strict_yaml import Document, StrictModel, checked, read
 
 
 class Scenario(StrictModel):
@@ -55,7 +56,13 @@ class Scenario(StrictModel):
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
 
+    _source: Source = PrivateAttr(NOWHERE)
     _parts_fit = faultless(consistency.faults)
+
+    @property
+    def source(self) -> Source:
+        """What the file says, from which the scenario can be read again."""
+        return self._source
 
     @property
     def tasks(self) -> tuple[Mission, ...]:
@@ -78,7 +85,10 @@ class Scenario(StrictModel):
         )
         if all(robot.navigation is None for robot in robots):
             raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
-        return self.model_copy(update={"robots": robots})
+        changed = self.model_copy(update={"robots": robots})
+        navigates = [robot.navigation is not None for robot in robots]
+        changed._source = self._source.with_params_file(str(path), navigates)
+        return changed
 
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
         """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
@@ -100,8 +110,22 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    file = catalogue.resolve(name_or_path)
-    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
+
+
+def load_again(
+    source: Source, overrides: Mapping[str, str] = MappingProxyType({}), *, execute: bool = False
+) -> Scenario:
+    """Return the scenario of what was read earlier; see `load`."""
+    document = Document(source.file, deepcopy(source.data))
+    return _checked(document, overrides, execute)
+
+
+def _checked(document: Document, overrides: Mapping[str, str], execute: bool) -> Scenario:
+    context = {"execute": execute}
+    scenario = checked(document, Scenario, error=ScenarioError, overrides=overrides, context=context)
+    scenario._source = Source(document.file.absolute(), document.data)
+    return scenario
 
 
 def json_schema() -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -23,7 +23,7 @@ from twin.sim.robot import RobotHandle, RobotPlacement
 from twin.sim.scene import Scene
 from twin.sim.sensors import Mount, create_sensor
 from twin.sim.shapes import BodyShape, shapes
-from twin.sim.work import WorkMeter
+from twin.sim.work import StepMeter, StepWatch, WorkMeter
 
 
 class World:
@@ -57,7 +57,7 @@ class World:
         """Physics steps since the start."""
         self._motion_step = self._contact_step = -1
         self._contacts: list[Contact] | None = None
-        self._work_meter: WorkMeter | None = None
+        self._work_meter: StepMeter | None = None
         mujoco.mj_forward(self.model, self.data)
 
         self._guard = DivergenceGuard(self.model, self.data)
@@ -219,6 +219,10 @@ class World:
     def measure_work(self) -> None:
         """Add up the work of actuators from now on; it costs a little of each step."""
         self._work_meter = WorkMeter(self.model, self.data, tuple(self.robots))
+
+    def watch_steps(self, callback: Callable[[], None]) -> None:
+        """Call back after every single physics step from now on."""
+        self._work_meter = StepWatch(callback, self._work_meter)
 
     def work(self, robot: str) -> float:
         """Return the mechanical work of a robot's actuators, as far as it was measured [J].

@@ -1,0 +1,1 @@
+"""Commands about many runs: what differs between two, the smallest failure, known-bad stacks."""
