@@ -102,6 +102,8 @@ class OpenRun:
         self._outside = outside
         self._sink = _recording(scenario, out) if record else None
         self._wall_s = self._cpu_s = 0.0
+        self._thought = False
+        """Whether a tick is under way, at an agent's place."""
         bag_tap = None
         if bag is not None:
             from twin.bridge.bags.tap import BagTap
@@ -178,6 +180,31 @@ class OpenRun:
                         )
                     )
             return False
+
+    def advance_to_agent(self, until: Callable[[], bool]) -> bool:
+        """Go on until a condition holds at an agent's place in a tick, or the run is over; see `Run.think`.
+
+        The tick under way is finished first. All ticks together are those of `advance`.
+
+        Args:
+            until: Asked in each tick when its nodes have run.
+
+        Raises:
+            TwinError: The run cannot go on.
+        """
+        run = self.run
+        guard.take_again()
+        with self._executed.going_on(), self._timed():
+            while True:
+                if self._thought:
+                    run.act()
+                    self._thought = False
+                if run.over:
+                    return False
+                run.think()
+                self._thought = True
+                if until():
+                    return True
 
     @contextmanager
     def _timed(self) -> Iterator[None]:

@@ -30,6 +30,8 @@ class Run:
     """A built scenario that can be ticked; `PHASES` is the order of one tick."""
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
+    THINKING = 2
+    """So many phases are over when all nodes have run and nothing has been done yet: an agent's place."""
 
     def __init__(
         self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
@@ -84,6 +86,16 @@ class Run:
     def tick(self) -> None:
         """Advance by one tick."""
         for phase in self._phases:
+            phase()
+
+    def think(self) -> None:
+        """Begin a tick, up to the place of an agent, who acts as a node would that runs after all others."""
+        for phase in self._phases[: self.THINKING]:
+            phase()
+
+    def act(self) -> None:
+        """Go on to the end of the tick that `think` began."""
+        for phase in self._phases[self.THINKING :]:
             phase()
 
     def admit(self) -> None:
