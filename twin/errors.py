@@ -9,7 +9,7 @@ TwinError
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── PluginError       a user's plugin lacks something, cannot be found, or fails while it runs
 ├── RecordingError    a recording cannot be written or read
-├── EnvError          a scenario is no environment for such an agent, or an action is none
+├── GymError          a gymnasium environment was made or used wrongly
 └── SimulationError   the physics cannot go on (diverged)
 
 The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and
@@ -117,8 +117,8 @@ class RecordingError(TwinError):
     """A recording cannot be written or read."""
 
 
-class EnvError(TwinError):
-    """A scenario is no environment for such an agent, or an action is none."""
+class GymError(TwinError, ValueError):
+    """A gymnasium environment was made or used wrongly."""
 
 
 class SimulationError(TwinError):

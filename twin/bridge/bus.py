@@ -75,7 +75,7 @@ class Bus:
         self.announced: Callable[[Endpoint], None] | None = None
         """Called with every new endpoint."""
         self.hold_goal: Callable[[ActionClient, ClientGoal, Any], bool] | None = None
-        """Is shown each goal before a node sends its message, and may hold it back: see `ActionClient.post`."""
+        """Is shown each goal before its message is sent, and may hold it back: see `ActionClient.post`."""
         self._put_offs: list[tuple[Member, Any]] = []
         self._nodes: list[Node] = []
         self._away: frozenset[str] = frozenset()

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
+_LIVE_S = 0.2
+"""A viewer is as much behind the run, at most."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -71,6 +73,7 @@ class OpenRun:
         save_model: Path | None = None,
         workers: int = 0,
         savings: Savings = ALL,
+        viewer: str | None = None,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -90,6 +93,7 @@ class OpenRun:
             save_model: Folder for the compiled world as MJCF.
             workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
+            viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -100,7 +104,7 @@ class OpenRun:
         self._digest = RunDigest()
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out) if record else None
+        self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._thought = False
         """Whether a tick is under way, at an agent's place."""
@@ -199,6 +203,8 @@ class OpenRun:
                 if self._thought:
                     run.act()
                     self._thought = False
+                    if self._pace is not None:
+                        self._pace.keep(run.world.time_ns * 1e-9)
                 if run.over:
                     return False
                 run.think()
@@ -339,14 +345,15 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
-    if out is None or not scenario.recording.enabled:
+def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> RerunSink | None:
+    if viewer is None and (out is None or not scenario.recording.enabled):
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
-    return RerunSink(
-        out / f"{scenario.name}.rrd",
-        config=config,
-        recording_id=f"{scenario.name}-{scenario.seed}",
-    )
+    rate, name = scenario.recording.poses_hz, f"{scenario.name}-{scenario.seed}"
+    if viewer is not None:
+        # Each is a recording of its own, which the viewer turns to.
+        live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
+        return RerunSink(viewer, config=live, recording_id=f"{name}-{time.monotonic_ns()}")
+    assert out is not None
+    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)

@@ -58,7 +58,7 @@ class Run:
 
             self.lockstep = Lockstep(self.bus, outside)
         self.workers: Workers | None = None
-        self._obstacles = ObstacleSchedule(
+        self.obstacles = ObstacleSchedule(
             self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
         )
         self.faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
@@ -118,9 +118,9 @@ class Run:
         """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
-        if self._obstacles.active:
+        if self.obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
-            self._obstacles.update(bases)
+            self.obstacles.update(bases)
         self.faults.update()
 
     def step(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -18,12 +17,15 @@ from twin.envs.scenario.episode import Episode
 from twin.envs.scenario.observations.channel import Channel
 from twin.envs.scenario.observations.observer import Observer
 from twin.envs.scenario.rewards import Reward, require_terms
-from twin.errors import EnvError, nearest
+from twin.envs.scenario.screen import Screen
+from twin.errors import GymError, nearest
 from twin.savings import uncollected
 from twin.scenario.overrides import read_scenario
 from twin.scenario.schema import Scenario
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+_OF_THE_VERDICT = ("scenario", "seed", "verdict", "checks", "digest")
+"""What is the same in two equal runs; `episode.verdict` has all."""
 _SEEDS = 2**31
 """Seeds of runs that are not given are drawn below this."""
 
@@ -36,7 +38,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
     settle), `truncated` when its time is up. Then `info` has the verdict, with the digest of the run.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  gymnasium's own type
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"]}  # noqa: RUF012  gymnasium's own type
 
     def __init__(
         self,
@@ -66,21 +68,21 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         require_terms(self._weights)
         self._ticks = self._kind.ticks if ticks is None else ticks
         if not (isinstance(self._ticks, int) and self._ticks >= min(1, self._kind.ticks)):
-            raise EnvError(f"ticks={ticks!r}: valid is a whole number of control periods, 1 or more")
+            raise GymError(f"ticks={ticks!r}: valid is a whole number of control periods, 1 or more")
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             valid = ", ".join(self.metadata["render_modes"])
-            raise EnvError(f"there is no render_mode '{render_mode}'; valid: {valid}")
+            raise GymError(f"there is no render_mode '{render_mode}'; valid: {valid}")
         self.render_mode = render_mode
-        self._size = width, height
+        self._screen = Screen(render_mode, width, height)
         self._read = read_scenario(scenario, self._overrides)
         self._episode: Episode | None = None
         self._over = False
-        self._begin(self._read)
+        self._begin(self._read)  # to see what there is
         assert self._episode is not None
         period = self._episode.period_ns * 1e-9
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / (max(1, self._ticks) * period)))}
         self.observation_space, self.action_space = self._observer.space, self._agent.action_space
-        self.close()
+        self._end()
 
     # -- gymnasium -------------------------------------------------------------------------------------------
 
@@ -107,8 +109,8 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         self._begin(scenario.model_copy(update={"seed": seed}))
         spaces: list[gym.Space[Any]] = [self._observer.space, self._agent.action_space]
         if spaces != [self.observation_space, self.action_space]:
-            self.close()
-            raise EnvError(
+            self._end()
+            raise GymError(
                 f"the options of reset change the spaces of the environment of '{scenario.name}'; "
                 "make another environment with them as overrides"
             )
@@ -117,7 +119,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         assert episode is not None
         if episode.over:
             self._over = True
-            raise EnvError(
+            raise GymError(
                 f"the run of '{scenario.name}' was over after {episode.time:g} s before its agent had "
                 f"anything to decide: its mission was '{episode.parts.mission.state}'"
             )
@@ -128,12 +130,12 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         """Act, and go on to the next decision or the end of the run.
 
         Raises:
-            EnvError: The action is none, or there is no run.
+            GymError: The action is none, or there is no run.
             TwinError: The run cannot go on.
         """
         episode = self._episode
         if episode is None or self._over:
-            raise EnvError("the run is over, or has not begun; call reset()")
+            raise GymError("the run is over, or has not begun; call reset()")
         self._agent.act(self._checked(action))
         self._advance(self._ticks)
         self._over = episode.over
@@ -141,40 +143,59 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         info = self._info()
         info["reward_terms"] = terms
         if episode.verdict is not None:
-            info["verdict"] = episode.verdict.to_dict()
+            verdict = episode.verdict.to_dict()
+            info["verdict"] = {name: verdict[name] for name in _OF_THE_VERDICT}
             info["is_success"] = episode.verdict.exit_code == 0
         done = episode.over and episode.parts.mission.done
         return self._observer.observe(), sum(terms.values()), done, episode.over and not done, info
 
+    def render(self) -> Any:
+        """Return a picture of the robot from above, shape (height, width, 3), if the mode is `rgb_array`.
+
+        Raises:
+            GymError: There is no run, or this computer can draw nothing.
+        """
+        return self._screen.draw(self.episode)
+
     def close(self) -> None:
-        """End the run. Harmless when repeated."""
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
+        """End the run, and the viewer. Harmless when repeated."""
+        self._end()
+        self._screen.close()
 
     # -- inside ----------------------------------------------------------------------------------------------
+
+    @property
+    def agent(self) -> Agent:
+        """The agent of the run under way."""
+        return self._agent
 
     @property
     def episode(self) -> Episode:
         """The run under way: its nodes, its world, its mission.
 
         Raises:
-            EnvError: There is none.
+            GymError: There is none.
         """
         if self._episode is None:
-            raise EnvError("there is no run; call reset()")
+            raise GymError("there is no run; call reset()")
         return self._episode
 
+    def _end(self) -> None:
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
     def _begin(self, scenario: Scenario) -> None:
-        self.close()
+        self._end()
         self._over = False
         with uncollected():
-            self._episode = episode = Episode(self._kind.prepared(scenario, self._config), self._robot)
+            prepared = self._kind.prepared(scenario, self._config)
+            self._episode = episode = Episode(prepared, self._robot, self._screen.address)
             try:
                 self._agent = self._kind(episode, self._config)
                 self._observer = Observer(episode, self._agent, self._wanted)
             except BaseException:
-                self.close()
+                self._end()
                 raise
 
     def _advance(self, ticks: int) -> None:
@@ -193,24 +214,24 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         try:
             episode.advance(due)
         except BaseException:
-            self.close()  # a tick that was broken off cannot be resumed
+            self._end()  # a tick that was broken off cannot be resumed
             raise
 
     def _checked(self, action: Any) -> Values:
         """Return an action within the bounds.
 
         Raises:
-            EnvError: It has another shape, or is not finite.
+            GymError: It has another shape, or is not finite.
         """
         space = self._agent.action_space
         try:
             values = np.asarray(action, dtype=space.dtype)
         except (TypeError, ValueError):
-            raise EnvError(f"the action {action!r} is no array of numbers; valid is {space}") from None
+            raise GymError(f"the action {action!r} is no array of numbers; valid is {space}") from None
         if values.shape != space.shape:
-            raise EnvError(f"the action has the shape {values.shape}; valid is {space.shape}")
+            raise GymError(f"the action has the shape {values.shape}; valid is {space.shape}")
         if not np.isfinite(values).all():
-            raise EnvError(f"the action {values} is not finite; valid is {space}")
+            raise GymError(f"the action {values} is not finite; valid is {space}")
         return np.clip(values, space.low, space.high)
 
     def _info(self) -> dict[str, Any]:
@@ -220,9 +241,11 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             "time_s": episode.time,
             "ticks": episode.ticks,
             "mission": episode.parts.mission.state,
-            "mission_goal": np.array((math.nan,) * 3 if goal is None else goal),
+            "mission_goal": np.array((0.0, 0.0, 0.0) if goal is None else goal),
+            "has_goal": goal is not None,
             "goals_reached": episode.task.reached,
             "checks": {check.name: check.result().passed for check in episode.run.checks},
+            **self._agent.info(),
         }
 
 
@@ -230,11 +253,11 @@ def agent_of(agent: str | type[Agent]) -> type[Agent]:
     """Return a kind of agent by its name.
 
     Raises:
-        EnvError: There is none of that name.
+        GymError: There is none of that name.
     """
     if isinstance(agent, str):
         if agent not in AGENTS:
-            raise EnvError(f"there is no agent '{agent}'; {nearest(agent, AGENTS)}")
+            raise GymError(f"there is no agent '{agent}'; {nearest(agent, AGENTS)}")
         return AGENTS[agent]
     return agent
 
@@ -243,15 +266,15 @@ def config_of(kind: type[Agent], settings: Mapping[str, Any]) -> Any:
     """Return an agent's configuration.
 
     Raises:
-        EnvError: It has no such setting, or needs another.
+        GymError: It has no such setting, or needs another.
     """
     names = [field.name for field in fields(kind.Config)]
     for name in settings:
         if name not in names:
             more = ("agent", "observe", "overrides", "render_mode", "reward", "robot", "ticks")
             said = nearest(name, [*names, *more])
-            raise EnvError(f"an environment of the agent {kind.__name__} has no setting '{name}'; {said}")
+            raise GymError(f"an environment of the agent {kind.__name__} has no setting '{name}'; {said}")
     try:
         return kind.Config(**settings)
     except TypeError as error:
-        raise EnvError(f"the agent {kind.__name__}: {error}") from None
+        raise GymError(f"the agent {kind.__name__}: {error}") from None

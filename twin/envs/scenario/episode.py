@@ -9,7 +9,7 @@ from twin.bridge.msgs import ns
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Publisher
 from twin.envs.scenario.task import Task
-from twin.errors import EnvError, nearest
+from twin.errors import GymError, nearest
 from twin.geometry import Pose2
 from twin.runtime import OpenRun
 from twin.runtime.stacks.robot import RobotStack
@@ -40,19 +40,20 @@ class Heard:
 class Episode:
     """A run, the robot that the agent is about, its task, and what the agent's node has heard."""
 
-    def __init__(self, scenario: Scenario, robot: str | None = None) -> None:
+    def __init__(self, scenario: Scenario, robot: str | None = None, viewer: str | None = None) -> None:
         """Build the run, up to its first tick.
 
         Args:
             scenario: What to run.
             robot: Its name; None: the only one, or the only one with a mission.
+            viewer: Address of a Rerun viewer that shows it, at the pace of real time.
 
         Raises:
             TwinError: The run cannot be made, or has no such robot.
         """
         robot = robot_of(scenario, robot)
         self.scenario = scenario
-        self._opened = OpenRun(scenario, record=False)
+        self._opened = OpenRun(scenario, viewer=viewer, pace=None if viewer is None else 1.0)
         self.run = run = self._opened.run
         self.parts, self.world = run.parts, run.world
         self.stack: RobotStack = run.parts.stacks[robot]
@@ -140,19 +141,19 @@ class Episode:
         """Return who publishes a topic.
 
         Raises:
-            EnvError: Nobody does.
+            GymError: Nobody does.
         """
         name = self.node.resolve_name(topic)
         if name not in self._publishers:
             valid = [shown for shown in self._publishers if "/_action/" not in shown]
-            raise EnvError(f"the scenario '{self.scenario.name}' has no topic {name}; {nearest(name, valid)}")
+            raise GymError(f"the scenario '{self.scenario.name}' has no topic {name}; {nearest(name, valid)}")
         return self._publishers[name]
 
     def hear(self, topic: str) -> Heard:
         """Return what will always be the last message on a topic.
 
         Raises:
-            EnvError: Nobody publishes it.
+            GymError: Nobody publishes it.
         """
         heard, node, publisher = Heard(), self.node, self.publisher(topic)
         qos = QoS(depth=1, durability=publisher.qos.durability, reliability=publisher.qos.reliability)
@@ -165,18 +166,18 @@ def robot_of(scenario: Scenario, name: str | None) -> str:
     """Return the robot that an agent is about.
 
     Raises:
-        EnvError: There is none of that name, or several to choose from.
+        GymError: There is none of that name, or several to choose from.
     """
     robots = [robot.id for robot in scenario.robots]
     if name is not None:
         if name not in robots:
-            raise EnvError(f"the scenario '{scenario.name}' has no robot '{name}'; {nearest(name, robots)}")
+            raise GymError(f"the scenario '{scenario.name}' has no robot '{name}'; {nearest(name, robots)}")
         return name
     busy = [task.robot for task in scenario.tasks if not isinstance(task, Idle) and task.robot in robots]
     for choice in (robots, busy):
         if len(choice) == 1 and choice[0] is not None:
             return choice[0]
-    raise EnvError(
+    raise GymError(
         f"the scenario '{scenario.name}' has several robots; say which one the agent is about with "
         f"robot=...: {', '.join(robots)}"
     )

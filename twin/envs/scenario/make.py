@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,22 +64,22 @@ def make_env(
     Raises:
         TwinError: The scenario cannot be run, or is no environment for this agent.
     """
-    register_scenarios()
-    made = gym.make(
-        ID,
-        scenario=scenario,
-        agent=agent,
-        robot=robot,
-        observe=observe,
-        reward=reward,
-        ticks=ticks,
-        overrides=dict(overrides),
-        render_mode=render_mode,
-        width=width,
-        height=height,
+    options: dict[str, Any] = {
+        "scenario": scenario,
+        "agent": agent,
+        "robot": robot,
+        "observe": observe,
+        "reward": reward,
+        "ticks": ticks,
+        "overrides": dict(overrides),
+        "render_mode": render_mode,
+        "width": width,
+        "height": height,
         **settings,
-    ).unwrapped
-    assert isinstance(made, ScenarioEnv)
+    }
+    made = ScenarioEnv(**options)
+    register_scenarios()
+    made.spec = replace(gym.spec(ID), kwargs=options)
     return made
 
 

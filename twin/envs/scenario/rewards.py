@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 from twin.envs.scenario.episode import Episode
-from twin.errors import EnvError, nearest
+from twin.errors import GymError, nearest
 
 
 class Term(ABC):
@@ -22,7 +22,7 @@ class Term(ABC):
 
 
 class Progress(Term):
-    """Metres that the robot came nearer to the mission's goal, by the truth; all that was left at the goal."""
+    """Metres that the robot came nearer to the mission's goal, by the truth; there, all that was left."""
 
     def __init__(self, episode: Episode) -> None:
         super().__init__(episode)
@@ -127,8 +127,8 @@ def require_terms(weights: Mapping[str, float]) -> None:
     """Check the names of terms.
 
     Raises:
-        EnvError: One is not known.
+        GymError: One is not known.
     """
     for name in weights:
         if name not in TERMS:
-            raise EnvError(f"there is no reward '{name}'; {nearest(name, TERMS)}")
+            raise GymError(f"there is no reward '{name}'; {nearest(name, TERMS)}")

@@ -36,7 +36,7 @@ class Agent(ABC):
         """Take a run before its first tick, and an object of `Config`.
 
         Raises:
-            EnvError: The scenario is no environment for this agent.
+            GymError: The scenario is no environment for this agent.
         """
         self.episode, self.config = episode, config
 
@@ -63,6 +63,10 @@ class Agent(ABC):
 
     def observe(self) -> dict[str, Values]:
         """Return what it is shown beside topics."""
+        return {}
+
+    def info(self) -> dict[str, Values]:
+        """Return what else `info` tells of its decision."""
         return {}
 
 

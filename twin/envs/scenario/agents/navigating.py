@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from twin.envs.scenario.agents.agent import Agent, Values
 from twin.envs.scenario.episode import Episode
-from twin.errors import EnvError
+from twin.errors import GymError
 from twin.geometry import Pose2
 
 
@@ -22,7 +22,7 @@ class NavigatingAgent(Agent):
         if not episode.task.is_set:
             scenario = episode.scenario
             kinds = ", ".join(dict.fromkeys(task.type for task in scenario.tasks))
-            raise EnvError(
+            raise GymError(
                 f"the scenario '{scenario.name}' has no goal for robot '{episode.stack.name}': its mission "
                 f"({kinds}) sends none to navigate_to_pose; valid are missions that do, such as behaviors "
                 "with a step navigate_to_pose, random_goals, explore or pick_and_place"

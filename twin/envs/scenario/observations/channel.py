@@ -38,7 +38,7 @@ class Channel(ABC):
         """Return shape and bounds, which are finite.
 
         Raises:
-            EnvError: This robot, or this type, has no such thing.
+            GymError: This robot, or this type, has no such thing.
         """
 
     @abstractmethod

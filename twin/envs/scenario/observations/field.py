@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from twin.envs.scenario.episode import Episode
 from twin.envs.scenario.observations.channel import Channel, Values
-from twin.errors import EnvError
+from twin.errors import GymError
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Field(Channel):
     def space(self, episode: Episode) -> spaces.Box:
         """Return the bounds."""
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            raise EnvError(
+            raise GymError(
                 f"the bounds of {self.topic} are {self.low} and {self.high}; valid are finite ones"
             )
         return spaces.Box(self.low, self.high, (self.size,), np.float32)
@@ -45,7 +45,7 @@ class Field(Channel):
         try:
             found = np.atleast_1d(np.asarray(reduce(getattr, path, message), float)).ravel()[: self.size]
         except (AttributeError, TypeError, ValueError):
-            raise EnvError(
+            raise GymError(
                 f"{self.topic} is no number, or array of numbers, of {type(message).__name__}"
             ) from None
         values = np.zeros(self.size)

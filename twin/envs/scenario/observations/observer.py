@@ -15,7 +15,7 @@ from twin.envs.scenario.observations.costmap import Costmap
 from twin.envs.scenario.observations.odometry import Odometry
 from twin.envs.scenario.observations.pose import PoseInMap
 from twin.envs.scenario.observations.scan import Scan
-from twin.errors import EnvError, nearest
+from twin.errors import GymError, nearest
 
 OLDEST_S = 10.0
 """Older than this is as good as nothing, which counts as so old [s]."""
@@ -41,7 +41,7 @@ class Observer:
             wanted: Names of topics, or channels; None: what is usual, as far as it is there.
 
         Raises:
-            EnvError: A topic that is not there, or whose type nothing shows.
+            GymError: A topic that is not there, or whose type nothing shows.
         """
         self._episode, self._agent = episode, agent
         self.channels: tuple[Channel, ...] = tuple(
@@ -52,7 +52,7 @@ class Observer:
         for key in {*keys, "age", *agent.observation_spaces()}:
             taken = keys.count(key) + (key == "age") + (key in agent.observation_spaces())
             if taken > 1:
-                raise EnvError(f"two parts of the observation are called '{key}'")
+                raise GymError(f"two parts of the observation are called '{key}'")
         self._heard: list[Heard] = [episode.hear(channel.name) for channel in self.channels]
         self._boxes = [channel.space(episode) for channel in self.channels]
         ages = {"age": spaces.Box(0.0, OLDEST_S, (len(keys),), np.float32)} if keys else {}
@@ -82,13 +82,13 @@ def channel_of(topic: str, episode: Episode) -> Channel:
     """Return what shows a topic of which only the name is given.
 
     Raises:
-        EnvError: It is not there, or nothing shows its type.
+        GymError: It is not there, or nothing shows its type.
     """
     if "." in topic:
-        raise EnvError(f"a field needs bounds: Field({topic!r}, low, high) of twin.envs.scenario")
+        raise GymError(f"a field needs bounds: Field({topic!r}, low, high) of twin.envs.scenario")
     msgtype = episode.publisher(topic).msgtype
     if msgtype not in CHANNELS:
-        raise EnvError(
+        raise GymError(
             f"{topic} carries {msgtype}, of which a field with bounds can be shown, as in "
             f"Field('{topic}.<field>', low, high); {nearest(msgtype, CHANNELS)}"
         )

@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from twin.envs.scenario.episode import Episode
 from twin.envs.scenario.observations.channel import Channel, Values
-from twin.errors import EnvError
+from twin.errors import GymError
 from twin.sensors.lidar import LidarSpec
 
 
@@ -26,7 +26,7 @@ class Scan(Channel):
         spec = self._spec(episode)
         count = spec.samples if self.beams is None else self.beams
         if not 1 <= count <= spec.samples:
-            raise EnvError(f"{self.topic} has {spec.samples} beams; valid is a number of them, not {count}")
+            raise GymError(f"{self.topic} has {spec.samples} beams; valid is a number of them, not {count}")
         return spaces.Box(0.0, spec.range_max, (count,), np.float32)
 
     def values(self, message: Any, episode: Episode) -> Values:
@@ -44,4 +44,4 @@ class Scan(Channel):
             spec = sensor.sensor.spec
             if isinstance(spec, LidarSpec) and sensor.node.resolve_name(spec.topic) == name:
                 return spec
-        raise EnvError(f"{self.topic} is no lidar's of robot '{episode.stack.name}'")
+        raise GymError(f"{self.topic} is no lidar's of robot '{episode.stack.name}'")
