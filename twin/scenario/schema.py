@@ -19,6 +19,7 @@ from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
+from twin.scenario.pass_rate import PassRate
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.source import NOWHERE, Source
@@ -53,6 +54,8 @@ class Scenario(StrictModel):
     """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
+    pass_rate: PassRate | None = None
+    """What share of the runs of `twin sweep` is to pass; absent: all."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
 

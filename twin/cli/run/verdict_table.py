@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-_STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta"}
+STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta", "inconclusive": "bold yellow"}
 
 
 def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
@@ -56,7 +56,7 @@ def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
     for verdict in verdicts:
         metrics = verdict["metrics"]
         table.add_row(
-            Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]]),
+            Text(verdict["verdict"].upper(), style=STYLE[verdict["verdict"]]),
             Text(verdict["scenario"]),
             str(verdict["seed"]),
             _seconds(metrics.get("sim_time_s")),
@@ -69,7 +69,7 @@ def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
         for reason in _reasons(verdict)
     ]
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
-    style = _STYLE["pass" if passed == len(verdicts) else "fail"]
+    style = STYLE["pass" if passed == len(verdicts) else "fail"]
     return Group(table, *reasons, Text(f"{passed} of {len(verdicts)} passed", style=style))
 
 
@@ -88,7 +88,7 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
         parts.append(f"in {metrics['wall_time_s']:.1f} s")
     if "real_time_factor" in metrics:
         parts.append(f"({metrics['real_time_factor']:.1f}x real time)")
-    text = Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]])
+    text = Text(verdict["verdict"].upper(), style=STYLE[verdict["verdict"]])
     text.append("  " + " ".join(parts), style="not bold default")
     if verdict["digest"] is not None:
         text.append(f"  digest {verdict['digest'][:12]}", style="not bold dim default")
