@@ -14,6 +14,7 @@ from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
+from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
@@ -58,6 +59,8 @@ class Scenario(StrictModel):
     """What share of the runs of `twin sweep` is to pass; absent: all."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
+    test: CasesConfig = CasesConfig()
+    """With which seeds and values it is a test; `twin run` does not look at it."""
 
     _source: Source = PrivateAttr(NOWHERE)
     _parts_fit = faultless(consistency.faults)
