@@ -46,7 +46,7 @@ def span(geometry: Geometry, R: Array) -> tuple[Array, Array]:
         mesh = read_mesh(geometry.path, apply_up_axis=geometry.apply_up_axis)
         points = (mesh.points * geometry.scale) @ R.T
         return points.min(axis=0), points.max(axis=0)
-    half = np.array([reach(geometry, row) for row in R])
+    half = np.array([reach(geometry, row) for row in R.tolist()])
     return -half, half
 
 
