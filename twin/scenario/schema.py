@@ -12,6 +12,7 @@ from pydantic import Field
 from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
+from twin.savings import uncollected
 from twin.scenario import catalogue, consistency
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
@@ -101,7 +102,8 @@ def load(
         PluginError: A plugin that was executed is wrong.
     """
     file = catalogue.resolve(name_or_path)
-    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    with uncollected():
+        return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
 
 
 def json_schema() -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -39,7 +39,7 @@ def _defaults(msgtype: str) -> tuple[dict[str, Value], dict[str, Callable[[], An
     makers: dict[str, Callable[[], Any]] = {}
     for name, description in types.store.fielddefs[msgtype][1]:
         field, default = normalize_fieldname(name), values.get(name)
-        node, value = description  # type: ignore[assignment]
+        node, value = cast("tuple[Nodetype, Any]", description)
         if node == Nodetype.BASE:
             constants[field] = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
         else:
