@@ -100,7 +100,7 @@ def build(
     if scenario.world.arena is not None:
         from twin.warehouse import arena as arenas
 
-        arena = arenas.load(scenario.world.arena)
+        arena = arenas.shared(scenario.world.arena)
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
     reading = ReadOptions(sensors=tuple(map(SENSORS.find, scenario.sensors)), execute=True)

@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr
 from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
+from twin.savings import uncollected
 from twin.scenario import catalogue, consistency
 from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
@@ -116,7 +117,8 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
+    with uncollected():
+        return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
 
 
 def load_again(

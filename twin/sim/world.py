@@ -14,7 +14,7 @@ from twin.errors import ScenarioError, nearest
 from twin.files.writing import write_whole
 from twin.geometry import Array, Pose3
 from twin.savings import ALL, Savings
-from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
+from twin.sim.compose import FLOOR, build_spec, static_geom
 from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
 from twin.sim.hardware import Hardware
@@ -45,12 +45,11 @@ class World:
         visuals: bool,
         savings: Savings,
     ) -> None:
-        self._spec = build_spec(scene, robots, physics)
         self._placements = tuple(robots)
         self.scene, self.physics, self.seed, self.crash_folder = scene, physics, seed, crash_folder
         self.savings = savings
         """What is not done over again."""
-        self.model = (self._spec if visuals else without_visuals(self._spec)).compile()
+        self.model = build_spec(scene, robots, physics, visuals=visuals).compile()
         self.data = mujoco.MjData(self.model)
         self.timestep_ns = physics.timestep_ns
         self.step_count = 0
@@ -251,7 +250,7 @@ class World:
     def save_model(self, folder: Path) -> Path:
         """Write the world as `world.xml` with its meshes in `assets/`, for any MuJoCo tool."""
         folder.mkdir(parents=True, exist_ok=True)
-        spec = self._spec.copy()
+        spec = build_spec(self.scene, self._placements, self.physics)
         for name, content in spec.assets.items():
             asset = folder / "assets" / name
             asset.parent.mkdir(parents=True, exist_ok=True)
