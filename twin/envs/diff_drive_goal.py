@@ -56,7 +56,7 @@ class Room(Course):
             )
             for i, size in enumerate(config.boxes)
         )
-        self.scene = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
+        self.scene = self.looks = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
         self._radii = [math.hypot(*size) / 2.0 for size in config.boxes]
 
     def _walls(self) -> list[StaticBody]:
