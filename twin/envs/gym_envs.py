@@ -17,7 +17,7 @@ from twin.errors import GymError
 from twin.geometry import Array
 
 Observation = NDArray[np.float32]
-METADATA: dict[str, Any] = {"render_modes": [], "render_fps": 10}
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 class NavigationEnv(gym.Env[Observation, Observation]):
@@ -52,6 +52,14 @@ class NavigationEnv(gym.Env[Observation, Observation]):
         info = {name: values[0].item() for name, values in _info(outcome).items()}
         over = bool(outcome.success[0] or outcome.collision[0])
         return self.navigation.observe()[0], float(outcome.reward[0]), over, False, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, shape (480, 640, 3), of the present state."""
+        return self.navigation.picture(0) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Free what drawing took."""
+        self.navigation.close()
 
 
 class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
@@ -134,6 +142,16 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         info.update(final_obs=final, _final_obs=mask, final_info=_masked(last, mask), _final_info=mask.copy())
         observations[over] = self.navigation.observe(over)
         info["distance"][over] = self.navigation.distances()[over]
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each environment, shape (480, 640, 3), in its present state."""
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(self.navigation.picture(i) for i in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free what drawing took."""
+        self.navigation.close()
 
 
 def _known(render_mode: str | None) -> str | None:

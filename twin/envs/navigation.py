@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from twin.envs import kernels
 from twin.envs.agent import DrivingAgent
 from twin.envs.kernels import Floats32
+from twin.envs.picture import Mark, Painter
 from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import ALL, Rows, Simulations
@@ -23,6 +25,8 @@ from twin.sim.scene import Scene
 
 _HIDDEN_M = -20.0
 """Height of what is not there in an episode: no ray and no robot comes so low."""
+_NEAR_M = 8.0
+"""Distance of a camera that follows a robot."""
 _OPTIONS = ("start", "goal")
 
 
@@ -90,6 +94,8 @@ class Course(ABC):
     """As it is simulated."""
     looks: Scene
     """As it is drawn: perhaps with more that never moves."""
+    overview: float | None
+    """From where a picture shows everything around the origin [m]; None: pictures follow the robot."""
 
     @abstractmethod
     def layout(self, episode: Episode) -> Layout:
@@ -211,6 +217,30 @@ class Navigation:
         poses = np.empty_like(starts)
         kernels.compose(starts, self.simulations.states.odometry[rows], poses)
         return poses
+
+    def picture(self, i: int) -> NDArray[np.uint8]:
+        """Return a picture of environment `i`: goal in green, other points to drive to in blue.
+
+        Raises:
+            GymError: This computer can draw nothing.
+        """
+        row = np.array([i])
+        points = self._points(row, self._believed(row, np.zeros((1, self.NOISES))))[0].tolist()
+        marks = [Mark(points[0], self.config.goal_tolerance, (0.15, 0.7, 0.25, 0.9))]
+        marks += [Mark(point, 0.1, (0.1, 0.4, 0.9, 0.9)) for point in points[1:]]
+        robot = self.simulations.root[i, :3] * (1.0, 1.0, 0.0)
+        if (distance := self.course.overview) is None:
+            return self._painter.draw(i, marks, robot, _NEAR_M)
+        return self._painter.draw(i, marks, (0.0, 0.0, 0.0), distance)
+
+    @cached_property
+    def _painter(self) -> Painter:
+        return Painter(self.simulations, self.course.looks)
+
+    def close(self) -> None:
+        """Free what drawing took."""
+        if "_painter" in self.__dict__:
+            self.__dict__.pop("_painter").close()
 
     def _points(self, rows: Rows, poses: Array) -> Array:
         """Return the points that robots drive to, shape (n, POINTS, 2) [m]; here: their goals."""

@@ -71,6 +71,8 @@ class WarehouseNavConfig(NavigationConfig):
 class Aisles(Course):
     """What of an arena a driving robot can meet."""
 
+    overview = None
+
     def __init__(self, config: WarehouseNavConfig) -> None:
         self.config = config
         arena = arenas.load(config.arena)
