@@ -17,17 +17,20 @@ from twin.errors import GymError
 from twin.geometry import Array
 
 Observation = NDArray[np.float32]
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+_FPS = 10
 
 
 class NavigationEnv(gym.Env[Observation, Observation]):
     """One environment."""
 
-    metadata: ClassVar[dict[str, Any]] = METADATA  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": _FPS,
+    }
 
     def __init__(self, navigation: Navigation, render_mode: str | None = None) -> None:
         self.navigation = navigation
-        self.render_mode = _known(render_mode)
+        self.render_mode = _known(render_mode, self.metadata)
         self.action_space = navigation.agent.action_space
         self.observation_space = navigation.agent.observation_space
         self._seed = self._episode = -1
@@ -42,6 +45,8 @@ class NavigationEnv(gym.Env[Observation, Observation]):
             self._episode = -1
         self._episode += 1
         self.navigation.begin(0, Episode(self._seed, self._episode), options)
+        if self.render_mode == "human":
+            self.navigation.begin_showing()
         return self.navigation.observe()[0], {"distance": float(self.navigation.distances()[0])}
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -49,16 +54,18 @@ class NavigationEnv(gym.Env[Observation, Observation]):
         if self._episode < 0:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
         outcome = self.navigation.act(_checked(np.asarray(action)[None], (1, 2)))
+        if self.render_mode == "human":
+            self.navigation.show()
         info = {name: values[0].item() for name, values in _info(outcome).items()}
         over = bool(outcome.success[0] or outcome.collision[0])
         return self.navigation.observe()[0], float(outcome.reward[0]), over, False, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture, shape (480, 640, 3), of the present state."""
+        """Return a picture, shape (480, 640, 3), of the present state; `human` shows each step by itself."""
         return self.navigation.picture(0) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Free what drawing took."""
+        """Free what drawing took, and end the viewer."""
         self.navigation.close()
 
 
@@ -66,7 +73,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     """n environments; one that is over begins its next episode within the same step."""
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        **METADATA,
+        "render_modes": ["rgb_array"],
+        "render_fps": _FPS,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
@@ -76,7 +84,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         if max_episode_steps is not None and max_episode_steps < 1:
             raise GymError(f"max_episode_steps is {max_episode_steps}; valid: a whole number from 1 on")
         self.navigation, self.num_envs = navigation, navigation.count
-        self.render_mode = _known(render_mode)
+        self.render_mode = _known(render_mode, self.metadata)
         self.single_action_space = navigation.agent.action_space
         self.single_observation_space = navigation.agent.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -154,9 +162,10 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         self.navigation.close()
 
 
-def _known(render_mode: str | None) -> str | None:
-    if render_mode is not None and render_mode not in METADATA["render_modes"]:
-        raise GymError(f"render_mode is {render_mode!r}; valid: {METADATA['render_modes']} or None")
+def _known(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        valid = ", ".join(metadata["render_modes"])
+        raise GymError(f"render_mode is {render_mode!r}; valid: {valid}, or None")
     return render_mode
 
 

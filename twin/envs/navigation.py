@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from twin.envs.simulations import ALL, Rows, Simulations
 from twin.errors import GymError, nearest
 from twin.geometry import Array, Pose2, quat_wxyz_from_yaw
 from twin.sim.scene import Scene
+
+if TYPE_CHECKING:
+    from twin.envs.live import LiveWindow
 
 _HIDDEN_M = -20.0
 """Height of what is not there in an episode: no ray and no robot comes so low."""
@@ -233,14 +236,42 @@ class Navigation:
             return self._painter.draw(i, marks, robot, _NEAR_M)
         return self._painter.draw(i, marks, (0.0, 0.0, 0.0), distance)
 
+    def begin_showing(self) -> None:
+        """Show that the first environment begins an episode in Rerun's viewer, which starts if need be.
+
+        Raises:
+            RecordingError: There is no viewer, or it does not start.
+        """
+        episode, layout = self._episodes[0], self.layouts[0]
+        assert layout is not None, "an episode has begun"
+        name = f"seed {episode.seed}, episode {episode.number}"
+        self._window.begin(name, layout.goal, self.config.goal_tolerance)
+        self.show()
+
+    def show(self) -> None:
+        """Show the first environment's present state."""
+        simulations, first = self.simulations, np.array([0])
+        (origins,), (directions,) = simulations.rays(first)
+        (hits,) = simulations.hits(first)
+        seen = (hits > 0.0) & (hits < simulations.robot.lidar.range_max)
+        elapsed = int(self.steps[0]) * round(self.config.decision_period * 1e9)
+        self._window.show(elapsed, (origins + hits[:, None] * directions)[seen])
+
+    @cached_property
+    def _window(self) -> LiveWindow:
+        from twin.envs.live import LiveWindow  # imports rerun, which takes 0.4 s
+
+        return LiveWindow(self.simulations, self.course.looks)
+
     @cached_property
     def _painter(self) -> Painter:
         return Painter(self.simulations, self.course.looks)
 
     def close(self) -> None:
-        """Free what drawing took."""
-        if "_painter" in self.__dict__:
-            self.__dict__.pop("_painter").close()
+        """Free what drawing took, and end the viewer."""
+        for name in ("_painter", "_window"):
+            if name in self.__dict__:
+                self.__dict__.pop(name).close()
 
     def _points(self, rows: Rows, poses: Array) -> Array:
         """Return the points that robots drive to, shape (n, POINTS, 2) [m]; here: their goals."""

@@ -113,11 +113,16 @@ class Simulations:
             which = int(np.argmin(finite))
             raise SimulationError(f"the physics of environment {which} diverged; reset it")
 
-    def hits(self, rows: Rows = ALL) -> Array:
-        """Cast the rays of some lidars at present; return distances, -1 for no hit, shape (n, beams) [m]."""
+    def rays(self, rows: Rows = ALL) -> tuple[Array, Array]:
+        """Return where the rays of some lidars begin [m], shape (n, 1, 3), and point, shape (n, beams, 3)."""
         poses = self.root[rows]
         origins, directions = np.empty((len(poses), 1, 3)), np.empty((len(poses), *self._beams.shape))
         kernels.aim(poses, self._mount, self._beams, origins, directions)
+        return origins, directions
+
+    def hits(self, rows: Rows = ALL) -> Array:
+        """Cast the rays of some lidars at present; return distances, -1 for no hit, shape (n, beams) [m]."""
+        origins, directions = self.rays(rows)
         ids = None if isinstance(rows, slice) else rows
         distances, _ = self.batch.ray(
             origins, directions, geomgroup=self.robot.seen, bodyexclude=self._lidar_body, ids=ids
