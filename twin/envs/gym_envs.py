@@ -53,7 +53,7 @@ class NavigationEnv(gym.Env[Observation, Observation]):
         """Drive for a decision period."""
         if self._episode < 0:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(np.asarray(action)[None], (1, 2)))
+        outcome = self.navigation.act(_checked(_one(action), 1))
         if self.render_mode == "human":
             self.navigation.show()
         info = {name: values[0].item() for name, values in _info(outcome).items()}
@@ -92,19 +92,38 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         self._longest = max_episode_steps or np.iinfo(np.int64).max
         self._seeds: list[int] = []
         self._episodes = [-1] * self.num_envs
+        self._observations = np.zeros(self.observation_space.shape or (), np.float32)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin episodes: a number seeds environment i with itself plus i; without one the next episodes."""
-        first = seed if isinstance(seed, int | np.integer) else None
-        super().reset(seed=None if first is None else int(first))
-        self._take_seeds(seed)
-        for i in range(self.num_envs):
-            self._begin(i, options)
-        return self.navigation.observe(), _masked({"distance": self.navigation.distances()})
+        """Begin episodes: a number seeds environment i with itself plus i; without one the next episodes.
 
-    def _take_seeds(self, seed: int | Sequence[int | None] | None) -> None:
+        Args:
+            seed: One, or one for each environment (None: go on with that which it has).
+            options: `start` and `goal` for all, as of one environment; `reset_mask`, shape (n,): only where
+                it is True an episode begins, the observations of the others are as they were.
+        """
+        options = dict(options or {})
+        which = self._chosen(options.pop("reset_mask", None))
+        first = int(seed) if isinstance(seed, int | np.integer) else None
+        super().reset(seed=first)
+        self._take_seeds(seed, which)
+        for i in which:
+            self._begin(int(i), options)
+        self._observations[which] = self.navigation.observe(which)
+        return self._observations.copy(), _masked({"distance": self.navigation.distances()})
+
+    def _chosen(self, mask: Any) -> NDArray[np.intp]:
+        if mask is None:
+            return np.arange(self.num_envs)
+        if not self._seeds:
+            raise GymError("option 'reset_mask' of a first reset; valid: from the second reset on")
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise GymError(f"option 'reset_mask' is {mask!r}; valid: {self.num_envs} booleans in an array")
+        return np.flatnonzero(mask)
+
+    def _take_seeds(self, seed: int | Sequence[int | None] | None, which: NDArray[np.intp]) -> None:
         given: Sequence[int | None]
         if seed is None:
             given = [None] * self.num_envs
@@ -116,8 +135,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
             raise GymError(f"{len(given)} seeds for {self.num_envs} environments; valid: one for each")
         if not self._seeds:
             self._seeds = self.np_random.integers(2**31, size=self.num_envs).tolist()
-        for i, value in enumerate(given):
-            if value is not None:
+        for i in which:
+            if (value := given[i]) is not None:
                 self._seeds[i], self._episodes[i] = int(value), -1
 
     def _begin(self, i: int, options: Mapping[str, Any] | None = None) -> None:
@@ -130,14 +149,15 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         """Drive for a decision period; who is over then begins anew."""
         if not self._seeds:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(np.asarray(actions), (self.num_envs, 2)))
+        outcome = self.navigation.act(_checked(np.asarray(actions), self.num_envs))
         terminated = outcome.success | outcome.collision
         truncated = self.navigation.steps >= self._longest
         observations, info = self.navigation.observe(), _masked(_info(outcome))
         over = np.flatnonzero(terminated | truncated)
         if len(over):
             self._begin_anew(over, observations, info)
-        return observations, outcome.reward, terminated, truncated, info
+        self._observations = observations
+        return observations.copy(), outcome.reward, terminated, truncated, info
 
     def _begin_anew(self, over: NDArray[np.intp], observations: Observation, info: dict[str, Any]) -> None:
         mask = np.zeros(self.num_envs, np.bool_)
@@ -169,17 +189,31 @@ def _known(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
     return render_mode
 
 
-def _checked(actions: NDArray[Any], shape: tuple[int, ...]) -> Array:
-    """Return actions as numbers.
+_VALID = "linear and angular velocity, each in [-1, 1]"
+
+
+def _one(action: ArrayLike) -> NDArray[Any]:
+    """Return the action of one environment as a row of its own."""
+    given = np.asarray(action)
+    if given.shape != (2,):
+        raise GymError(f"the action has shape {given.shape}; valid: (2,), {_VALID}")
+    return given[None]
+
+
+def _checked(actions: NDArray[Any], n: int) -> Array:
+    """Return n actions as numbers; what is beyond [-1, 1] counts as there.
 
     Raises:
         GymError: They have another shape, or are not finite.
     """
-    if actions.shape != shape:
-        wanted, given = ("(2,)", actions.shape[1:]) if shape[0] == 1 else (str(shape), actions.shape)
-        raise GymError(f"action of shape {given}; valid: {wanted}, linear and angular velocity in [-1, 1]")
-    if actions.dtype.kind not in "fiu" or not np.isfinite(actions).all():
-        raise GymError(f"action {actions.tolist()} has what is no finite number; valid: [-1, 1]")
+    if actions.shape != (n, 2):
+        raise GymError(f"actions have shape {actions.shape}; valid: {(n, 2)}, of {_VALID}")
+    if actions.dtype.kind not in "fiu":
+        raise GymError(f"actions are of type {actions.dtype}; valid: numbers, of {_VALID}")
+    finite = np.isfinite(actions).all(axis=1)
+    if not finite.all():
+        which = int(np.argmin(finite))
+        raise GymError(f"the action of environment {which} is {actions[which].tolist()}; valid: {_VALID}")
     return actions.astype(np.float64)
 
 

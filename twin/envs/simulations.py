@@ -148,6 +148,11 @@ class _Randomiser:
         self._tyres = np.flatnonzero(np.isin(bodies, wheels.body) & (model.geom_contype > 0))
         self._tyre_is_left = np.isin(bodies[self._tyres], wheels.body[wheels.is_left])
         self._up = _up_in_parents(model, wheels.body)
+        # Sizes that are the radius: of an ellipsoid, as a tyre is made of, two; otherwise the first.
+        sizes = model.geom_size[self._tyres]
+        ellipsoid = model.geom_type[self._tyres] == mujoco.mjtGeom.mjGEOM_ELLIPSOID
+        largest = np.isclose(sizes, sizes.max(axis=1, keepdims=True))
+        self._round = np.where(ellipsoid[:, None], largest, [True, False, False])
         self._model, self._data = copy.copy(model), mujoco.MjData(model)
         nominal = ("body_mass", "body_inertia", "body_pos", "geom_friction", "geom_size")
         self._nominal = {name: getattr(model, name).copy() for name in nominal}
@@ -170,7 +175,8 @@ class _Randomiser:
         tyres = self._tyres
         model.geom_friction[tyres, 0] = nominal["geom_friction"][tyres, 0] * draw.friction
         factors = np.where(self._tyre_is_left, draw.radius_left, draw.radius_right)
-        model.geom_size[tyres, 0] = nominal["geom_size"][tyres, 0] * factors
+        grown = np.where(self._round, factors[:, None], 1.0)
+        model.geom_size[tyres] = nominal["geom_size"][tyres] * grown
         # Axles move up with the radius, or the robot would lose its casters or its wheels the ground.
         factors = np.where(self._is_left, draw.radius_left, draw.radius_right)
         rise = self._radii() * (factors - 1.0)

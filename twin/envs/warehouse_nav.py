@@ -23,6 +23,7 @@ from twin.geometry import Array, Pose2, Pose3
 from twin.models.shapes import Box
 from twin.sim.scene import PlacedBody, Shape, StaticBody
 from twin.warehouse import arena as arenas
+from twin.warehouse.arena_scene import PALETTE
 from twin.warehouse.map_files import map_of_arena
 
 _LOW = 0.3
@@ -76,8 +77,12 @@ class Aisles(Course):
     def __init__(self, config: WarehouseNavConfig) -> None:
         self.config = config
         arena = arenas.load(config.arena)
-        boxes = tuple(_placed(f"box_{i}", (*size, _BOX_HEIGHT)) for i, size in enumerate(config.boxes))
-        walkers = tuple(_placed(f"walker_{i}", walker.size) for i, walker in enumerate(config.walkers))
+        boxes = tuple(
+            _placed(f"box_{i}", (*size, _BOX_HEIGHT), "orange") for i, size in enumerate(config.boxes)
+        )
+        walkers = tuple(
+            _placed(f"walker_{i}", walker.size, "yellow") for i, walker in enumerate(config.walkers)
+        )
         whole = arena.scene()
         self.looks = replace(whole, placed=(*boxes, *walkers))
         self.scene = replace(self.looks, statics=tuple(_low(whole.statics)))
@@ -180,8 +185,8 @@ class WarehouseNavigation(Navigation):
         return points
 
 
-def _placed(name: str, size: tuple[float, float, float]) -> PlacedBody:
-    shape = Shape(geometry=Box(size=size), rgba=(0.85, 0.33, 0.10, 1.0))
+def _placed(name: str, size: tuple[float, float, float], colour: str) -> PlacedBody:
+    shape = Shape(geometry=Box(size=size), rgba=PALETTE[colour])
     return PlacedBody(name=name, T_world_body=Pose3.from_xyz_rpy((0.0, 0.0, size[2] / 2.0)), shapes=(shape,))
 
 
