@@ -40,6 +40,11 @@ def _suite(verdict: Mapping[str, Any]) -> ElementTree.Element:
     properties = ElementTree.SubElement(suite, "properties")
     for key in ("seed", "digest", "cpu"):
         ElementTree.SubElement(properties, "property", name=key, value=_text(str(verdict[key])))
+    for fault in verdict["faults"]:
+        told = ": ".join(filter(None, (fault["outcome"], fault["effect"])))
+        ElementTree.SubElement(
+            properties, "property", name=_text(f"fault.{fault['name']}"), value=_text(told)
+        )
     suite.extend(cases)
     return suite
 

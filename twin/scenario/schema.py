@@ -7,9 +7,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from twin.errors import ScenarioError
+from twin.errors import Problem, ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
@@ -21,8 +21,9 @@ from twin.scenario.observation import CheckContext
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import StrictModel
+from twin.strict_yaml import Loc, StrictModel
 from twin.strict_yaml import load as load_yaml
+from twin.strict_yaml.document import Document
 
 
 class Scenario(StrictModel):
@@ -56,6 +57,16 @@ class Scenario(StrictModel):
     """What goes into the Rerun recording."""
 
     _parts_fit = faultless(consistency.faults)
+    _document: Document | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _keep_lines(self, info: ValidationInfo) -> Scenario:
+        self._document = (info.context or {}).get("document")
+        return self
+
+    def problem(self, loc: Loc, message: str) -> Problem:
+        """Return what is wrong with a value that was valid by itself, at its line if there is a file."""
+        return Problem(message) if self._document is None else self._document.problem(loc, message)
 
     @property
     def tasks(self) -> tuple[Mission, ...]:

@@ -64,7 +64,7 @@ def load(
             folder as `info.context["folder"]`.
         error: What to raise.
         overrides: Dotted path to YAML text, e.g. `{"robots.0.pose.yaw": "90 deg"}`.
-        context: What else validators find in `info.context`.
+        context: What else validators find in `info.context`, beside the `document`.
 
     Raises:
         TwinError: As `error`, with every problem of the file and of the overrides, in file order.
