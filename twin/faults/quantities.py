@@ -12,11 +12,11 @@ from twin.geometry import Array
 
 
 def values_of(thing: Any) -> Mapping[str, Any]:
-    """Return the fields of a reading by name, but for its header."""
+    """Return the fields of a reading by name, but for its header and its type."""
     if hasattr(thing, "_asdict"):
         return dict(thing._asdict())
     fields = (field.name for field in dataclasses.fields(thing))
-    return {name: getattr(thing, name) for name in fields if name != "header"}
+    return {name: getattr(thing, name) for name in fields if name not in ("header", "__msgtype__")}
 
 
 def numbers(thing: Any) -> list[str]:
@@ -47,10 +47,10 @@ def altered(reading: Any, path: str, change: Callable[[Array], Array]) -> Any:
         made = change(value).astype(value.dtype, copy=False)
         made.setflags(write=False)
         return with_field(reading, head, made)
-    names = [field.name for field in dataclasses.fields(value)]
-    made = change(np.array([getattr(value, name) for name in names]))
+    parts = values_of(value)
+    made = change(np.array(list(parts.values())))
     return with_field(
-        reading, head, dataclasses.replace(value, **dict(zip(names, made.tolist(), strict=True)))
+        reading, head, dataclasses.replace(value, **dict(zip(parts, made.tolist(), strict=True)))
     )
 
 
