@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -65,6 +67,10 @@ def test_a_run_without_faults_imports_and_does_nothing_for_them(drive: Drive) ->
     assert ended.run.faults is None
     assert ended.run.bus.link is None
     assert "alterations" not in vars(ended.run.world)
+    script = "import sys; from twin import Simulation; Simulation('diff_bot_figure8', out=None).start()"
+    script += "; print([name for name in sys.modules if name.startswith('twin.faults')])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_errors_have_their_lines_all_at_once(tmp_path: Path) -> None:
