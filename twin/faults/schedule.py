@@ -83,7 +83,9 @@ class FaultSchedule:
                 self._watched.append(self._prepared(entry, name, context))
             except Faults as wrong:
                 loc = ("faults", i, entry.kind)
-                problems += [scenario.problem((*loc, *fault.loc), fault.message) for fault in wrong.faults]
+                problems += [
+                    scenario.source.problem((*loc, *fault.loc), fault.message) for fault in wrong.faults
+                ]
         if problems:
             raise ScenarioError(problems)
         tells = any(watched.fault.text for watched in self._watched)

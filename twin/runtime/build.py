@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.names import RemapRule
+from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs.factory import create_nodes
 from twin.bridge.programs.ros_args import RosArguments
@@ -68,6 +69,8 @@ class Parts:
     clock: Clock
     stacks: Mapping[str, RobotStack]
     mission: AnyMission
+    deciders: Sequence[Node]
+    """The nodes of the missions."""
     checks: CheckContext
     comers: Sequence[Obstacle]
     """Obstacles that faults bring."""
@@ -157,7 +160,9 @@ def build(
             )
             for robot in scenario.robots
         }
+        robots_nodes = len(bus.nodes)
         mission = build_missions(scenario.tasks, stacks, arena)
+        deciders = bus.nodes[robots_nodes:]
         bus.node_options, bus.group = None, ""
         for place in outside.nodes:
             create_nodes(bus, place)
@@ -171,6 +176,7 @@ def build(
         clock=clock,
         stacks=stacks,
         mission=mission,
+        deciders=deciders,
         checks=_check_context(scenario, scene, arena, stacks),
         comers=comers,
         control_period_ns=control_period_ns,
@@ -194,7 +200,7 @@ def _as_it_is(scenario: Scenario, arena: Arena | None) -> Arena | None:
                 arena = arena.with_moved(fault.given["name"], fault.given["by"].pose)
             except TwinError as wrong:
                 raise ScenarioError(
-                    scenario.problem(("faults", i, "displacement", "name"), str(wrong))
+                    scenario.source.problem(("faults", i, "displacement", "name"), str(wrong))
                 ) from None
     return arena
 

@@ -30,6 +30,8 @@ class Run:
     """A built scenario that can be ticked; `PHASES` is the order of one tick."""
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
+    THINKING = 2
+    """So many phases are over when all nodes have run and nothing has been done yet: an agent's place."""
 
     def __init__(
         self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
@@ -56,7 +58,7 @@ class Run:
 
             self.lockstep = Lockstep(self.bus, outside)
         self.workers: Workers | None = None
-        self._obstacles = ObstacleSchedule(
+        self.obstacles = ObstacleSchedule(
             self.world,
             scenario.world.obstacles,
             [stack.footprint for stack in parts.stacks.values()],
@@ -94,7 +96,7 @@ class Run:
             world=self.world,
             bus=self.bus,
             robots=parts.stacks,
-            obstacles=self._obstacles,
+            obstacles=self.obstacles,
             held=self._observer.holders,
             mission_state=lambda: parts.mission.state,
             control_period_ns=parts.control_period_ns,
@@ -107,6 +109,16 @@ class Run:
     def tick(self) -> None:
         """Advance by one tick."""
         for phase in self._phases:
+            phase()
+
+    def think(self) -> None:
+        """Begin a tick, up to the place of an agent, who acts as a node would that runs after all others."""
+        for phase in self._phases[: self.THINKING]:
+            phase()
+
+    def act(self) -> None:
+        """Go on to the end of the tick that `think` began."""
+        for phase in self._phases[self.THINKING :]:
             phase()
 
     def admit(self) -> None:
@@ -129,9 +141,9 @@ class Run:
         """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
-        if self._obstacles.active:
+        if self.obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
-            self._obstacles.update(bases)
+            self.obstacles.update(bases)
         if self.faults is not None:
             self.faults.update()
 

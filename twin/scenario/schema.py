@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import Field, PrivateAttr
 
-from twin.errors import Problem, ScenarioError
+from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
+from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
+from twin.scenario.pass_rate import PassRate
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
+from twin.scenario.source import NOWHERE, Source
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import Loc, StrictModel
-from twin.strict_yaml import load as load_yaml
-from twin.strict_yaml.document import Document
+from twin.strict_yaml import Document, StrictModel, checked, read
 
 
 class Scenario(StrictModel):
@@ -53,20 +55,20 @@ class Scenario(StrictModel):
     """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
+    pass_rate: PassRate | None = None
+    """What share of the runs of `twin sweep` is to pass; absent: all."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
+    test: CasesConfig = CasesConfig()
+    """With which seeds and values it is a test; `twin run` does not look at it."""
 
+    _source: Source = PrivateAttr(NOWHERE)
     _parts_fit = faultless(consistency.faults)
-    _document: Document | None = PrivateAttr(None)
 
-    @model_validator(mode="after")
-    def _keep_lines(self, info: ValidationInfo) -> Scenario:
-        self._document = (info.context or {}).get("document")
-        return self
-
-    def problem(self, loc: Loc, message: str) -> Problem:
-        """Return what is wrong with a value that was valid by itself, at its line if there is a file."""
-        return Problem(message) if self._document is None else self._document.problem(loc, message)
+    @property
+    def source(self) -> Source:
+        """What the file says, from which the scenario can be read again."""
+        return self._source
 
     @property
     def tasks(self) -> tuple[Mission, ...]:
@@ -89,7 +91,10 @@ class Scenario(StrictModel):
         )
         if all(robot.navigation is None for robot in robots):
             raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
-        return self.model_copy(update={"robots": robots})
+        changed = self.model_copy(update={"robots": robots})
+        navigates = [robot.navigation is not None for robot in robots]
+        changed._source = self._source.with_params_file(str(path), navigates)
+        return changed
 
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
         """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
@@ -111,8 +116,22 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    file = catalogue.resolve(name_or_path)
-    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
+
+
+def load_again(
+    source: Source, overrides: Mapping[str, str] = MappingProxyType({}), *, execute: bool = False
+) -> Scenario:
+    """Return the scenario of what was read earlier; see `load`."""
+    document = Document(source.file, deepcopy(source.data))
+    return _checked(document, overrides, execute)
+
+
+def _checked(document: Document, overrides: Mapping[str, str], execute: bool) -> Scenario:
+    context = {"execute": execute}
+    scenario = checked(document, Scenario, error=ScenarioError, overrides=overrides, context=context)
+    scenario._source = Source(document.file.absolute(), document.data, document)
+    return scenario
 
 
 def json_schema() -> dict[str, Any]:

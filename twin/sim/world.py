@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -25,7 +25,7 @@ from twin.sim.robot import RobotHandle, RobotPlacement
 from twin.sim.scene import Scene
 from twin.sim.sensors import Mount, create_sensor
 from twin.sim.shapes import BodyShape, shapes
-from twin.sim.work import WorkMeter
+from twin.sim.work import StepMeter, StepWatch, WorkMeter
 
 if TYPE_CHECKING:
     from twin.sim.alterations import Alterations
@@ -62,7 +62,7 @@ class World:
         """Physics steps since the start."""
         self._motion_step = self._contact_step = -1
         self._contacts: list[Contact] | None = None
-        self._work_meter: WorkMeter | None = None
+        self._work_meter: StepMeter | None = None
         mujoco.mj_forward(self.model, self.data)
 
         self._guard = DivergenceGuard(self.model, self.data)
@@ -232,6 +232,10 @@ class World:
         """Add up the work of actuators from now on; it costs a little of each step."""
         self._work_meter = WorkMeter(self.model, self.data, tuple(self.robots))
 
+    def watch_steps(self, callback: Callable[[], None]) -> None:
+        """Call back after every single physics step from now on."""
+        self._work_meter = StepWatch(callback, self._work_meter)
+
     def work(self, robot: str) -> float:
         """Return the mechanical work of a robot's actuators, as far as it was measured [J].
 
@@ -243,6 +247,10 @@ class World:
     def shapes(self) -> list[BodyShape]:
         """Return everything there is to draw except for the floor."""
         return list(shapes(self.scene, self._placements))
+
+    def model_to_see(self) -> mujoco.MjModel:
+        """Return the same world with what is seen only, to draw it at this one's `qpos` and `mocap_pos`."""
+        return self._spec.copy().compile()
 
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
