@@ -65,6 +65,7 @@ from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
 from twin.parameters.units import RadiansPerSecondSquared as RadiansPerSecondSquared
 from twin.parameters.units import Seconds as Seconds
+from twin.parameters.units import Share as Share
 from twin.parameters.units import SquareMetres as SquareMetres
 from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit

@@ -187,6 +187,10 @@ def verdict_text(verdict: Mapping[str, Any]) -> str:
         lines += ["| check | | value | limit | at |", "|---|---|---|---|---|"]
         lines += [_check_row(check) for check in checks]
         lines.append("")
+    if faults := verdict.get("faults", ()):
+        lines += ["| fault | | from | effect |", "|---|---|---|---|"]
+        lines += [_fault_row(fault) for fault in faults]
+        lines.append("")
     metrics = {k: v for k, v in verdict.get("metrics", {}).items() if k not in WALL_CLOCK_METRICS}
     if metrics:
         lines += ["| metric | value |", "|---|---|"]
@@ -195,6 +199,11 @@ def verdict_text(verdict: Mapping[str, Any]) -> str:
     if "digest" in verdict:
         lines.append(f"Digest `{verdict['digest']}`")
     return "\n".join(lines)
+
+
+def _fault_row(fault: Mapping[str, Any]) -> str:
+    at = "" if fault["at_s"] is None else f"{fault['at_s']:.2f} s"
+    return f"| {fault['name']} | {fault['outcome'].replace('_', ' ')} | {at} | {fault['effect']} |"
 
 
 def _check_row(check: Mapping[str, Any]) -> str:

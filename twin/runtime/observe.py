@@ -71,7 +71,7 @@ class Observer:
             time_ns=world.time_ns,
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
-            held=self._held(world.contacts(), goods),
+            held=self._held(goods),
             contacts=tuple(map(_observed, self._contacts.values())),
             moved=self._note_moved(),
             mission_state=mission.state,
@@ -114,18 +114,19 @@ class Observer:
             self._moved |= {self._roots[i] for i in np.flatnonzero(new)}
         return self._moved
 
-    def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:
-        """Return the goods that both fingers of a robot touch."""
+    def holders(self) -> dict[str, str]:
+        """Return which robot holds each good that both its fingers touch."""
         touching: dict[str, set[str]] = {}
-        for contact in contacts:
-            if contact.body2 in goods and contact.body1 in self._fingers:
+        for contact in self._world.contacts():
+            if contact.body2 in self._goods and contact.body1 in self._fingers:
                 touching.setdefault(contact.body2, set()).add(contact.body1)
+        return {name: self._fingers[min(fingers)] for name, fingers in touching.items() if len(fingers) >= 2}
+
+    def _held(self, goods: Mapping[str, Pose3]) -> dict[str, Held]:
         held = {}
-        for name, fingers in touching.items():
-            if len(fingers) >= 2:
-                robot = self._fingers[min(fingers)]
-                grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
-                held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
+        for name, robot in self.holders().items():
+            grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
+            held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
         return held
 
 

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.runtime.build import Parts
-from twin.runtime.events.faults import FaultSchedule
-from twin.runtime.events.obstacles import ObstacleSchedule
 from twin.runtime.observe import Observer
+from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.sensing import SensorSchedule
 from twin.scenario.checks import Check
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.schema import Scenario
 
 if TYPE_CHECKING:
+    from twin.faults.schedule import FaultSchedule
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
     from twin.runtime.workers.workers import Workers
@@ -59,9 +59,12 @@ class Run:
             self.lockstep = Lockstep(self.bus, outside)
         self.workers: Workers | None = None
         self.obstacles = ObstacleSchedule(
-            self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
+            self.world,
+            scenario.world.obstacles,
+            [stack.footprint for stack in parts.stacks.values()],
+            parts.comers,
         )
-        self.faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
+        self.faults: FaultSchedule | None = self._schedule_faults() if scenario.faults else None
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         self._mission_end_ns: int | None = None
@@ -82,6 +85,26 @@ class Run:
 
         self.workers = Workers(self, count)
         return self.workers
+
+    def _schedule_faults(self) -> FaultSchedule:
+        """Prepare the faults, and let those happen that are there from the start."""
+        from twin.faults.fault import FaultContext
+        from twin.faults.schedule import FaultSchedule
+
+        parts = self.parts
+        context = FaultContext(
+            world=self.world,
+            bus=self.bus,
+            robots=parts.stacks,
+            obstacles=self.obstacles,
+            held=self._observer.holders,
+            mission_state=lambda: parts.mission.state,
+            control_period_ns=parts.control_period_ns,
+            zones=parts.checks.zones,
+        )
+        faults = FaultSchedule(self.scenario, context)
+        faults.update()
+        return faults
 
     def tick(self) -> None:
         """Advance by one tick."""
@@ -121,7 +144,8 @@ class Run:
         if self.obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
             self.obstacles.update(bases)
-        self.faults.update()
+        if self.faults is not None:
+            self.faults.update()
 
     def step(self) -> None:
         """4. Physics; a sensor due on the way samples and publishes there."""

@@ -132,7 +132,7 @@ def load_again(
 def _checked(document: Document, overrides: Mapping[str, str], execute: bool) -> Scenario:
     context = {"execute": execute}
     scenario = checked(document, Scenario, error=ScenarioError, overrides=overrides, context=context)
-    scenario._source = Source(document.file.absolute(), document.data)
+    scenario._source = Source(document.file.absolute(), document.data, document)
     return scenario
 
 

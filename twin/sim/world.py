@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -24,6 +26,9 @@ from twin.sim.scene import Scene
 from twin.sim.sensors import Mount, create_sensor
 from twin.sim.shapes import BodyShape, shapes
 from twin.sim.work import StepMeter, StepWatch, WorkMeter
+
+if TYPE_CHECKING:
+    from twin.sim.alterations import Alterations
 
 
 class World:
@@ -214,6 +219,13 @@ class World:
     def refresh_poses(self) -> None:
         """Bring poses to the present positions, as they are after each step."""
         mujoco.mj_kinematics(self.model, self.data)
+
+    @cached_property
+    def alterations(self) -> Alterations:
+        """What changes the physics while a run goes on."""
+        from twin.sim.alterations import Alterations
+
+        return Alterations(self.model, self.data)
 
     def measure_work(self) -> None:
         """Add up the work of actuators from now on; it costs a little of each step."""
