@@ -45,6 +45,7 @@ TABLE = {
     "run": Command(_SCENARIOS, "Run a scenario to its verdict.", "run", "run", "twin run warehouse --seed 7 --set robots.0.pose.x=1.5", needs_arguments=True),
     "test": Command(_SCENARIOS, "Run many scenarios, each in a process of its own.", "run.batch", "run_batch", "twin test scenarios --junit results.xml"),
     "diff": Command(_SCENARIOS, "Name the first tick, topic and field in which two runs differ.", "experiments.diff", "diff", "twin diff runs/warehouse/20261121-101500 --set robots.0.pose.x=1.5", needs_arguments=True),
+    "shrink": Command(_SCENARIOS, "Reduce a failing scenario to the smallest that fails the same checks, and write it.", "experiments.shrink", "shrink", "twin shrink warehouse --seed 7 -o smallest.yaml", needs_arguments=True),
     "play": Command(_SCENARIOS, "Open a recording in the Rerun viewer.", "play", "play", "twin play runs/warehouse/20261121-101500", needs_arguments=True),
     "new": Command(_SCENARIOS, "Write a small project that runs as it is: a robot, an arena, a scenario, a check, a test, a CI file.", "new", "new", "twin new my_robot", needs_arguments=True),
     "scenarios": Command(_SCENARIOS, "List the scenarios that `twin run` knows by name: those in the folder `scenarios`, and shipped ones.", "listings", "scenarios", "twin scenarios"),
