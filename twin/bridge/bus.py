@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
 
@@ -29,6 +29,9 @@ from twin.bridge.wire.ros2dds import bridge_token
 from twin.bridge.wire.session import SessionConfig, open_session, session_id
 from twin.errors import BridgeError
 from twin.savings import ALL, Savings
+
+if TYPE_CHECKING:
+    from twin.bridge.actions.client import ActionClient, ClientGoal
 
 _EXTERNAL_DEPTH = 10_000
 
@@ -71,6 +74,8 @@ class Bus:
         """What becomes of what a running node tells another group."""
         self.announced: Callable[[Endpoint], None] | None = None
         """Called with every new endpoint."""
+        self.hold_goal: Callable[[ActionClient, ClientGoal, Any], bool] | None = None
+        """Is shown each goal before its message is sent, and may hold it back: see `ActionClient.post`."""
         self._put_offs: list[tuple[Member, Any]] = []
         self._nodes: list[Node] = []
         self._away: frozenset[str] = frozenset()

@@ -28,9 +28,9 @@ _abandoned: list[Any] = []
 
 
 def open_recording(
-    path: Path, application_id: str, recording_id: str, blueprint: rrb.Blueprint
+    target: Path | str, application_id: str, recording_id: str, blueprint: rrb.Blueprint
 ) -> rr.RecordingStream:
-    """Return a stream into a new file.
+    """Return a stream into a new file, or to a viewer at an address.
 
     Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
     It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
@@ -38,13 +38,14 @@ def open_recording(
     Raises:
         RecordingError: The file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("wb").close()
-    except OSError as error:
-        raise RecordingError(
-            f"{path}: cannot write the recording: {error.strerror}; choose another folder"
-        ) from error
+    if isinstance(target, Path):
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.open("wb").close()
+        except OSError as error:
+            raise RecordingError(
+                f"{target}: cannot write the recording: {error.strerror}; choose another folder"
+            ) from error
     recording = rr.RecordingStream(
         application_id,
         recording_id=recording_id,
@@ -55,7 +56,10 @@ def open_recording(
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
     with handed_over(blueprint):
-        recording.save(path, default_blueprint=blueprint, write_footer=False)
+        if isinstance(target, Path):
+            recording.save(target, default_blueprint=blueprint, write_footer=False)
+        else:
+            recording.connect_grpc(target, default_blueprint=blueprint)
     return recording
 
 
@@ -90,8 +94,8 @@ def begin_flush(recording: rr.RecordingStream) -> None:
         recording.flush(timeout_sec=0.0)
 
 
-def flush(recording: rr.RecordingStream, path: Path) -> None:
-    """Wait until everything so far is in the file.
+def flush(recording: rr.RecordingStream, target: Path | str) -> None:
+    """Wait until everything so far is in the file, or has reached the viewer.
 
     A full disk ends Rerun's writer, for which its flush then may wait for ever.
 
@@ -103,12 +107,13 @@ def flush(recording: rr.RecordingStream, path: Path) -> None:
             recording.flush(timeout_sec=1.0)
             return
         except RuntimeError as fault:
-            if "timed out" not in str(fault) or not _has_room(path.parent):
+            waits = "timed out" in str(fault) and isinstance(target, Path) and _has_room(target.parent)
+            if not waits:
                 break
     # When it is collected, or the process ends, Rerun would wait for that writer, too.
     _abandoned.append(recording.inner)
     rr.unregister_shutdown()
-    raise _not_whole(path)
+    raise _not_whole(target)
 
 
 def _has_room(folder: Path) -> bool:
@@ -120,7 +125,7 @@ def _has_room(folder: Path) -> bool:
     return True
 
 
-def end_recording(recording: rr.RecordingStream, path: Path) -> None:
+def end_recording(recording: rr.RecordingStream, target: Path | str) -> None:
     """See that all is in the file, and close it.
 
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
@@ -128,7 +133,7 @@ def end_recording(recording: rr.RecordingStream, path: Path) -> None:
     Raises:
         RecordingError: The file is not whole.
     """
-    flush(recording, path)
+    flush(recording, target)
     recording.disconnect()
 
 
@@ -146,7 +151,10 @@ def whole_recording(path: Path) -> Iterator[Path]:
         raise _not_whole(path) from fault
 
 
-def _not_whole(path: Path) -> RecordingError:
+def _not_whole(target: Path | str) -> RecordingError:
+    if isinstance(target, str):
+        return RecordingError(f"the viewer at {target} takes nothing any more; was it closed?")
+    path = target
     return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 

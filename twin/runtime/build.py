@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.names import RemapRule
+from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs.factory import create_nodes
 from twin.bridge.programs.ros_args import RosArguments
@@ -67,6 +68,8 @@ class Parts:
     clock: Clock
     stacks: Mapping[str, RobotStack]
     mission: AnyMission
+    deciders: Sequence[Node]
+    """The nodes of the missions."""
     checks: CheckContext
     control_period_ns: int
 
@@ -153,7 +156,9 @@ def build(
             )
             for robot in scenario.robots
         }
+        robots_nodes = len(bus.nodes)
         mission = build_missions(scenario.tasks, stacks, arena)
+        deciders = bus.nodes[robots_nodes:]
         bus.node_options, bus.group = None, ""
         for place in outside.nodes:
             create_nodes(bus, place)
@@ -167,6 +172,7 @@ def build(
         clock=clock,
         stacks=stacks,
         mission=mission,
+        deciders=deciders,
         checks=_check_context(scenario, scene, arena, stacks),
         control_period_ns=control_period_ns,
     )

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
+_LIVE_S = 0.2
+"""A viewer is as much behind the run, at most."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -74,6 +76,7 @@ class OpenRun:
         workers: int = 0,
         savings: Savings = ALL,
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
+        viewer: str | None = None,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -94,6 +97,7 @@ class OpenRun:
             workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
             taps: Called with every sample that a node publishes, from the first one on.
+            viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -105,9 +109,11 @@ class OpenRun:
         """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out) if record else None
+        self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
+        self._thought = False
+        """Whether a tick is under way, at an agent's place."""
         bag_tap = None
         if bag is not None:
             from twin.bridge.bags.tap import BagTap
@@ -188,6 +194,33 @@ class OpenRun:
                         )
                     )
             return False
+
+    def advance_to_agent(self, until: Callable[[], bool]) -> bool:
+        """Go on until a condition holds at an agent's place in a tick, or the run is over; see `Run.think`.
+
+        The tick under way is finished first. All ticks together are those of `advance`.
+
+        Args:
+            until: Asked in each tick when its nodes have run.
+
+        Raises:
+            TwinError: The run cannot go on.
+        """
+        run = self.run
+        guard.take_again()
+        with self._executed.going_on(), self._timed():
+            while True:
+                if self._thought:
+                    run.act()
+                    self._thought = False
+                    if self._pace is not None:
+                        self._pace.keep(run.world.time_ns * 1e-9)
+                if run.over:
+                    return False
+                run.think()
+                self._thought = True
+                if until():
+                    return True
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
@@ -341,14 +374,15 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
-    if out is None or not scenario.recording.enabled:
+def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> RerunSink | None:
+    if viewer is None and (out is None or not scenario.recording.enabled):
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
-    return RerunSink(
-        out / f"{scenario.name}.rrd",
-        config=config,
-        recording_id=f"{scenario.name}-{scenario.seed}",
-    )
+    rate, name = scenario.recording.poses_hz, f"{scenario.name}-{scenario.seed}"
+    if viewer is not None:
+        # Each is a recording of its own, which the viewer turns to.
+        live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
+        return RerunSink(viewer, config=live, recording_id=f"{name}-{time.monotonic_ns()}")
+    assert out is not None
+    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)

@@ -30,6 +30,8 @@ class Run:
     """A built scenario that can be ticked; `PHASES` is the order of one tick."""
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
+    THINKING = 2
+    """So many phases are over when all nodes have run and nothing has been done yet: an agent's place."""
 
     def __init__(
         self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
@@ -56,7 +58,7 @@ class Run:
 
             self.lockstep = Lockstep(self.bus, outside)
         self.workers: Workers | None = None
-        self._obstacles = ObstacleSchedule(
+        self.obstacles = ObstacleSchedule(
             self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
         )
         self.faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
@@ -86,6 +88,16 @@ class Run:
         for phase in self._phases:
             phase()
 
+    def think(self) -> None:
+        """Begin a tick, up to the place of an agent, who acts as a node would that runs after all others."""
+        for phase in self._phases[: self.THINKING]:
+            phase()
+
+    def act(self) -> None:
+        """Go on to the end of the tick that `think` began."""
+        for phase in self._phases[self.THINKING :]:
+            phase()
+
     def admit(self) -> None:
         """1. Samples from outside enter the inboxes."""
         if self.lockstep is None:
@@ -106,9 +118,9 @@ class Run:
         """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
-        if self._obstacles.active:
+        if self.obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
-            self._obstacles.update(bases)
+            self.obstacles.update(bases)
         self.faults.update()
 
     def step(self) -> None:

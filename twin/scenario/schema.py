@@ -14,11 +14,13 @@ from twin.errors import ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
+from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
+from twin.scenario.pass_rate import PassRate
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.source import NOWHERE, Source
@@ -53,8 +55,12 @@ class Scenario(StrictModel):
     """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
+    pass_rate: PassRate | None = None
+    """What share of the runs of `twin sweep` is to pass; absent: all."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
+    test: CasesConfig = CasesConfig()
+    """With which seeds and values it is a test; `twin run` does not look at it."""
 
     _source: Source = PrivateAttr(NOWHERE)
     _parts_fit = faultless(consistency.faults)

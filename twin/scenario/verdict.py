@@ -36,6 +36,10 @@ class Verdict:
     """What users brought, by name: a package and its version, or the hash of a file."""
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
+    test: str = ""
+    """Name of the test that the run was, such as `warehouse[seed=3]`; empty if it was none."""
+    command: str = ""
+    """What makes the same run again, in the folder where it was made; empty if a program did."""
     error: str | None = None
     """Why the run could not be made or finished."""
 

@@ -236,6 +236,10 @@ class World:
         """Return everything there is to draw except for the floor."""
         return list(shapes(self.scene, self._placements))
 
+    def model_to_see(self) -> mujoco.MjModel:
+        """Return the same world with what is seen only, to draw it at this one's `qpos` and `mocap_pos`."""
+        return self._spec.copy().compile()
+
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
         data, digest = self.data, hashlib.sha256()

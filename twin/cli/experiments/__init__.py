@@ -1,1 +1,1 @@
-"""Commands about many runs: what differs between two, the smallest failure, known-bad stacks."""
+"""Commands about many runs: sweeps, reports, differences, the smallest failure, known-bad stacks."""

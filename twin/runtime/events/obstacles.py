@@ -56,6 +56,12 @@ class ObstacleSchedule:
         self._time_ns = world.time_ns
         self._bases: Sequence[Pose2] = ()
 
+    def steer(self, name: str) -> Steered:
+        """Let somebody say from now on where one that walks goes; return what is told it."""
+        index = [walker.obstacle.name for walker in self._walkers].index(name)
+        self._walkers[index] = steered = Steered(self._walkers[index].obstacle)
+        return steered
+
     @property
     def active(self) -> bool:
         """Whether there is one that waits or walks."""
@@ -145,7 +151,7 @@ class Walker:
         """
         end = self._knots[-1]
         along = min(max(self._along + self._direction * self.obstacle.speed * elapsed, 0.0), end)
-        if self._is_blocked(along, bases, outlines, soon):
+        if self._is_blocked(self._at(along), bases, outlines, soon):
             self._waited += elapsed
             if self._waited >= self.obstacle.patience:
                 self._waited, self._direction = 0.0, -self._direction
@@ -159,13 +165,13 @@ class Walker:
 
     def _is_blocked(
         self,
-        along: float,
+        there: Pose2,
         bases: Sequence[Pose2],
         outlines: Sequence[Outline],
         soon: Sequence[Sequence[Pose2]],
     ) -> bool:
         """Whether a robot is near, and would be nearer after the step: its base, or some part of it."""
-        here, there = self.pose, self._at(along)
+        here = self.pose
         for base, outline, later in zip_longest(bases, outlines, soon):
             then = _distance(self.obstacle, there, base)
             if then < self.obstacle.yields_within and then < _distance(self.obstacle, here, base):
@@ -194,6 +200,36 @@ class Walker:
         start, length = self._knots[after - 1], self._knots[after] - self._knots[after - 1]
         gone = along - start
         return Pose2((x1 - x0) / length * gone + x0, (y1 - y0) / length * gone + y0, yaw)
+
+
+class Steered(Walker):
+    """Somebody who goes where he is told, as far as people do: not into robots."""
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        super().__init__(obstacle)
+        self.velocity = (0.0, 0.0)
+        """Along x and y of the world [m/s]."""
+        self._here = obstacle.pose.pose
+
+    @property
+    def pose(self) -> Pose2:
+        """Where its footprint's centre stands; its heading stays that of its start."""
+        return self._here
+
+    def walk(
+        self,
+        elapsed: float,
+        bases: Sequence[Pose2],
+        outlines: Sequence[Outline] = (),
+        soon: Sequence[Sequence[Pose2]] = (),
+    ) -> bool:
+        """Go on for `elapsed` [s] unless a robot is in the way, or will be; return whether it moved."""
+        (vx, vy), here = self.velocity, self._here
+        there = Pose2(here.x + vx * elapsed, here.y + vy * elapsed, here.yaw)
+        if there == here or self._is_blocked(there, bases, outlines, soon):
+            return False
+        self._here = there
+        return True
 
 
 def _soon(before: Sequence[Pose2], bases: Sequence[Pose2], elapsed: float) -> list[list[Pose2]]:

@@ -1,0 +1,1 @@
+"""Topics as arrays of numbers with bounds and units: a file for each kind."""
