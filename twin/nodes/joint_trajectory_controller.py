@@ -10,7 +10,7 @@ import numpy as np
 from twin.bridge.action_types import FollowJointTrajectory
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
-from twin.bridge.msgs import new, ns
+from twin.bridge.msgs import JointTrajectory, JointTrajectoryPoint, new, ns
 from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
@@ -22,7 +22,11 @@ _PATIENCE_NS = 2_000_000_000
 
 
 class JointTrajectoryControllerNode:
-    """Commands positions along the trajectory, then waits until the joints have arrived."""
+    """Commands positions along the trajectory of a goal, then waits until the joints have arrived.
+
+    A message on `arm_controller/joint_trajectory` takes the place of whatever is followed; its points may
+    have velocities, and nobody hears how it ends.
+    """
 
     def __init__(
         self,
@@ -38,6 +42,42 @@ class JointTrajectoryControllerNode:
         ActionServer(
             self.node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory", self._execute
         )
+        self._messages = 0
+        self.node.create_subscription(
+            JointTrajectory, "arm_controller/joint_trajectory", self._on_trajectory, 10
+        )
+
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        names = list(message.joint_names)
+        fault = self._fault(names, message.points)
+        if fault is not None:
+            self.node.get_logger().error(f"joint_trajectory refused: {fault.error_string}")
+            return
+        self._messages += 1
+        self.node.create_task(self._follow(self._messages, names, self._as_told(names, message.points)))
+
+    def _as_told(self, names: list[str], points: Sequence[JointTrajectoryPoint]) -> Trajectory:
+        """Return a trajectory from where the joints are, and as fast as they are, through its points."""
+        measured, index = self._hardware.read(), [self._index[name] for name in names]
+        rows = [(0.0, measured.position[index], measured.velocity[index])]
+        for point in points:
+            time = ns(point.time_from_start) * 1e-9
+            if time > rows[-1][0]:
+                still = np.zeros(len(names))
+                rows.append((time, point.positions, point.velocities if len(point.velocities) else still))
+        if len(rows) == 1:
+            rows[0] = (0.0, points[-1].positions, np.zeros(len(names)))
+        times, positions, velocities = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+        return Trajectory(tuple(names), times, positions, velocities)
+
+    def _follow(self, message: int, names: list[str], trajectory: Trajectory) -> Generator[None, None, None]:
+        start = self.node.now_ns
+        while message == self._messages:
+            elapsed = (self.node.now_ns - start) * 1e-9
+            self._command(names, trajectory.sample(elapsed))
+            if elapsed >= trajectory.duration:
+                return
+            yield
 
     def _execute(self, goal: GoalHandle) -> Generator[None, None, Any]:
         names = list(goal.request.trajectory.joint_names)
@@ -46,11 +86,15 @@ class JointTrajectoryControllerNode:
             goal.abort()
             return fault
         trajectory = self._with_start(names, goal.request.trajectory.points)
-        start = self.node.now_ns
+        self._messages += 1  # what a message said is over
+        mine, start = self._messages, self.node.now_ns
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
                 goal.canceled()
                 return _result(_SUCCESSFUL, "canceled")
+            if mine != self._messages:
+                goal.abort()
+                return _result(_INVALID_GOAL, "another trajectory has taken its place")
             self._command(names, trajectory.sample(elapsed))
             yield
         self._command(names, trajectory.positions[-1])
