@@ -11,12 +11,15 @@ from twin.bridge.action_types import FollowJointTrajectory
 from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import JointTrajectory, JointTrajectoryPoint, new, ns
+from twin.geometry import Array
 from twin.manipulation.trajectory import Trajectory, concatenate
 from twin.nodes.hardware import HardwareInterface
 
 _SUCCESSFUL, _INVALID_GOAL, _INVALID_JOINTS, _GOAL_TOLERANCE_VIOLATED = 0, -1, -2, -5
 _TOLERANCE = 0.005
 """As near to its goal as this a joint has arrived [rad or m]."""
+_DERIVED_S = 1e-3
+"""A velocity is the difference of positions over so long [s]."""
 _PATIENCE_NS = 2_000_000_000
 """How long joints may take to arrive once the trajectory is over."""
 
@@ -43,6 +46,8 @@ class JointTrajectoryControllerNode:
             self.node, FollowJointTrajectory, "arm_controller/follow_joint_trajectory", self._execute
         )
         self._messages = 0
+        self._told: tuple[int, Trajectory | None] = (0, None)
+        """When the last message came [ns], and what it said, unless a goal came after it."""
         self.node.create_subscription(
             JointTrajectory, "arm_controller/joint_trajectory", self._on_trajectory, 10
         )
@@ -54,21 +59,35 @@ class JointTrajectoryControllerNode:
             self.node.get_logger().error(f"joint_trajectory refused: {fault.error_string}")
             return
         self._messages += 1
-        self.node.create_task(self._follow(self._messages, names, self._as_told(names, message.points)))
+        trajectory = self._as_told(names, message.points)
+        self._told = self.node.now_ns, trajectory
+        self.node.create_task(self._follow(self._messages, names, trajectory))
 
     def _as_told(self, names: list[str], points: Sequence[JointTrajectoryPoint]) -> Trajectory:
-        """Return a trajectory from where the joints are, and as fast as they are, through its points."""
-        measured, index = self._hardware.read(), [self._index[name] for name in names]
-        rows = [(0.0, measured.position[index], measured.velocity[index])]
+        """Return a trajectory through points, with no jump from that of the message before."""
+        still = np.zeros(len(names))
+        rows = [(0.0, *self._desired(names))]
         for point in points:
             time = ns(point.time_from_start) * 1e-9
             if time > rows[-1][0]:
-                still = np.zeros(len(names))
-                rows.append((time, point.positions, point.velocities if len(point.velocities) else still))
+                velocities = np.array(point.velocities, float) if len(point.velocities) else still
+                rows.append((time, np.array(point.positions, float), velocities))
         if len(rows) == 1:
-            rows[0] = (0.0, points[-1].positions, np.zeros(len(names)))
-        times, positions, velocities = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+            rows[0] = (0.0, np.array(points[-1].positions, float), still)
+        times, positions, velocities = (np.array(column) for column in zip(*rows, strict=True))
         return Trajectory(tuple(names), times, positions, velocities)
+
+    def _desired(self, names: list[str]) -> tuple[Array, Array]:
+        """Return positions and velocities that joints are to have now: as told, else as measured."""
+        since, told = self._told
+        if told is not None and told.joint_names == tuple(names):
+            elapsed = (self.node.now_ns - since) * 1e-9
+            if elapsed <= told.duration + 1e-9:
+                before = told.sample(elapsed - _DERIVED_S)
+                here = told.sample(elapsed)
+                return here, (here - before) / _DERIVED_S
+        reading, index = self._hardware.read(), [self._index[name] for name in names]
+        return reading.position[index], reading.velocity[index]
 
     def _follow(self, message: int, names: list[str], trajectory: Trajectory) -> Generator[None, None, None]:
         start = self.node.now_ns
@@ -87,6 +106,7 @@ class JointTrajectoryControllerNode:
             return fault
         trajectory = self._with_start(names, goal.request.trajectory.points)
         self._messages += 1  # what a message said is over
+        self._told = (0, None)
         mine, start = self._messages, self.node.now_ns
         while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
@@ -106,9 +126,17 @@ class JointTrajectoryControllerNode:
         if unknown:
             said = f"unknown joints {unknown}; this controller has {list(self._index)}"
             return _result(_INVALID_JOINTS, said)
-        usable = all(len(p.positions) == len(names) and np.isfinite(p.positions).all() for p in points)
+        usable = all(
+            len(p.positions) == len(names)
+            and len(p.velocities) in (0, len(names))
+            and np.isfinite([*p.positions, *p.velocities]).all()
+            for p in points
+        )
         if not (names and points and usable):
-            said = f"every point needs {len(names)} finite positions, and there must be a point"
+            said = (
+                f"every point needs {len(names)} finite positions, as many finite velocities or none, "
+                "and there must be a point"
+            )
             return _result(_INVALID_GOAL, said)
         return None
 

@@ -113,7 +113,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
                 f"the options of reset change the spaces of the environment of '{scenario.name}'; "
                 "make another environment with them as overrides"
             )
-        self._advance(0)
+        self._advance(1)
         episode = self._episode
         assert episode is not None
         if episode.over:

@@ -33,7 +33,7 @@ from twin.warehouse.skills import SkillsConfig
 
 SPEEDS = (0.3, 0.6, 0.3, 0.3)
 """Largest rates: forward [m/s], turn [rad/s], lift [m/s], reach of the arm [m/s]."""
-_AHEAD = 0.05
+_AHEAD = 0.15
 """So far, at most, a joint is sent from where it is [m]."""
 
 
