@@ -46,6 +46,11 @@ def _suite(verdict: Mapping[str, Any]) -> ElementTree.Element:
 
 def _case(suite: str, check: Mapping[str, Any]) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname=_text(suite), name=_text(check["name"]))
+    known = {key: check[key] for key in ("margin", "unit", "worst_s") if check.get(key) not in (None, "")}
+    if "margin" in known:
+        properties = ElementTree.SubElement(case, "properties")
+        for key, value in known.items():
+            ElementTree.SubElement(properties, "property", name=key, value=_text(str(value)))
     if not check["passed"]:
         failure = ElementTree.SubElement(case, "failure", message=_text(check["reason"]))
         failure.text = _text(f"value {check['value']} limit {check['limit']} {check['unit']}".rstrip())

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from twin.errors import ScenarioError
+from twin.errors import Problem, ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.scenario import catalogue, consistency
@@ -21,8 +21,9 @@ from twin.scenario.observation import CheckContext
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import StrictModel
+from twin.strict_yaml import Loc, StrictModel
 from twin.strict_yaml import load as load_yaml
+from twin.strict_yaml.document import Document
 
 
 class Scenario(StrictModel):
@@ -52,10 +53,19 @@ class Scenario(StrictModel):
     """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
+    early_stop: Literal["never", "failed", "decided"] = "never"
+    """When checks end the run: `failed`, as soon as one has failed whatever comes; `decided`, also when
+    nothing that comes could change any of them."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
 
     _parts_fit = faultless(consistency.faults)
+    _document: Document | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _remember_lines(self, info: ValidationInfo) -> Scenario:
+        self._document = (info.context or {}).get("document")
+        return self
 
     @property
     def tasks(self) -> tuple[Mission, ...]:
@@ -80,9 +90,27 @@ class Scenario(StrictModel):
             raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
         return self.model_copy(update={"robots": robots})
 
+    def _placed(self, loc: Loc, problem: Problem) -> Problem:
+        """Return a problem that was found when the run was made with its place in the file."""
+        if self._document is None or problem.file is not None:
+            return problem
+        return self._document.problem(loc, problem.message)
+
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
-        """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
-        return tuple(entry.build(context) for entry in self.checks)
+        """Return a fresh fold for each check.
+
+        Raises:
+            ScenarioError: The run lacks what some name, such as a zone or a topic.
+        """
+        checks, problems = [], list[Problem]()
+        for i, entry in enumerate(self.checks):
+            try:
+                checks.append(entry.build(context))
+            except ScenarioError as wrong:
+                problems += [self._placed(("checks", i), problem) for problem in wrong.problems]
+        if problems:
+            raise ScenarioError(problems)
+        return tuple(checks)
 
 
 def load(

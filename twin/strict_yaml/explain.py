@@ -156,7 +156,7 @@ def validate(schema: type[M], document: Document, more: Mapping[str, Any] = Mapp
     if document.outsized:
         document.problems += document.outsized
         return None
-    context = {"folder": document.file.parent, **more}
+    context = {"folder": document.file.parent, "document": document, **more}
     model, first = findings(schema, document.data, context)
     if model is not None:
         return model

@@ -346,6 +346,13 @@ def test_closed_loop() -> None:
         {"final_pose": {"x": 0, "y": 0}},
         {"path_on_circle": {"radius": 1, "tolerance": 1}},
         {"closed_loop": {"tolerance": 1}},
+        {"always": "speed < 1"},
+        {"never": "speed > 1"},
+        {"eventually": "speed < 1"},
+        {"until": {"first": "speed < 1", "then": "mission_done"}},
+        {"within": {"time": 1, "of": "speed < 1", "then": "mission_done"}},
+        {"reaches": {"x": 0, "y": 0}},
+        {"formula": "speed < 1"},
     ],
     ids=lambda entry: next(iter(entry)),
 )

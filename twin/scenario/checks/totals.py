@@ -78,7 +78,7 @@ class Energy(RobotCheck):
 
     Config = EnergyConfig
     config: EnergyConfig
-    measures_work = True
+    needs = ("work_J",)
     _energy = 0.0
     _moved = _seen = False
 
