@@ -10,6 +10,7 @@ from twin.scenario.temporal import (
     FOREVER,
     Always,
     And,
+    Finally,
     Formula,
     Not,
     Predicate,
@@ -39,6 +40,7 @@ def random_formula(rng: random.Random, depth: int, step: int = 1, longest: int =
         lambda: Always(inner[0], window),
         lambda: eventually(inner[0], window),
         lambda: Until(inner[0], inner[1], window),
+        lambda: Finally(inner[0]),
     )
     return rng.choice(makers)()
 
@@ -72,6 +74,8 @@ def by_definition(formula: Formula, trace: Trace, end: int) -> tuple[float, bool
                 return min(at(one, t) for one in formulas)
             case Always(inner, window):
                 return min(at(inner, s) for s in moments(t, window))
+            case Finally(inner):
+                return at(inner, end)
             case Until(first, then, window):
                 best = (-float("inf"), False)
                 for s in moments(t, window):

@@ -15,7 +15,7 @@ import pytest
 
 from tests.scenario.temporal.random_formulas import Trace, random_formula, random_trace
 from tests.scenario.temporal.test_monitor import online
-from twin.scenario.temporal import FOREVER, Always, And, Formula, Not, Predicate, Until
+from twin.scenario.temporal import FOREVER, Always, And, Finally, Formula, Not, Predicate, Until
 
 LENGTH = 6
 ATOMS: dict[Predicate, Any] = {}
@@ -37,6 +37,8 @@ def translated(formula: Formula, *, spelled_out: bool) -> Any:
                 return first
             case Always(inner, window):
                 return of(inner).always(lo=window.low, hi=end(window.high))
+            case Finally(inner):
+                return of(inner).always().eventually()
             case Until(first, then, window):
                 one, other, low = of(first), of(then), window.low
                 if spelled_out:

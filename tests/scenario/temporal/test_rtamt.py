@@ -18,7 +18,7 @@ import pytest
 
 from tests.scenario.temporal.random_formulas import Trace, random_formula, random_trace
 from tests.scenario.temporal.test_monitor import online
-from twin.scenario.temporal import FOREVER, Always, And, Formula, Not, Predicate, Until
+from twin.scenario.temporal import FOREVER, Always, And, Finally, Formula, Not, Predicate, Until
 from twin.scenario.temporal.formula import parts
 
 PYTHON = os.environ.get("TWIN_STL_ORACLE", "")
@@ -42,6 +42,8 @@ def spelled(formula: Formula) -> str:
             return f"({' and '.join(map(spelled, formulas))})"
         case Always(inner, window):
             return f"(always{_window(window.low, window.high)} {spelled(inner)})"
+        case Finally(inner):
+            return f"(always[{LONG}, {LONG}] {spelled(inner)})"
         case Until(first, then, window):
             return f"({spelled(first)} until{_window(window.low, window.high)} {spelled(then)})"
 

@@ -27,7 +27,7 @@ CHECKS.register("energy", "twin.scenario.checks.totals:Energy")
 CHECKS.register("final_pose", "twin.scenario.checks.path:FinalPose")
 CHECKS.register("path_on_circle", "twin.scenario.checks.path:PathOnCircle")
 CHECKS.register("closed_loop", "twin.scenario.checks.path:ClosedLoop")
-for _kind in ("always", "never", "eventually", "until", "within", "reaches", "formula"):
+for _kind in ("always", "never", "eventually", "finally", "until", "within", "reaches", "formula"):
     CHECKS.register(_kind, f"twin.scenario.checks.temporal:{_kind.capitalize()}Check")
 
 

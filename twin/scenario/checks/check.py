@@ -93,10 +93,18 @@ class Check(ABC):
         limit: float | None = None,
         unit: str = "",
         at_s: float | None = None,
+        margin: float | None = None,
     ) -> CheckResult:
         """Return the outcome: passed unless there is a reason why not."""
         return CheckResult(
-            name=self.name, passed=not reason, value=value, limit=limit, unit=unit, at_s=at_s, reason=reason
+            name=self.name,
+            passed=not reason,
+            value=value,
+            limit=limit,
+            unit=unit,
+            at_s=at_s,
+            reason=reason,
+            margin=margin,
         )
 
 
@@ -124,19 +132,13 @@ class RobotCheckConfig(CheckConfig):
 
 
 class RobotCheck(Check):
-    """Knows its robot, whether that moved, and when the verdict was decided."""
+    """Knows its robot, and when the verdict was decided."""
 
     _at_s: float | None = None
 
     def __init__(self, name: str, config: RobotCheckConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
         self._robot = context.robot(config.robot)
-        self._motion = BaseMotion()
-
-    @property
-    def _stood(self) -> str:
-        """Why a check fails whose robot never moved; empty if it did."""
-        return "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
 
 
 def at_least_one(*keys: str) -> Any:

@@ -83,7 +83,10 @@ class Delivered(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the distance outside of the zone."""
-        return self._judged(self._reason, self._outside, self.config.tolerance, "m", self._at_s)
+        tolerance, outside = self.config.tolerance, self._outside
+        told = outside is not None and (outside <= tolerance) == (not self._reason)
+        margin = tolerance - outside if outside is not None and told else None
+        return self._judged(self._reason, outside, tolerance, "m", self._at_s, margin)
 
 
 _LONGEST_GAP_NS = 500_000_000
@@ -151,4 +154,10 @@ class ToteSlip(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the largest slip."""
-        return self._judged(self._reason, self._worst, self.config.max, "m", self._at_s)
+        margin = None if self._worst is None else self.config.max - self._worst
+        return self._judged(self._reason, self._worst, self.config.max, "m", self._at_s, margin)
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it holds, whatever comes."""
+        return False if self._worst is not None and self._worst > self.config.max else None

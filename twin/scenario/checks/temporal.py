@@ -5,28 +5,23 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from twin.errors import ScenarioError
 from twin.parameters import Metres, NotNegative, Positive, Radians, Seconds
-from twin.scenario.checks.check import NOTHING, Check, CheckConfig, CheckResult
+from twin.scenario.checks.check import CheckConfig
+from twin.scenario.checks.signal_check import SignalCheck
 from twin.scenario.checks.statement import FormulaModel, Statement, StatementOrText
-from twin.scenario.observation import CheckContext, Observation
-from twin.scenario.signals import Signal
-from twin.scenario.signals.topics import TopicReader
+from twin.scenario.signals.reference import Reference
 from twin.scenario.temporal import (
     FOREVER,
     Always,
     And,
+    Finally,
     Formula,
-    Margin,
-    Monitor,
-    Predicate,
     Until,
     Window,
     eventually,
     implies,
     never,
 )
-from twin.scenario.temporal.formula import Value, begins_ns
 from twin.strict_yaml import Fault, Faults
 
 
@@ -81,6 +76,19 @@ class EventuallyConfig(SpanConfig):
     def formula(self) -> Formula:
         """Return what it means; raises Faults."""
         return eventually(super().formula(), self.window)
+
+
+class FinallyConfig(Statement, CheckConfig):
+    """A statement holds at the end."""
+
+    robot: str | None = None
+    """The robot whose signals are meant where none is named; may be left out if there is only one."""
+
+    def formula(self) -> Formula:
+        """Return what it means; raises Faults."""
+        return Finally(super().formula())
+
+    subject = property(Statement.words)
 
 
 class FormulaConfig(FormulaModel, CheckConfig):
@@ -171,97 +179,22 @@ class ReachesConfig(TemporalConfig):
         return f"{self.x:g}, {self.y:g}" if self.zone is None else self.zone
 
 
-class TemporalCheck(Check):
-    """A monitor of the formula, and the signals that it takes."""
-
-    config: TemporalConfig | FormulaConfig
-    _at_s: float | None = None
-    _last_s: float | None = None
-
-    def __init__(self, name: str, config: TemporalConfig | FormulaConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context)
-        self._formula = config.formula()
-        self._monitor = Monitor(self._formula)
-        self._references = {text: config.reference(text) for text in self._monitor.signals}
-        self._signals: dict[str, Signal] = {}
-        self.topics: dict[str, TopicReader] = {}
-        self._unseen = dict.fromkeys(self._references)
-        for text, reference in self._references.items():
-            if reference.field is None:
-                self._signals[text] = reference.make(config.robot, context)
-            else:
-                self.topics[text] = reference.field.reader(context.topic_type(reference.field.topic))
-        self.needs = frozenset(signal.needs for signal in self._signals.values()) - {""}
-        for predicate in self._monitor.predicates:
-            self._check_kind(predicate)
-
-    def _check_kind(self, predicate: Predicate) -> None:
-        """Raise ScenarioError if a signal is compared with what it is not."""
-        text = predicate.signal
-        kind = self.topics[text].kind if text in self.topics else self._signals[text].kind
-        if type(predicate.limit) is not kind or (
-            kind is not float and predicate.relation not in ("==", "!=")
-        ):
-            words = {float: "a number", bool: "true or false", str: "a text"}
-            compared = f"{predicate.relation} {predicate.limit!r}"
-            raise ScenarioError(f"{text} is {words[kind]}, and cannot be compared by {compared}")
-
-    def take(self, signal: str, time_ns: int, value: Value) -> None:
-        """Take a value of a signal."""
-        self._unseen.pop(signal, None)
-        self._monitor.take(signal, time_ns, value)
-
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        self._last_s = observation.time_s
-        for text, signal in self._signals.items():
-            value = signal.value(observation)
-            if value is not None:
-                self.take(text, observation.time_ns, value)
-        self._monitor.know(observation.time_ns)
-        if self._at_s is None and self._monitor.verdict is not None:
-            self._at_s = observation.time_s
-
-    @property
-    def decided(self) -> bool | None:
-        """Whether it holds, whatever comes; None: that is open."""
-        return self._monitor.verdict
-
-    def result(self) -> CheckResult:
-        """Return the outcome, the run being over; value, limit and unit are those of the worst moment."""
-        begin = begins_ns(self._formula) / 1e9
-        at_s = self._last_s if self._at_s is None else self._at_s
-        if self._last_s is None:
-            return self._judged("the run made no step")
-        if self._unseen:
-            return self._judged(f"{NOTHING}there was no {' and no '.join(self._unseen)}", at_s=at_s)
-        if begin > self._last_s:
-            return self._judged(f"{NOTHING}the run ended before {begin:g} s", at_s=at_s)
-        margin = self._monitor.finish()
-        assert margin is not None
-        predicate = self._monitor.predicates[margin.predicate]
-        unit = self._references[predicate.signal].unit
-        reason = "" if margin.holds else _sentence(predicate.signal, margin, unit)
-        return CheckResult(
-            name=self.name,
-            passed=margin.holds,
-            value=None if isinstance(margin.value, str) else margin.value,
-            limit=None if isinstance(predicate.limit, str) else predicate.limit,
-            unit=unit,
-            at_s=at_s,
-            reason=reason,
-            margin=margin.number,
-            worst_s=margin.at_ns / 1e9,
-        )
-
-
-def _sentence(signal: str, margin: Margin, unit: str) -> str:
-    value = f"{margin.value:.4g} {unit}".rstrip() if isinstance(margin.value, float) else repr(margin.value)
-    return f"{signal} was {value} at {margin.at_ns / 1e9:.2f} s"
-
-
 def _ns(seconds: float) -> int:
     return round(seconds * 1e9)
+
+
+class TemporalCheck(SignalCheck):
+    """The formula of a file."""
+
+    config: TemporalConfig | FormulaConfig
+
+    def formula(self) -> Formula:
+        """Return what the file says."""
+        return self.config.formula()
+
+    def reference(self, signal: str) -> Reference:
+        """Return what a name of a signal means in the file."""
+        return self.config.reference(signal)
 
 
 class AlwaysCheck(TemporalCheck):
@@ -298,6 +231,12 @@ class ReachesCheck(TemporalCheck):
     """The place was reached."""
 
     Config = ReachesConfig
+
+
+class FinallyCheck(TemporalCheck):
+    """Holds at the end."""
+
+    Config = FinallyConfig
 
 
 class FormulaCheck(TemporalCheck):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from twin.geometry import Pose2, wrap_angle
-from twin.scenario.observation import RobotObservation
+from twin.parameters.units import SECONDS
+from twin.scenario.observation import CheckContext, RobotObservation
 from twin.scenario.signals.signal import RobotSignal
 
 
@@ -20,6 +22,25 @@ class LocalisationError(RobotSignal):
             return None
         error = math.hypot(robot.estimate.x - robot.pose.xyz[0], robot.estimate.y - robot.pose.xyz[1])
         return error if math.isfinite(error) else math.inf
+
+
+class LocalisationRms(LocalisationError):
+    """Root mean square of that distance over all observations from a time on."""
+
+    takes = (("after", SECONDS),)
+    _squares, _count = 0.0, 0
+
+    def __init__(self, robot: str | None, arguments: Sequence[float | str], context: CheckContext) -> None:
+        super().__init__(robot, arguments, context)
+        self._after = float(arguments[0])
+
+    def of(self, robot: RobotObservation, time_s: float) -> float | None:
+        """Return it [m]; None before that time."""
+        error = super().of(robot, time_s)
+        if error is not None and time_s >= self._after:
+            self._squares += error * error
+            self._count += 1
+        return math.sqrt(self._squares / self._count) if self._count else None
 
 
 class HeadingError(RobotSignal):

@@ -73,6 +73,19 @@ class DistanceToStart(RobotSignal):
         return self._start.distance(here)
 
 
+class TurnedFromStart(RobotSignal):
+    """Angle between the base's heading and its first one, never negative."""
+
+    unit = "rad"
+    _start: float | None = None
+
+    def of(self, robot: RobotObservation, time_s: float) -> float:
+        """Return it [rad]."""
+        yaw = robot.pose.to_pose2().yaw
+        self._start = yaw if self._start is None else self._start
+        return abs(wrap_angle(yaw - self._start))
+
+
 class DistanceToGoal(RobotSignal):
     """Distance of the base from the goal that its navigator drives to, else from the last one."""
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from twin.bridge.types.fields import Field, fields_of
 from twin.errors import ScenarioError, nearest
 from twin.scenario.temporal.formula import Value
+
+if TYPE_CHECKING:
+    from twin.bridge.types.fields import Field
 
 _STEP = re.compile(r"\.([A-Za-z_]\w*)|\[(\d+)\]")
 _NUMBERS = re.compile(r"u?int\d+|float\d+|byte|char|octet")
@@ -75,6 +77,8 @@ class TopicField:
         Raises:
             ScenarioError: The type has no such field, or nothing of one value.
         """
+        from twin.bridge.types.fields import fields_of  # with all types: files are read without
+
         attributes: list[str | int] = []
         field: Field | None = None
         inside, single = msgtype, True
@@ -97,20 +101,20 @@ class TopicField:
             inside, single = field.message, not field.many
             attributes.append(field.attribute)
         assert field is not None
-        return TopicReader(self.topic, msgtype, *self._finished(field, inside, single, tuple(attributes)))
+        inner = fields_of(inside) if inside else ()
+        return TopicReader(self.topic, msgtype, *self._finished(field, inner, single, tuple(attributes)))
 
     def _finished(
-        self, field: Field, inside: str, single: bool, attributes: tuple[str | int, ...]
+        self, field: Field, inner: tuple[Field, ...], single: bool, attributes: tuple[str | int, ...]
     ) -> tuple[type, Callable[[Any], Value | None]]:
         if self.aggregate:
-            parts = [one for one in fields_of(inside) if _is_number(one)] if inside and single else []
-            of_array = not single and not inside and (_is_number(field) or self.aggregate == "length")
-            if not parts and not of_array and not (self.aggregate == "length" and not single):
+            parts = [one for one in inner if _is_number(one)] if single else []
+            if not parts and (single or not (_is_number(field) or self.aggregate == "length")):
                 raise self._wrong(f"{self.aggregate}() is for arrays of numbers, not {field.typename}")
             of_parts = tuple(part.attribute for part in parts)
             return float, _Aggregate(attributes, AGGREGATES[self.aggregate], of_parts)
-        if inside or not single:
-            names = ", ".join(one.name for one in fields_of(inside)) if inside and single else ""
+        if inner or not single:
+            names = ", ".join(one.name for one in inner) if single else ""
             valid = f"valid: {names}" if names else f"write [0], or {', '.join(AGGREGATES)} around it"
             raise self._wrong(f"'{field.name}' is {field.typename}, not one value; {valid}")
         kind = str if field.base in ("string", "wstring") else bool if field.base == "bool" else float

@@ -10,6 +10,7 @@ windows as in A. Donzé, T. Ferrère, O. Maler, "Efficient robust monitoring for
 from twin.scenario.temporal.formula import FOREVER as FOREVER
 from twin.scenario.temporal.formula import Always as Always
 from twin.scenario.temporal.formula import And as And
+from twin.scenario.temporal.formula import Finally as Finally
 from twin.scenario.temporal.formula import Formula as Formula
 from twin.scenario.temporal.formula import Not as Not
 from twin.scenario.temporal.formula import Predicate as Predicate

@@ -88,7 +88,14 @@ class Until:
     window: Window = Window()
 
 
-Formula = Predicate | Not | And | Always | Until
+@dataclass(frozen=True)
+class Finally:
+    """The formula holds at the end, and so for ever: eventually always."""
+
+    formula: Formula
+
+
+Formula = Predicate | Not | And | Always | Until | Finally
 
 
 def negation(formula: Formula) -> Formula:
@@ -130,7 +137,7 @@ def parts(formula: Formula) -> tuple[Formula, ...]:
             return formulas
         case Until(first, then):
             return first, then
-        case Not(inner) | Always(inner):
+        case Not(inner) | Always(inner) | Finally(inner):
             return (inner,)
 
 

@@ -143,6 +143,21 @@ class _Always(_Node):
         return UNKNOWN[0], self._least[0].margin if self._least else UNKNOWN[1]
 
 
+class _Finally(_Node):
+    """The margin at the end, at every moment."""
+
+    def __init__(self, part: _Node, asked: Window) -> None:
+        super().__init__(asked)
+        self._part = part
+
+    def work(self) -> None:
+        self._part.work()
+        while self._part.ready:
+            _, end, margin = self._part.ready.popleft()
+            if end == FOREVER:
+                self._found(self.asked.low, FOREVER, margin)
+
+
 class _Open(NamedTuple):
     """A span of moments at which an until is not decided."""
 
@@ -259,6 +274,8 @@ class Monitor:
                 return _And([self._made(part, asked) for part in parts])
             case stl.Always(part, window):
                 return _Always(self._made(part, _later(asked, window)), window, asked)
+            case stl.Finally(part):
+                return _Finally(self._made(part, Window(asked.low, FOREVER)), asked)
             case stl.Until(first, then, window):
                 return self._until(first, then, window, asked)
 

@@ -6,7 +6,7 @@ From what binds least to what binds most:
     this or that
     this and that
     this until that, this until[0, 9 s] that      and `unless`, which does not ask for the end
-    not this, always[2 s, 60 s] this, eventually[0, 60) this, never this
+    not this, always[2 s, 60 s] this, eventually[0, 60) this, never this, finally this
     signal > 3, signal within [1 cm, 5 cm], state == 'driving', done, (any formula)
 
 A signal is a name, `robot.name`, `name(arguments)`, or a field of a topic, `/topic.field[0]`. A bracket is in
@@ -25,6 +25,7 @@ from twin.scenario.temporal.formula import (
     FOREVER,
     Always,
     And,
+    Finally,
     Formula,
     Until,
     Window,
@@ -46,7 +47,7 @@ DEEPEST = 40
 """So deeply may formulas be nested."""
 _UNARY = {"always": Always, "eventually": eventually, "never": never}
 _BINARY = {"until": Until, "unless": unless}
-KEYWORDS = ("not", "and", "or", "implies", "within", "true", "false", "inf", *_UNARY, *_BINARY)
+KEYWORDS = ("not", "and", "or", "implies", "within", "finally", "true", "false", "inf", *_UNARY, *_BINARY)
 _RELATIONS = (">=", "<=", "==", "!=", ">", "<")
 _KEYWORD = "|".join(KEYWORDS)
 _TOKEN = re.compile(
@@ -145,6 +146,8 @@ class _Parser:
                 if self._take(word):
                     window = self._window()
                     return make(self._unary(), window)
+            if self._take("finally"):
+                return Finally(self._unary())
             if self._take("("):
                 formula = self._implies()
                 self._need(")")
@@ -156,7 +159,7 @@ class _Parser:
     def _predicate(self) -> Formula:
         signal = self._token
         if signal.kind != "signal":
-            raise self._expected("a signal, not, always, eventually, never or (")
+            raise self._expected("a signal, not, always, eventually, never, finally or (")
         self._next += 1
         if self._take("within"):
             self._need("[")
