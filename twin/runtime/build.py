@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.missions import AnyMission, build_missions
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
+from twin.runtime.topics import topic_types
 from twin.savings import ALL, Savings
 from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation
@@ -177,7 +179,7 @@ def build(
         stacks=stacks,
         mission=mission,
         deciders=deciders,
-        checks=_check_context(scenario, scene, arena, stacks),
+        checks=replace(_check_context(scenario, scene, arena, stacks), topics=partial(topic_types, bus)),
         comers=comers,
         control_period_ns=control_period_ns,
     )
