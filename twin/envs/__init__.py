@@ -1,1 +1,18 @@
-"""Gymnasium environments: vectors of small worlds at the speed of physics, and any scenario as one."""
+"""Gymnasium environments: vectors of small worlds at the speed of physics, and any scenario as one.
+
+Importing this module registers them, so `gym.make("twin.envs:twin/DiffDriveGoal-v0")` works by itself, and
+`gym.make("twin/DiffDriveGoal-v0")` after `import twin.envs`.
+"""
+
+from gymnasium.envs.registration import register, registry
+
+_NAVIGATION = {"DiffDriveGoal": "diff_drive_goal"}
+
+for _name, _module in _NAVIGATION.items():
+    if f"twin/{_name}-v0" not in registry:
+        register(
+            id=f"twin/{_name}-v0",
+            entry_point=f"twin.envs.{_module}:{_name}Env",
+            vector_entry_point=f"twin.envs.{_module}:{_name}VectorEnv",
+            max_episode_steps=300,
+        )

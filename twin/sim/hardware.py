@@ -315,12 +315,7 @@ class _WheelServos:
         actuators = actuators[turning]
         joints = model.actuator_trnid[actuators, 0]
         self._qpos, self._dof = indices(model.jnt_qposadr[joints]), indices(model.jnt_dofadr[joints])
-        torques = [_torque_limit(model, i) for i in actuators]
-        damping = (-model.actuator_biasprm[actuators, 2]).tolist()
-        self._reach = [torque / slope for torque, slope in zip(torques, damping, strict=True)]
-        limited = model.actuator_ctrllimited[actuators].tolist()
-        ranges = model.actuator_ctrlrange[actuators, 1].tolist()
-        self._fastest = [top if known else math.inf for known, top in zip(limited, ranges, strict=True)]
+        self._reach, self._fastest = servo_bounds(model, actuators)
         self.reset()
 
     def reset(self) -> None:
@@ -351,6 +346,19 @@ class _WheelServos:
             last[i] = command
             commands[actuator] = command + gain * owed
         self._position, self._time = position, now
+
+
+def servo_bounds(model: mujoco.MjModel, actuators: NDArray[np.intp]) -> tuple[list[float], list[float]]:
+    """Return of each velocity servo how far its command may be ahead of its joint's speed, and the fastest.
+
+    Farther ahead its torque would not rise any more; both are in [rad/s].
+    """
+    torques = [_torque_limit(model, i) for i in actuators]
+    damping = (-model.actuator_biasprm[actuators, 2]).tolist()
+    reach = [torque / slope for torque, slope in zip(torques, damping, strict=True)]
+    limited = model.actuator_ctrllimited[actuators].tolist()
+    ranges = model.actuator_ctrlrange[actuators, 1].tolist()
+    return reach, [top if known else math.inf for known, top in zip(limited, ranges, strict=True)]
 
 
 def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:
