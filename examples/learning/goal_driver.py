@@ -24,12 +24,14 @@ class GoalDriver(MissionNode):
 
     @dataclass(frozen=True, kw_only=True)
     class Config:
+        """Where to, with what, and what was so in training."""
+
         ahead: Metres
         """Goal in `odom`: along x, where the robot looks at the start."""
         left: Metres
         """... and along y."""
         policy: str = "goal.npz"
-        """File beside this one."""
+        """File, from the folder of this one on."""
         tolerance: Annotated[Metres, Positive] = 0.25
         """Distance at which the goal is reached."""
         max_linear: Annotated[MetresPerSecond, Positive] = 1.0
@@ -46,7 +48,7 @@ class GoalDriver(MissionNode):
     def __init__(self, context, config):
         super().__init__(context.bus, namespace=context.namespace)
         self.config = config
-        self.policy = Policy.load(Path(__file__).with_name(config.policy))
+        self.policy = Policy.load(Path(__file__).parent / config.policy)
         self.action = np.zeros(2)
         self.odometry = None
         self.commands = self.node.create_publisher(Twist, "cmd_vel", 10)
@@ -55,9 +57,11 @@ class GoalDriver(MissionNode):
         self.enter("driving")
 
     def move(self, message):
+        """Keep where the wheels say that it is."""
         self.odometry = message
 
     def look(self, scan):
+        """Decide what to do until the next scan."""
         if self.done or self.odometry is None:
             return
         config = self.config
