@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 
 
 def room(seed: int, folder: Path) -> tuple[Path, list[float], tuple[float, float]]:
-    """Write the room of a seed of `twin/DiffDriveGoal-v0` as an arena; return it with start and goal in it."""
+    """Write the room of a seed of `twin/DiffDriveGoal-v0` as an arena; return start and goal, too."""
     config = DiffDriveGoalConfig()
     layout = Room(config).layout(Episode(seed, 0))
     x, y = (size / 2.0 for size in config.room)
