@@ -38,7 +38,7 @@ def drive(seed: int, policy: Path, folder: Path, out: Path | None = None) -> twi
     overrides = {
         "seed": seed,
         "world.arena": str(arena),
-        "robots.0.start": start,
+        "robots.0.pose": dict(zip(("x", "y", "yaw"), start, strict=True)),
         "mission.ahead": float(ahead),
         "mission.left": float(left),
         "mission.policy": str(policy.resolve()),
