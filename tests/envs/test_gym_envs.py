@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 from twin.errors import GymError, TwinError
 
-IDS = ("twin.envs:twin/DiffDriveGoal-v0",)
+IDS = ("twin.envs:twin/DiffDriveGoal-v0", "twin.envs:twin/WarehouseNav-v0")
 STEPS = 45
 
 

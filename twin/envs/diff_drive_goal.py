@@ -56,7 +56,8 @@ class Room(Course):
             )
             for i, size in enumerate(config.boxes)
         )
-        self.scene = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
+        self.scene = self.looks = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
+        self.overview = 1.3 * max(config.room)
         self._radii = [math.hypot(*size) / 2.0 for size in config.boxes]
 
     def _walls(self) -> list[StaticBody]:

@@ -17,7 +17,7 @@ from twin.errors import GymError
 from twin.geometry import Array
 
 Observation = NDArray[np.float32]
-METADATA: dict[str, Any] = {"render_modes": [], "render_fps": 10}
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 class NavigationEnv(gym.Env[Observation, Observation]):
@@ -28,7 +28,8 @@ class NavigationEnv(gym.Env[Observation, Observation]):
     def __init__(self, navigation: Navigation, render_mode: str | None = None) -> None:
         self.navigation = navigation
         self.render_mode = _known(render_mode)
-        self.action_space, self.observation_space = navigation.spaces
+        self.action_space = navigation.agent.action_space
+        self.observation_space = navigation.agent.observation_space
         self._seed = self._episode = -1
 
     def reset(
@@ -52,6 +53,14 @@ class NavigationEnv(gym.Env[Observation, Observation]):
         over = bool(outcome.success[0] or outcome.collision[0])
         return self.navigation.observe()[0], float(outcome.reward[0]), over, False, info
 
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, shape (480, 640, 3), of the present state."""
+        return self.navigation.picture(0) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Free what drawing took."""
+        self.navigation.close()
+
 
 class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     """n environments; one that is over begins its next episode within the same step."""
@@ -68,7 +77,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
             raise GymError(f"max_episode_steps is {max_episode_steps}; valid: a whole number from 1 on")
         self.navigation, self.num_envs = navigation, navigation.count
         self.render_mode = _known(render_mode)
-        self.single_action_space, self.single_observation_space = navigation.spaces
+        self.single_action_space = navigation.agent.action_space
+        self.single_observation_space = navigation.agent.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._longest = max_episode_steps or np.iinfo(np.int64).max
@@ -132,6 +142,16 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         info.update(final_obs=final, _final_obs=mask, final_info=_masked(last, mask), _final_info=mask.copy())
         observations[over] = self.navigation.observe(over)
         info["distance"][over] = self.navigation.distances()[over]
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each environment, shape (480, 640, 3), in its present state."""
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(self.navigation.picture(i) for i in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free what drawing took."""
+        self.navigation.close()
 
 
 def _known(render_mode: str | None) -> str | None:

@@ -229,20 +229,36 @@ def scan(hits: Array, noise: Array, stddev: Array, nearest: float, farthest: flo
 
 
 @jit
-def locate(starts: Array, odometry: Array, goals: Array, polar: Array) -> None:
-    """Write where goals are by dead reckoning: distance [m], cosine and sine of the bearing, shape (n, 3).
+def flatten(poses: Array, planar: Array) -> None:
+    """Write x [m], y [m] and yaw [rad], shape (n, 3), of x y z and quat_wxyz, shape (n, 7)."""
+    for i in range(poses.shape[0]):
+        w, x, y, z = poses[i, 3], poses[i, 4], poses[i, 5], poses[i, 6]
+        planar[i, 0], planar[i, 1] = poses[i, 0], poses[i, 1]
+        planar[i, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@jit
+def compose(first: Array, then: Array, poses: Array) -> None:
+    """Write planar poses `T_a_c` of `T_a_b` and `T_b_c`: x [m], y [m], yaw [rad], each of shape (n, 3)."""
+    for i in range(first.shape[0]):
+        c, s = math.cos(first[i, 2]), math.sin(first[i, 2])
+        poses[i, 0] = first[i, 0] + c * then[i, 0] - s * then[i, 1]
+        poses[i, 1] = first[i, 1] + s * then[i, 0] + c * then[i, 1]
+        poses[i, 2] = first[i, 2] + then[i, 2]
+
+
+@jit
+def locate(poses: Array, points: Array, polar: Array) -> None:
+    """Write where points are from poses: distance [m], cosine and sine of the bearing.
 
     Args:
-        starts: Where odometry began: x [m], y [m], yaw [rad] in the world, shape (n, 3).
-        odometry: x [m], y [m], yaw [rad] first, shape (n, 3 or more).
-        goals: x [m], y [m] in the world, shape (n, 2).
-        polar: Written.
+        poses: x [m], y [m], yaw [rad], shape (n, 3).
+        points: x [m], y [m] in the same frame, shape (n, k, 2).
+        polar: Written, shape (n, 3 k).
     """
-    for i in range(starts.shape[0]):
-        c, s = math.cos(starts[i, 2]), math.sin(starts[i, 2])
-        east, north = goals[i, 0] - starts[i, 0], goals[i, 1] - starts[i, 1]
-        x = c * east + s * north - odometry[i, 0]
-        y = c * north - s * east - odometry[i, 1]
-        distance = math.sqrt(x * x + y * y)
-        bearing = math.atan2(y, x) - odometry[i, 2]
-        polar[i, 0], polar[i, 1], polar[i, 2] = distance, math.cos(bearing), math.sin(bearing)
+    for i in range(poses.shape[0]):
+        for k in range(points.shape[1]):
+            x, y = points[i, k, 0] - poses[i, 0], points[i, k, 1] - poses[i, 1]
+            bearing = math.atan2(y, x) - poses[i, 2]
+            polar[i, 3 * k] = math.sqrt(x * x + y * y)
+            polar[i, 3 * k + 1], polar[i, 3 * k + 2] = math.cos(bearing), math.sin(bearing)

@@ -6,14 +6,16 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from twin.envs import kernels
+from twin.envs.agent import DrivingAgent
 from twin.envs.kernels import Floats32
+from twin.envs.picture import Mark, Painter
 from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import ALL, Rows, Simulations
@@ -23,6 +25,8 @@ from twin.sim.scene import Scene
 
 _HIDDEN_M = -20.0
 """Height of what is not there in an episode: no ray and no robot comes so low."""
+_NEAR_M = 8.0
+"""Distance of a camera that follows a robot."""
 _OPTIONS = ("start", "goal")
 
 
@@ -87,6 +91,11 @@ class Course(ABC):
     """Where robots drive: the scene, and where start, goal and obstacles are in an episode."""
 
     scene: Scene
+    """As it is simulated."""
+    looks: Scene
+    """As it is drawn: perhaps with more that never moves."""
+    overview: float | None
+    """From where a picture shows everything around the origin [m]; None: pictures follow the robot."""
 
     @abstractmethod
     def layout(self, episode: Episode) -> Layout:
@@ -106,6 +115,11 @@ class Outcome(NamedTuple):
 class Navigation:
     """n environments on one course, without any convention of gymnasium's on top."""
 
+    POINTS: ClassVar[int] = 1
+    """That robots drive to."""
+    NOISES: ClassVar[int] = 0
+    """Normal numbers of a step beside those of the lidar."""
+
     def __init__(self, config: NavigationConfig, course: Course, robot: DrivenRobot, n: int, threads: int):
         self.config, self.course, self.count = config, course, n
         self.simulations = Simulations(
@@ -118,32 +132,21 @@ class Navigation:
             threads=threads,
         )
         self._ticks = round(config.decision_period / config.control_period)
-        drive = robot.drive
-        self._fastest = np.array([drive.linear.max_velocity, drive.angular.max_velocity])
-        self._low, self._high = self._bounds(robot)
-        actions: Space[Any] = Box(-1.0, 1.0, (2,), np.float32)
-        observations: Space[Any] = Box(self._low, self._high, dtype=np.float32)
-        self.spaces = actions, observations
-        """Of one environment."""
+        self.agent = DrivingAgent(
+            robot.drive, robot.lidar, beams=config.beams, points=self.POINTS, farthest=config.goal_range
+        )
         self._episodes = [Episode(0, 0)] * n
         self.steps = np.zeros(n, np.int64)
         """Steps since the start of each episode."""
         self.layouts: list[Layout | None] = [None] * n
         """Of the present episodes."""
         self._goals, self._starts = np.zeros((n, 2)), np.zeros((n, 3))
-        self._actions, self._distance = np.zeros((n, 2)), np.zeros(n)
-        self._noise = np.zeros((n, config.beams))
-
-    def _bounds(self, robot: DrivenRobot) -> tuple[Floats32, Floats32]:
-        v, w = 1.5 * self._fastest
-        low = np.concatenate(([0.0, -1.0, -1.0, -v, -w, -1.0, -1.0], np.zeros(self.config.beams)))
-        far = np.full(self.config.beams, robot.lidar.range_max)
-        high = np.concatenate(([self.config.goal_range, 1.0, 1.0, v, w, 1.0, 1.0], far))
-        return low.astype(np.float32), high.astype(np.float32)
+        self._actions, self._way = np.zeros((n, 2)), np.zeros(n)
+        self._noise = np.zeros((n, config.beams + self.NOISES))
 
     def begin(self, i: int, episode: Episode, options: Mapping[str, Any] | None = None) -> None:
         """Let environment `i` begin an episode; `options` may say where `start` and `goal` are."""
-        layout = _with_options(self.course.layout(episode), options)
+        layout = self._laid_out(i, episode, options)
         simulations = self.simulations
         self._episodes[i], self.layouts[i] = episode, layout
         self.steps[i], self._goals[i], self._starts[i] = 0, layout.goal, layout.start
@@ -154,7 +157,11 @@ class Navigation:
             x, y, yaw = pose or (0.0, 0.0, 0.0)
             simulations.mocap_pos[i, k] = (x, y, height if pose else _HIDDEN_M)
             simulations.mocap_quat[i, k] = quat_wxyz_from_yaw(yaw)
-        self._distance[i] = self.distances()[i]
+        self._way[i] = self._to_go(np.array([i]))[0]
+
+    def _laid_out(self, i: int, episode: Episode, options: Mapping[str, Any] | None) -> Layout:
+        """Return where everything is as environment `i` begins an episode."""
+        return _with_options(self.course.layout(episode), options)
 
     def act(self, actions: Array) -> Outcome:
         """Take a step with actions of the action space, shape (n, 2).
@@ -164,18 +171,26 @@ class Navigation:
         """
         simulations, reward = self.simulations, self.config.reward
         self._actions = np.clip(actions, -1.0, 1.0)
-        wanted = self._actions * self._fastest
+        wanted = self.agent.velocities(self._actions)
         collision = np.zeros(self.count, np.bool_)
         for _ in range(self._ticks):
+            self._before_tick()
             collision |= simulations.tick(wanted)
         simulations.check()
         self.steps += 1
-        distance = self.distances()
+        distance, way = self.distances(), self._to_go(ALL)
         success = (distance <= self.config.goal_tolerance) & ~collision
-        value = reward.progress * (self._distance - distance) + reward.step
+        value = reward.progress * (self._way - way) + reward.step
         value += reward.goal * success + reward.collision * collision
-        self._distance = distance
-        return Outcome(value, success, collision, distance.copy())
+        self._way = way
+        return Outcome(value, success, collision, distance)
+
+    def _before_tick(self) -> None:
+        """Move what moves by itself."""
+
+    def _to_go(self, rows: Rows) -> Array:
+        """Return how far some robots truly have to go, shape (n,) [m]; here: as the crow flies."""
+        return self.distances()[rows]
 
     def distances(self) -> Array:
         """Return how far the robots truly are from their goals, shape (n,) [m]."""
@@ -189,12 +204,47 @@ class Navigation:
         noise = self._noise[: len(which)]
         for row, i in zip(noise, which, strict=True):
             row[:] = self._episodes[i].normal(int(self.steps[i]), len(row))
-        ranges = simulations.scan(simulations.hits(rows), noise, rows)
-        odometry = simulations.states.odometry[rows]
-        polar = np.empty((len(odometry), 3))
-        kernels.locate(self._starts[rows], odometry, self._goals[rows], polar)
-        found = np.concatenate((polar, odometry[:, 3:], self._actions[rows], ranges), axis=1)
-        return np.clip(found.astype(np.float32), self._low, self._high)
+        beams = self.config.beams
+        ranges = simulations.scan(simulations.hits(rows), noise[:, :beams], rows)
+        poses = self._believed(rows, noise[:, beams:])
+        points = self._points(rows, poses)
+        speeds = simulations.states.odometry[rows, 3:]
+        return self.agent.observe(poses, points, speeds, self._actions[rows], ranges)
+
+    def _believed(self, rows: Rows, noise: Array) -> Array:
+        """Return where robots believe that they are in the world, shape (n, 3); here: by dead reckoning."""
+        starts = self._starts[rows]
+        poses = np.empty_like(starts)
+        kernels.compose(starts, self.simulations.states.odometry[rows], poses)
+        return poses
+
+    def picture(self, i: int) -> NDArray[np.uint8]:
+        """Return a picture of environment `i`: goal in green, other points to drive to in blue.
+
+        Raises:
+            GymError: This computer can draw nothing.
+        """
+        row = np.array([i])
+        points = self._points(row, self._believed(row, np.zeros((1, self.NOISES))))[0].tolist()
+        marks = [Mark(points[0], self.config.goal_tolerance, (0.15, 0.7, 0.25, 0.9))]
+        marks += [Mark(point, 0.1, (0.1, 0.4, 0.9, 0.9)) for point in points[1:]]
+        robot = self.simulations.root[i, :3] * (1.0, 1.0, 0.0)
+        if (distance := self.course.overview) is None:
+            return self._painter.draw(i, marks, robot, _NEAR_M)
+        return self._painter.draw(i, marks, (0.0, 0.0, 0.0), distance)
+
+    @cached_property
+    def _painter(self) -> Painter:
+        return Painter(self.simulations, self.course.looks)
+
+    def close(self) -> None:
+        """Free what drawing took."""
+        if "_painter" in self.__dict__:
+            self.__dict__.pop("_painter").close()
+
+    def _points(self, rows: Rows, poses: Array) -> Array:
+        """Return the points that robots drive to, shape (n, POINTS, 2) [m]; here: their goals."""
+        return self._goals[rows, None]
 
 
 def _with_options(layout: Layout, options: Mapping[str, Any] | None) -> Layout:

@@ -85,7 +85,7 @@ class Simulations:
             state[i] = 0
         states, wheels = self.states, len(self.drive.qpos)
         states.delay[i] = math.ceil(round(draw.latency / self.drive.period, 6))
-        states.scale[i] = 1.0 + HardwareConfig.wheel_scale_stddev * episode.encoder_errors(wheels)
+        states.scale[i] = 1.0 + HardwareConfig.wheel_scale_stddev * episode.constants(wheels)
         self.lidar_noise[i] = draw.lidar_noise
 
     def tick(self, wanted: Array) -> NDArray[np.bool_]:
