@@ -12,8 +12,10 @@ import numpy as np
 
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import LaserScan, Odometry, Twist
+from twin.envs.agent import DrivingAgent
 from twin.nodes.missions.mission_node import MissionNode
-from twin.parameters import Metres, MetresPerSecond, Positive, RadiansPerSecond, Seconds
+from twin.parameters import Metres, Positive, Seconds
+from twin.runtime.defaults.from_description import scan_lidar
 
 sys.path.insert(0, str(Path(__file__).parent))
 from ppo import Policy
@@ -34,21 +36,26 @@ class GoalDriver(MissionNode):
         """File, from the folder of this one on."""
         tolerance: Annotated[Metres, Positive] = 0.25
         """Distance at which the goal is reached."""
-        max_linear: Annotated[MetresPerSecond, Positive] = 1.0
-        """Speed of action 1, as in training."""
-        max_angular: Annotated[RadiansPerSecond, Positive] = 3.0
-        """Rate of action 1, as in training."""
         beams: Annotated[int, Positive] = 36
         """Of a scan, as in training."""
-        far: Annotated[Metres, Positive] = 15.0
+        farthest: Annotated[Metres, Positive] = 15.0
         """Goals farther away look so far, as in training."""
         patience: Annotated[Seconds, Positive] = 30.0
         """Time for the way."""
 
     def __init__(self, context, config):
         super().__init__(context.bus, namespace=context.namespace)
+        robot = context.robot
         self.config = config
         self.policy = Policy.load(Path(__file__).parent / config.policy)
+        self.agent = DrivingAgent(
+            robot.drive.config.drive,
+            scan_lidar(robot.handle.description),
+            beams=config.beams,
+            points=1,
+            farthest=config.farthest,
+        )
+        self.goal = np.array([config.ahead, config.left])
         self.action = np.zeros(2)
         self.odometry = None
         self.commands = self.node.create_publisher(Twist, "cmd_vel", 10)
@@ -64,21 +71,23 @@ class GoalDriver(MissionNode):
         """Decide what to do until the next scan."""
         if self.done or self.odometry is None:
             return
-        config = self.config
-        position, q = self.odometry.pose.pose.position, self.odometry.pose.pose.orientation
-        yaw = 2.0 * math.atan2(q.z, q.w)
-        x, y = config.ahead - position.x, config.left - position.y
-        distance, bearing = math.hypot(x, y), math.atan2(y, x) - yaw
-        if distance < config.tolerance or self.node.now_ns > config.patience * 1e9:
+        pose, twist, agent = self.odometry.pose.pose, self.odometry.twist.twist, self.agent
+        here = np.array([pose.position.x, pose.position.y])
+        yaw = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+        left = math.dist(here, self.goal)
+        if left < self.config.tolerance or self.node.now_ns > self.config.patience * 1e9:
             self.commands.publish(twist_from_planar(0.0, 0.0))
-            if distance >= config.tolerance:
-                self.note(f"{distance:.1f} m to go after {config.patience:g} s")
-            self.finish(succeeded=distance < config.tolerance)
+            if left >= self.config.tolerance:
+                self.note(f"{left:.1f} m to go after {self.config.patience:g} s")
+            self.finish(succeeded=left < self.config.tolerance)
             return
-        ranges = np.asarray(scan.ranges)[:: len(scan.ranges) // config.beams]
-        ranges = np.clip(np.nan_to_num(ranges, nan=scan.range_max), 0.0, scan.range_max)
-        speeds = self.odometry.twist.twist.linear.x, self.odometry.twist.twist.angular.z
-        polar = min(distance, config.far), math.cos(bearing), math.sin(bearing)
-        self.action = self.policy(np.array([*polar, *speeds, *self.action, *ranges]))
-        v, w = self.action * (config.max_linear, config.max_angular)
+        seen = agent.observe(
+            poses=np.array([[*here, yaw]]),
+            points=self.goal[None, None],
+            velocities=np.array([[twist.linear.x, twist.angular.z]]),
+            actions=self.action[None],
+            ranges=agent.ranges(scan)[None],
+        )
+        self.action = np.asarray(self.policy(seen)[0], float)
+        v, w = agent.velocities(self.action)
         self.commands.publish(twist_from_planar(float(v), float(w)))
