@@ -24,7 +24,7 @@ Array = np.ndarray
 class PPOConfig:
     """What is tuned; the defaults learn `twin/DiffDriveGoal-v0`."""
 
-    steps: int = 500_000
+    steps: int = 300_000
     """Steps of all environments together."""
     horizon: int = 128
     """Steps of each environment between two updates."""
