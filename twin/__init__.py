@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from twin.bridge import action_types as actions
     from twin.bridge import msgs, srvs
     from twin.bridge.wire.session import SessionConfig
+    from twin.envs.scenario.make import make_env, make_vec_env
     from twin.errors import TwinError
     from twin.geometry import Pose2, Pose3
     from twin.recording.read_back import Recording
@@ -44,6 +45,8 @@ __all__ = [
     "load_arena",
     "load_robot",
     "load_scenario",
+    "make_env",
+    "make_vec_env",
     "msgs",
     "read_bag",
     "read_recording",
@@ -71,6 +74,8 @@ _HOMES = {
     "load_arena": "twin.api.files",
     "load_robot": "twin.api.robot",
     "load_scenario": "twin.api.files",
+    "make_env": "twin.envs.scenario.make",
+    "make_vec_env": "twin.envs.scenario.make",
     "read_bag": "twin.api.bags",
     "read_recording": "twin.api.files",
     "read_runs": "twin.api.files",

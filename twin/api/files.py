@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -49,25 +48,9 @@ def load_scenario(
     Raises:
         ScenarioError: With every problem of the file and of the overrides, each with its line.
     """
-    from twin.errors import ScenarioError
-    from twin.scenario import schema
+    from twin.scenario.overrides import read_scenario
 
-    if isinstance(scenario, schema.Scenario):
-        if overrides:
-            raise ScenarioError(
-                f"scenario '{scenario.name}' is read already; give overrides to load_scenario, "
-                "or the file instead of the scenario"
-            )
-        return scenario
-    texts = {key: as_yaml(value) for key, value in overrides.items()}
-    return schema.load(scenario, texts, execute=execute)
-
-
-def as_yaml(value: Any) -> str:
-    """Return a value as in a file (JSON is YAML); text is taken as it is, as that of `twin run --set`."""
-    if isinstance(value, str):
-        return value
-    return json.dumps(value, default=lambda other: other.tolist() if hasattr(other, "tolist") else str(other))
+    return read_scenario(scenario, overrides, execute=execute)
 
 
 def read_runs(folder: str | Path) -> pa.Table:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from twin.api.files import as_yaml, load_scenario
+from twin.api.files import load_scenario
 from twin.api.participant import Participant
 from twin.api.truth import Truth
 from twin.errors import RecordingError, SimulationError, TwinError
@@ -291,11 +291,12 @@ class Simulation(Participant):
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""
+        from twin.recording.hashes import HASHES
         from twin.scenario.verdict import VERDICT
 
         self._held.enter_context(written_alone(make_folder(folder)))
         self.folder = folder
-        for file in (folder / "junit.xml", folder / VERDICT):
+        for file in (folder / "junit.xml", folder / HASHES, folder / VERDICT):
             check_file(file, "--out")
             file.unlink(missing_ok=True)
 
@@ -329,6 +330,7 @@ class Simulation(Participant):
     def _command(self) -> str:
         """The command that makes the run again; empty if the scenario was not named by a file."""
         from twin.scenario.command import twin_run
+        from twin.scenario.overrides import as_yaml
 
         if not isinstance(self._given, str | Path):
             return ""

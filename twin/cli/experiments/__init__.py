@@ -1,1 +1,1 @@
-"""Commands about many runs, and what there is to say of one."""
+"""Commands about many runs: sweeps, reports, differences, the smallest failure, known-bad stacks."""
