@@ -187,7 +187,7 @@ def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     if len(choices) > 1 and "$ref" in choices[0] and "$ref" not in choices[1]:  # one number can stand for all
         return f"mapping, or {_value(schema, {'anyOf': choices[1:]})}"
     brings = any(choice.get("pattern") == ":" for choice in choices)  # a plugin's name
-    units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice and not brings), None)
+    units = next((unit for choice in choices if (unit := _unit(choice.get("pattern", "")))), None)
     if units is not None:
         number = next(choice for choice in choices if "pattern" not in choice)
         return QUANTITIES[units] + _bounds(number)
@@ -223,10 +223,9 @@ def _bounds(choice: Mapping[str, Any]) -> str:
 
 
 def _unit(pattern: str) -> str:
-    """Return the first unit of a pattern: SI."""
+    """Return the first unit of a pattern, SI; nothing if it has none."""
     match = re.search(r"\\s\*\(([^|)]+)", pattern)
-    assert match is not None, pattern
-    return match[1].replace("\\", "")
+    return match[1].replace("\\", "") if match else ""
 
 
 def _default(item: Mapping[str, Any]) -> str:
