@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from benchmarks.measures.memory import resident_mb
+from twin.envs.gym_envs import NavigationEnv, NavigationVectorEnv
 from twin.errors import GymError, TwinError
 
-IDS = ("twin.envs:twin/DiffDriveGoal-v0",)
+IDS = ("twin.envs:twin/DiffDriveGoal-v0", "twin.envs:twin/WarehouseNav-v0")
 STEPS = 45
 
 
@@ -77,12 +79,124 @@ def test_an_environment_is_the_same_alone(env_id, vector, i):
     alone.close()
 
 
-@pytest.mark.parametrize("action", [[0.0], [0.0, 0.0, 0.0], [np.nan, 0.0], [0.0, np.inf], ["a", "b"]])
-def test_a_wrong_action_is_told_in_one_sentence(env, vector, action):
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        ([0.0], r"shape \((4, )?1,?\)"),
+        ([0.0, 0.0, 0.0], r"shape \((4, )?3,?\)"),
+        ([np.nan, 0.0], r"environment 0 is \[nan, 0.0\]"),
+        ([0.0, np.inf], r"environment 0 is \[0.0, inf\]"),
+        (["a", "b"], "type <U1"),
+    ],
+)
+def test_a_wrong_action_is_told_in_one_sentence(env, vector, action, said):
     env.reset(seed=0)
     vector.reset(seed=0)
     for wrong, made in ((action, env), ([action] * 4, vector)):
-        with pytest.raises(GymError, match=r"^action .*valid: .*\[-1, 1\]$") as caught:
+        with pytest.raises(GymError, match=rf"^(the )?actions? .*{said}; valid: .*\[-1, 1\]$") as caught:
             made.step(np.array(wrong))
         assert isinstance(caught.value, TwinError)
         assert isinstance(caught.value, ValueError)
+    made.step(np.zeros((4, 2)))  # nothing was done, and it goes on
+
+
+def test_actions_beyond_the_space_count_as_its_bounds(env):
+    ends = []
+    for action in ((1.0, -1.0), (7.0, -3.0)):
+        env.reset(seed=1)
+        ends.append(env.step(np.array(action))[0])
+    np.testing.assert_array_equal(ends[0][:5], ends[1][:5])
+
+
+def test_a_step_needs_a_reset(env_id):
+    for made, action in (
+        (gym.make(env_id, disable_env_checker=True).unwrapped, np.zeros(2)),
+        (gym.make_vec(env_id, num_envs=2), np.zeros((2, 2))),
+    ):
+        with pytest.raises(gym.error.ResetNeeded):
+            made.step(action)
+        made.close()
+
+
+def test_a_seed_gives_the_same_first_observation_each_time(env_id, vector):
+    resets = 1000 if "Goal" in env_id else 200  # the arena's lidar has more to see
+    first, _ = vector.reset(seed=[0, 1, 2, 3])
+    assert len({row.tobytes() for row in first}) == 4
+    for _ in range(resets // 4):
+        np.testing.assert_array_equal(vector.reset(seed=[0, 1, 2, 3])[0], first)
+
+
+def test_without_a_seed_the_next_episode_follows(env, vector):
+    alone = [env.reset(seed=5)[0], env.reset()[0], env.reset()[0]]
+    many = [vector.reset(seed=[5, None, 6, 7])[0], vector.reset()[0], vector.reset()[0]]
+    for one, some in zip(alone, many, strict=True):
+        np.testing.assert_array_equal(one, some[0])
+    assert len({row.tobytes() for row in alone}) == 3
+
+
+def test_only_those_of_a_mask_begin_again(vector):
+    vector.reset(seed=3)
+    before, *_ = vector.step(np.full((4, 2), 0.5))
+    mask = np.array([False, True, False, True])
+    after, _ = vector.reset(seed=3, options={"reset_mask": mask})
+    np.testing.assert_array_equal(after[~mask], before[~mask])
+    fresh, _ = vector.reset(seed=3)
+    np.testing.assert_array_equal(after[mask], fresh[mask])
+    with pytest.raises(GymError, match=r"'reset_mask'.*valid: 4 booleans"):
+        vector.reset(options={"reset_mask": [True] * 4})
+
+
+def test_the_vector_truncates_by_itself(env_id):
+    made = gym.make_vec(env_id, num_envs=2, max_episode_steps=3)
+    made.reset(seed=0)
+    seen = [made.step(np.zeros((2, 2)))[2:4] for _ in range(6)]
+    assert [bool(truncated.all()) for _, truncated in seen] == [False, False, True] * 2
+    assert not any(terminated.any() for terminated, _ in seen)
+    made.close()
+    with pytest.raises(GymError, match="max_episode_steps is 0; valid"):
+        gym.make_vec(env_id, num_envs=2, max_episode_steps=0)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"goals": (0, 0)}, "unknown option 'goals' of reset; did you mean 'goal'"),
+        ({"goal": (0.0, np.nan)}, r"option 'goal' of reset is .*valid: x \[m\], y \[m\]"),
+        ({"start": (0.0, 1.0)}, r"option 'start' of reset is .*yaw \[rad\]"),
+        ({"start": "there"}, r"option 'start' of reset is 'there'; valid"),
+    ],
+)
+def test_a_wrong_option_is_told_in_one_sentence(env, options, said):
+    with pytest.raises(GymError, match=said):
+        env.reset(options=options)
+
+
+def test_an_unknown_render_mode_is_told_in_one_sentence(env, vector):
+    with pytest.raises(GymError, match="render_mode is 'ansi'; valid: human, rgb_array, or None"):
+        NavigationEnv(env.unwrapped.navigation, "ansi")
+    with pytest.raises(GymError, match="render_mode is 'human'; valid: rgb_array, or None"):
+        NavigationVectorEnv(vector.unwrapped.navigation, None, "human")
+
+
+def test_seeds_are_one_for_each(vector):
+    with pytest.raises(GymError, match="2 seeds for 4 environments"):
+        vector.reset(seed=[1, 2])
+
+
+def test_memory_does_not_grow_with_episodes(vector):
+    short = NavigationVectorEnv(vector.unwrapped.navigation, 1)
+    short.reset(seed=0)
+
+    def episodes(count):
+        for _ in range(count // 4):
+            short.step(np.zeros((4, 2)))
+        return resident_mb() - ways_to_goals(short)
+
+    before = episodes(200)
+    assert episodes(400) - before < 1.0  # a leak of 2.5 kB for each would show
+
+
+def ways_to_goals(vector):
+    """Of the warehouse each goal's ways are worked out once, and kept."""
+    aisles = getattr(vector.unwrapped.navigation, "_aisles", None)
+    return 0 if aisles is None else sum(field.nbytes for field in aisles._lengths.values()) / 1e6

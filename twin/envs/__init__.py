@@ -6,13 +6,16 @@ Importing this module registers them, so `gym.make("twin.envs:twin/DiffDriveGoal
 
 from gymnasium.envs.registration import register, registry
 
-_NAVIGATION = {"DiffDriveGoal": "diff_drive_goal"}
+from twin.envs.scenario.registration import register_scenarios
 
-for _name, _module in _NAVIGATION.items():
+_NAVIGATION = (("DiffDriveGoal", "diff_drive_goal", 300), ("WarehouseNav", "warehouse_nav", 600))
+
+for _name, _module, _steps in _NAVIGATION:
     if f"twin/{_name}-v0" not in registry:
         register(
             id=f"twin/{_name}-v0",
             entry_point=f"twin.envs.{_module}:{_name}Env",
             vector_entry_point=f"twin.envs.{_module}:{_name}VectorEnv",
-            max_episode_steps=300,
+            max_episode_steps=_steps,
         )
+register_scenarios()

@@ -15,6 +15,7 @@ from twin.envs.robot import DrivenRobot
 from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box
 from twin.sim.scene import PlacedBody, Scene, Shape, StaticBody
+from twin.warehouse.arena_scene import PALETTE
 
 _WALL, _HEIGHT = 0.1, 0.5
 _TRIES = 30
@@ -52,11 +53,12 @@ class Room(Course):
             PlacedBody(
                 name=f"box_{i}",
                 T_world_body=Pose3.from_xyz_rpy((0.0, 0.0, _HEIGHT / 2.0)),
-                shapes=(Shape(geometry=Box(size=(*size, _HEIGHT)), rgba=(0.85, 0.33, 0.10, 1.0)),),
+                shapes=(Shape(geometry=Box(size=(*size, _HEIGHT)), rgba=PALETTE["orange"]),),
             )
             for i, size in enumerate(config.boxes)
         )
-        self.scene = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
+        self.scene = self.looks = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
+        self.overview = 1.3 * max(config.room)
         self._radii = [math.hypot(*size) / 2.0 for size in config.boxes]
 
     def _walls(self) -> list[StaticBody]:
@@ -68,7 +70,7 @@ class Room(Course):
             StaticBody(
                 name=f"wall_{i}",
                 T_world_body=Pose3.from_xyz_rpy((px, py, _HEIGHT / 2.0)),
-                shapes=(Shape(geometry=Box(size=size), rgba=(0.86, 0.87, 0.88, 1.0)),),
+                shapes=(Shape(geometry=Box(size=size), rgba=PALETTE["white"]),),
             )
             for i, (px, py, size) in enumerate(places)
         ]

@@ -17,17 +17,20 @@ from twin.errors import GymError
 from twin.geometry import Array
 
 Observation = NDArray[np.float32]
-METADATA: dict[str, Any] = {"render_modes": [], "render_fps": 10}
+_FPS = 10
 
 
 class NavigationEnv(gym.Env[Observation, Observation]):
     """One environment."""
 
-    metadata: ClassVar[dict[str, Any]] = METADATA  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": _FPS,
+    }
 
     def __init__(self, navigation: Navigation, render_mode: str | None = None) -> None:
         self.navigation = navigation
-        self.render_mode = _known(render_mode)
+        self.render_mode = _known(render_mode, self.metadata)
         self.action_space = navigation.agent.action_space
         self.observation_space = navigation.agent.observation_space
         self._seed = self._episode = -1
@@ -42,23 +45,36 @@ class NavigationEnv(gym.Env[Observation, Observation]):
             self._episode = -1
         self._episode += 1
         self.navigation.begin(0, Episode(self._seed, self._episode), options)
+        if self.render_mode == "human":
+            self.navigation.begin_showing()
         return self.navigation.observe()[0], {"distance": float(self.navigation.distances()[0])}
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Drive for a decision period."""
         if self._episode < 0:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(np.asarray(action)[None], (1, 2)))
+        outcome = self.navigation.act(_checked(_one(action), 1))
+        if self.render_mode == "human":
+            self.navigation.show()
         info = {name: values[0].item() for name, values in _info(outcome).items()}
         over = bool(outcome.success[0] or outcome.collision[0])
         return self.navigation.observe()[0], float(outcome.reward[0]), over, False, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, shape (480, 640, 3), of the present state; `human` shows each step by itself."""
+        return self.navigation.picture(0) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Free what drawing took, and end the viewer."""
+        self.navigation.close()
 
 
 class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     """n environments; one that is over begins its next episode within the same step."""
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        **METADATA,
+        "render_modes": ["rgb_array"],
+        "render_fps": _FPS,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
@@ -68,7 +84,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         if max_episode_steps is not None and max_episode_steps < 1:
             raise GymError(f"max_episode_steps is {max_episode_steps}; valid: a whole number from 1 on")
         self.navigation, self.num_envs = navigation, navigation.count
-        self.render_mode = _known(render_mode)
+        self.render_mode = _known(render_mode, self.metadata)
         self.single_action_space = navigation.agent.action_space
         self.single_observation_space = navigation.agent.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -76,19 +92,38 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         self._longest = max_episode_steps or np.iinfo(np.int64).max
         self._seeds: list[int] = []
         self._episodes = [-1] * self.num_envs
+        self._observations = np.zeros(self.observation_space.shape or (), np.float32)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin episodes: a number seeds environment i with itself plus i; without one the next episodes."""
-        first = seed if isinstance(seed, int | np.integer) else None
-        super().reset(seed=None if first is None else int(first))
-        self._take_seeds(seed)
-        for i in range(self.num_envs):
-            self._begin(i, options)
-        return self.navigation.observe(), _masked({"distance": self.navigation.distances()})
+        """Begin episodes: a number seeds environment i with itself plus i; without one the next episodes.
 
-    def _take_seeds(self, seed: int | Sequence[int | None] | None) -> None:
+        Args:
+            seed: One, or one for each environment (None: go on with that which it has).
+            options: `start` and `goal` for all, as of one environment; `reset_mask`, shape (n,): only where
+                it is True an episode begins, the observations of the others are as they were.
+        """
+        options = dict(options or {})
+        which = self._chosen(options.pop("reset_mask", None))
+        first = int(seed) if isinstance(seed, int | np.integer) else None
+        super().reset(seed=first)
+        self._take_seeds(seed, which)
+        for i in which:
+            self._begin(int(i), options)
+        self._observations[which] = self.navigation.observe(which)
+        return self._observations.copy(), _masked({"distance": self.navigation.distances()})
+
+    def _chosen(self, mask: Any) -> NDArray[np.intp]:
+        if mask is None:
+            return np.arange(self.num_envs)
+        if not self._seeds:
+            raise GymError("option 'reset_mask' of a first reset; valid: from the second reset on")
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise GymError(f"option 'reset_mask' is {mask!r}; valid: {self.num_envs} booleans in an array")
+        return np.flatnonzero(mask)
+
+    def _take_seeds(self, seed: int | Sequence[int | None] | None, which: NDArray[np.intp]) -> None:
         given: Sequence[int | None]
         if seed is None:
             given = [None] * self.num_envs
@@ -100,8 +135,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
             raise GymError(f"{len(given)} seeds for {self.num_envs} environments; valid: one for each")
         if not self._seeds:
             self._seeds = self.np_random.integers(2**31, size=self.num_envs).tolist()
-        for i, value in enumerate(given):
-            if value is not None:
+        for i in which:
+            if (value := given[i]) is not None:
                 self._seeds[i], self._episodes[i] = int(value), -1
 
     def _begin(self, i: int, options: Mapping[str, Any] | None = None) -> None:
@@ -114,14 +149,15 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         """Drive for a decision period; who is over then begins anew."""
         if not self._seeds:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(np.asarray(actions), (self.num_envs, 2)))
+        outcome = self.navigation.act(_checked(np.asarray(actions), self.num_envs))
         terminated = outcome.success | outcome.collision
         truncated = self.navigation.steps >= self._longest
         observations, info = self.navigation.observe(), _masked(_info(outcome))
         over = np.flatnonzero(terminated | truncated)
         if len(over):
             self._begin_anew(over, observations, info)
-        return observations, outcome.reward, terminated, truncated, info
+        self._observations = observations
+        return observations.copy(), outcome.reward, terminated, truncated, info
 
     def _begin_anew(self, over: NDArray[np.intp], observations: Observation, info: dict[str, Any]) -> None:
         mask = np.zeros(self.num_envs, np.bool_)
@@ -135,24 +171,49 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         observations[over] = self.navigation.observe(over)
         info["distance"][over] = self.navigation.distances()[over]
 
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each environment, shape (480, 640, 3), in its present state."""
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(self.navigation.picture(i) for i in range(self.num_envs))
 
-def _known(render_mode: str | None) -> str | None:
-    if render_mode is not None and render_mode not in METADATA["render_modes"]:
-        raise GymError(f"render_mode is {render_mode!r}; valid: {METADATA['render_modes']} or None")
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free what drawing took."""
+        self.navigation.close()
+
+
+def _known(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        valid = ", ".join(metadata["render_modes"])
+        raise GymError(f"render_mode is {render_mode!r}; valid: {valid}, or None")
     return render_mode
 
 
-def _checked(actions: NDArray[Any], shape: tuple[int, ...]) -> Array:
-    """Return actions as numbers.
+_VALID = "linear and angular velocity, each in [-1, 1]"
+
+
+def _one(action: ArrayLike) -> NDArray[Any]:
+    """Return the action of one environment as a row of its own."""
+    given = np.asarray(action)
+    if given.shape != (2,):
+        raise GymError(f"the action has shape {given.shape}; valid: (2,), {_VALID}")
+    return given[None]
+
+
+def _checked(actions: NDArray[Any], n: int) -> Array:
+    """Return n actions as numbers; what is beyond [-1, 1] counts as there.
 
     Raises:
         GymError: They have another shape, or are not finite.
     """
-    if actions.shape != shape:
-        wanted, given = ("(2,)", actions.shape[1:]) if shape[0] == 1 else (str(shape), actions.shape)
-        raise GymError(f"action of shape {given}; valid: {wanted}, linear and angular velocity in [-1, 1]")
-    if actions.dtype.kind not in "fiu" or not np.isfinite(actions).all():
-        raise GymError(f"action {actions.tolist()} has what is no finite number; valid: [-1, 1]")
+    if actions.shape != (n, 2):
+        raise GymError(f"actions have shape {actions.shape}; valid: {(n, 2)}, of {_VALID}")
+    if actions.dtype.kind not in "fiu":
+        raise GymError(f"actions are of type {actions.dtype}; valid: numbers, of {_VALID}")
+    finite = np.isfinite(actions).all(axis=1)
+    if not finite.all():
+        which = int(np.argmin(finite))
+        raise GymError(f"the action of environment {which} is {actions[which].tolist()}; valid: {_VALID}")
     return actions.astype(np.float64)
 
 

@@ -229,6 +229,15 @@ def scan(hits: Array, noise: Array, stddev: Array, nearest: float, farthest: flo
 
 
 @jit
+def flatten(poses: Array, planar: Array) -> None:
+    """Write x [m], y [m] and yaw [rad], shape (n, 3), of x y z and quat_wxyz, shape (n, 7)."""
+    for i in range(poses.shape[0]):
+        w, x, y, z = poses[i, 3], poses[i, 4], poses[i, 5], poses[i, 6]
+        planar[i, 0], planar[i, 1] = poses[i, 0], poses[i, 1]
+        planar[i, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@jit
 def compose(first: Array, then: Array, poses: Array) -> None:
     """Write planar poses `T_a_c` of `T_a_b` and `T_b_c`: x [m], y [m], yaw [rad], each of shape (n, 3)."""
     for i in range(first.shape[0]):

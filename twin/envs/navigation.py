@@ -6,7 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from twin.envs import kernels
 from twin.envs.agent import DrivingAgent
 from twin.envs.kernels import Floats32
+from twin.envs.picture import Mark, Painter
 from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import ALL, Rows, Simulations
@@ -21,8 +23,13 @@ from twin.errors import GymError, nearest
 from twin.geometry import Array, Pose2, quat_wxyz_from_yaw
 from twin.sim.scene import Scene
 
+if TYPE_CHECKING:
+    from twin.envs.live import LiveWindow
+
 _HIDDEN_M = -20.0
 """Height of what is not there in an episode: no ray and no robot comes so low."""
+_NEAR_M = 8.0
+"""Distance of a camera that follows a robot."""
 _OPTIONS = ("start", "goal")
 
 
@@ -87,6 +94,11 @@ class Course(ABC):
     """Where robots drive: the scene, and where start, goal and obstacles are in an episode."""
 
     scene: Scene
+    """As it is simulated."""
+    looks: Scene
+    """As it is drawn: perhaps with more that never moves."""
+    overview: float | None
+    """From where a picture shows everything around the origin [m]; None: pictures follow the robot."""
 
     @abstractmethod
     def layout(self, episode: Episode) -> Layout:
@@ -108,6 +120,8 @@ class Navigation:
 
     POINTS: ClassVar[int] = 1
     """That robots drive to."""
+    NOISES: ClassVar[int] = 0
+    """Normal numbers of a step beside those of the lidar."""
 
     def __init__(self, config: NavigationConfig, course: Course, robot: DrivenRobot, n: int, threads: int):
         self.config, self.course, self.count = config, course, n
@@ -130,12 +144,12 @@ class Navigation:
         self.layouts: list[Layout | None] = [None] * n
         """Of the present episodes."""
         self._goals, self._starts = np.zeros((n, 2)), np.zeros((n, 3))
-        self._actions, self._distance = np.zeros((n, 2)), np.zeros(n)
-        self._noise = np.zeros((n, config.beams))
+        self._actions, self._way = np.zeros((n, 2)), np.zeros(n)
+        self._noise = np.zeros((n, config.beams + self.NOISES))
 
     def begin(self, i: int, episode: Episode, options: Mapping[str, Any] | None = None) -> None:
         """Let environment `i` begin an episode; `options` may say where `start` and `goal` are."""
-        layout = _with_options(self.course.layout(episode), options)
+        layout = self._laid_out(i, episode, options)
         simulations = self.simulations
         self._episodes[i], self.layouts[i] = episode, layout
         self.steps[i], self._goals[i], self._starts[i] = 0, layout.goal, layout.start
@@ -146,7 +160,11 @@ class Navigation:
             x, y, yaw = pose or (0.0, 0.0, 0.0)
             simulations.mocap_pos[i, k] = (x, y, height if pose else _HIDDEN_M)
             simulations.mocap_quat[i, k] = quat_wxyz_from_yaw(yaw)
-        self._distance[i] = self.distances()[i]
+        self._way[i] = self._to_go(np.array([i]))[0]
+
+    def _laid_out(self, i: int, episode: Episode, options: Mapping[str, Any] | None) -> Layout:
+        """Return where everything is as environment `i` begins an episode."""
+        return _with_options(self.course.layout(episode), options)
 
     def act(self, actions: Array) -> Outcome:
         """Take a step with actions of the action space, shape (n, 2).
@@ -159,15 +177,23 @@ class Navigation:
         wanted = self.agent.velocities(self._actions)
         collision = np.zeros(self.count, np.bool_)
         for _ in range(self._ticks):
+            self._before_tick()
             collision |= simulations.tick(wanted)
         simulations.check()
         self.steps += 1
-        distance = self.distances()
+        distance, way = self.distances(), self._to_go(ALL)
         success = (distance <= self.config.goal_tolerance) & ~collision
-        value = reward.progress * (self._distance - distance) + reward.step
+        value = reward.progress * (self._way - way) + reward.step
         value += reward.goal * success + reward.collision * collision
-        self._distance = distance
-        return Outcome(value, success, collision, distance.copy())
+        self._way = way
+        return Outcome(value, success, collision, distance)
+
+    def _before_tick(self) -> None:
+        """Move what moves by itself."""
+
+    def _to_go(self, rows: Rows) -> Array:
+        """Return how far some robots truly have to go, shape (n,) [m]; here: as the crow flies."""
+        return self.distances()[rows]
 
     def distances(self) -> Array:
         """Return how far the robots truly are from their goals, shape (n,) [m]."""
@@ -181,19 +207,73 @@ class Navigation:
         noise = self._noise[: len(which)]
         for row, i in zip(noise, which, strict=True):
             row[:] = self._episodes[i].normal(int(self.steps[i]), len(row))
-        ranges = simulations.scan(simulations.hits(rows), noise, rows)
-        poses, points = self._believed(rows), self._points(rows)
+        beams = self.config.beams
+        ranges = simulations.scan(simulations.hits(rows), noise[:, :beams], rows)
+        poses = self._believed(rows, noise[:, beams:])
+        points = self._points(rows, poses)
         speeds = simulations.states.odometry[rows, 3:]
         return self.agent.observe(poses, points, speeds, self._actions[rows], ranges)
 
-    def _believed(self, rows: Rows) -> Array:
+    def _believed(self, rows: Rows, noise: Array) -> Array:
         """Return where robots believe that they are in the world, shape (n, 3); here: by dead reckoning."""
         starts = self._starts[rows]
         poses = np.empty_like(starts)
         kernels.compose(starts, self.simulations.states.odometry[rows], poses)
         return poses
 
-    def _points(self, rows: Rows) -> Array:
+    def picture(self, i: int) -> NDArray[np.uint8]:
+        """Return a picture of environment `i`: goal in green, other points to drive to in blue.
+
+        Raises:
+            GymError: This computer can draw nothing.
+        """
+        row = np.array([i])
+        points = self._points(row, self._believed(row, np.zeros((1, self.NOISES))))[0].tolist()
+        marks = [Mark(points[0], self.config.goal_tolerance, (0.15, 0.7, 0.25, 0.9))]
+        marks += [Mark(point, 0.1, (0.1, 0.4, 0.9, 0.9)) for point in points[1:]]
+        robot = self.simulations.root[i, :3] * (1.0, 1.0, 0.0)
+        if (distance := self.course.overview) is None:
+            return self._painter.draw(i, marks, robot, _NEAR_M)
+        return self._painter.draw(i, marks, (0.0, 0.0, 0.0), distance)
+
+    def begin_showing(self) -> None:
+        """Show that the first environment begins an episode in Rerun's viewer, which starts if need be.
+
+        Raises:
+            RecordingError: There is no viewer, or it does not start.
+        """
+        episode, layout = self._episodes[0], self.layouts[0]
+        assert layout is not None, "an episode has begun"
+        name = f"seed {episode.seed}, episode {episode.number}"
+        self._window.begin(name, layout.goal, self.config.goal_tolerance)
+        self.show()
+
+    def show(self) -> None:
+        """Show the first environment's present state."""
+        simulations, first = self.simulations, np.array([0])
+        (origins,), (directions,) = simulations.rays(first)
+        (hits,) = simulations.hits(first)
+        seen = (hits > 0.0) & (hits < simulations.robot.lidar.range_max)
+        elapsed = int(self.steps[0]) * round(self.config.decision_period * 1e9)
+        self._window.show(elapsed, (origins + hits[:, None] * directions)[seen])
+
+    @cached_property
+    def _window(self) -> LiveWindow:
+        from twin.envs.live import LiveWindow  # imports rerun, which takes 0.4 s
+
+        return LiveWindow(self.simulations, self.course.looks)
+
+    @cached_property
+    def _painter(self) -> Painter:
+        return Painter(self.simulations, self.course.looks)
+
+    def close(self) -> None:
+        """Free what drawing took, and end the viewer."""
+        for name in ("_painter", "_window"):
+            if name in self.__dict__:
+                self.__dict__.pop(name).close()
+
+    def _points(self, rows: Rows, poses: Array) -> Array:
         """Return the points that robots drive to, shape (n, POINTS, 2) [m]; here: their goals."""
         return self._goals[rows, None]
 

@@ -11,8 +11,10 @@ from twin.errors import GymError, Problem
 from twin.geometry import Array
 from twin.sim.noise import NoiseStream
 
-DRIVE_TICK, LAYOUT_TICK = 0, 1
-"""Ticks of an episode's uniform numbers: of its robot, and from which on of where things are."""
+_ROBOT, _WALKS, _LAYOUT = 0, 1, 2
+"""Ticks of an episode's uniform numbers: of robot, of walkers, and from which on of where things are."""
+_CONSTANTS, _STEPS = 0, 1
+"""Ticks of its normal numbers: of what stays, and from which on of what differs in each step."""
 _NUMBERS = 6
 
 
@@ -92,7 +94,7 @@ class Episode:
 
     def robot(self, spread: Randomisation) -> RobotDraw:
         """Return the robot of this episode."""
-        u = self._stream.uniform(DRIVE_TICK, _NUMBERS)
+        u = self._stream.uniform(_ROBOT, _NUMBERS)
         either = 2.0 * u - 1.0
         radius, mismatch = spread.wheel_radius * either[2], spread.wheel_mismatch * either[3]
         return RobotDraw(
@@ -104,17 +106,21 @@ class Episode:
             lidar_noise=_between(spread.lidar_noise, u[5]),
         )
 
-    def encoder_errors(self, wheels: int) -> Array:
-        """Return standard normal numbers: how much odometry misjudges each wheel, shape (wheels,)."""
-        return self._stream.normal(0, wheels)
+    def constants(self, n: int) -> Array:
+        """Return the first `n` standard normal numbers that stay for the episode, shape (n,)."""
+        return self._stream.normal(_CONSTANTS, n)
+
+    def walks(self, walkers: int) -> Array:
+        """Return three numbers in [0, 1) for each walker, shape (walkers, 3)."""
+        return self._stream.uniform(_WALKS, 3 * walkers).reshape(walkers, 3)
 
     def uniform(self, attempt: int, n: int) -> Array:
         """Return `n` numbers in [0, 1) for the `attempt`-th try (>= 0) to find places, shape (n,)."""
-        return self._stream.uniform(LAYOUT_TICK + attempt, n)
+        return self._stream.uniform(_LAYOUT + attempt, n)
 
     def normal(self, step: int, n: int) -> Array:
         """Return `n` standard normal numbers of a step (>= 0), shape (n,)."""
-        return self._stream.normal(1 + step, n)
+        return self._stream.normal(_STEPS + step, n)
 
 
 def _between(limits: tuple[float, float], share: float) -> float:

@@ -24,6 +24,7 @@ from twin.sim.drive_check import calibrated_track_ratio
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
 from twin.sim.scene import Scene
+from twin.sim.shapes import BodyShape, shapes
 
 ROBOT = "robot"
 """Name of the robot in the model: its links are bodies `robot/<link>`."""
@@ -90,6 +91,11 @@ class DrivenRobot:
                 intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1],
             )
         return spec.compile()
+
+    def shapes(self, scene: Scene) -> list[BodyShape]:
+        """Return everything there is to draw in a scene except for the floor."""
+        placement = RobotPlacement(name=ROBOT, conversion=self._conversion, pose=Pose2(0.0, 0.0, 0.0))
+        return list(shapes(scene, [placement]))
 
     def wheels(self, model: mujoco.MjModel) -> Wheels:
         """Return where the driven wheels are in the arrays of a model."""

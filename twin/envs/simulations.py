@@ -85,7 +85,7 @@ class Simulations:
             state[i] = 0
         states, wheels = self.states, len(self.drive.qpos)
         states.delay[i] = math.ceil(round(draw.latency / self.drive.period, 6))
-        states.scale[i] = 1.0 + HardwareConfig.wheel_scale_stddev * episode.encoder_errors(wheels)
+        states.scale[i] = 1.0 + HardwareConfig.wheel_scale_stddev * episode.constants(wheels)
         self.lidar_noise[i] = draw.lidar_noise
 
     def tick(self, wanted: Array) -> NDArray[np.bool_]:
@@ -113,11 +113,16 @@ class Simulations:
             which = int(np.argmin(finite))
             raise SimulationError(f"the physics of environment {which} diverged; reset it")
 
-    def hits(self, rows: Rows = ALL) -> Array:
-        """Cast the rays of some lidars at present; return distances, -1 for no hit, shape (n, beams) [m]."""
+    def rays(self, rows: Rows = ALL) -> tuple[Array, Array]:
+        """Return where the rays of some lidars begin [m], shape (n, 1, 3), and point, shape (n, beams, 3)."""
         poses = self.root[rows]
         origins, directions = np.empty((len(poses), 1, 3)), np.empty((len(poses), *self._beams.shape))
         kernels.aim(poses, self._mount, self._beams, origins, directions)
+        return origins, directions
+
+    def hits(self, rows: Rows = ALL) -> Array:
+        """Cast the rays of some lidars at present; return distances, -1 for no hit, shape (n, beams) [m]."""
+        origins, directions = self.rays(rows)
         ids = None if isinstance(rows, slice) else rows
         distances, _ = self.batch.ray(
             origins, directions, geomgroup=self.robot.seen, bodyexclude=self._lidar_body, ids=ids
@@ -143,6 +148,11 @@ class _Randomiser:
         self._tyres = np.flatnonzero(np.isin(bodies, wheels.body) & (model.geom_contype > 0))
         self._tyre_is_left = np.isin(bodies[self._tyres], wheels.body[wheels.is_left])
         self._up = _up_in_parents(model, wheels.body)
+        # Sizes that are the radius: of an ellipsoid, as a tyre is made of, two; otherwise the first.
+        sizes = model.geom_size[self._tyres]
+        ellipsoid = model.geom_type[self._tyres] == mujoco.mjtGeom.mjGEOM_ELLIPSOID
+        largest = np.isclose(sizes, sizes.max(axis=1, keepdims=True))
+        self._round = np.where(ellipsoid[:, None], largest, [True, False, False])
         self._model, self._data = copy.copy(model), mujoco.MjData(model)
         nominal = ("body_mass", "body_inertia", "body_pos", "geom_friction", "geom_size")
         self._nominal = {name: getattr(model, name).copy() for name in nominal}
@@ -165,7 +175,8 @@ class _Randomiser:
         tyres = self._tyres
         model.geom_friction[tyres, 0] = nominal["geom_friction"][tyres, 0] * draw.friction
         factors = np.where(self._tyre_is_left, draw.radius_left, draw.radius_right)
-        model.geom_size[tyres, 0] = nominal["geom_size"][tyres, 0] * factors
+        grown = np.where(self._round, factors[:, None], 1.0)
+        model.geom_size[tyres] = nominal["geom_size"][tyres] * grown
         # Axles move up with the radius, or the robot would lose its casters or its wheels the ground.
         factors = np.where(self._is_left, draw.radius_left, draw.radius_right)
         rise = self._radii() * (factors - 1.0)

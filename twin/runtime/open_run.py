@@ -297,6 +297,7 @@ class OpenRun:
             scenario=run.scenario.name,
             seed=run.scenario.seed,
             checks=tuple(check.result() for check in run.checks),
+            faults=() if run.faults is None else run.faults.reports(),
             metrics={
                 "sim_time_s": simulated,
                 "wall_time_s": self._wall_s,

@@ -24,8 +24,10 @@ _SEEDS_SCHEMA = {
 
 def _seeds(value: object) -> object:
     """Return the seeds of a text such as `1..10`."""
+    if value == []:
+        raise ValueError("must have at least one seed")
     if not isinstance(value, str):
-        return value
+        return tuple(value) if isinstance(value, list) else value
     ends = re.fullmatch(r"(\d{1,19})\.\.(\d{1,19})", value.strip())
     if ends is None or int(ends[1]) > int(ends[2]):
         raise ValueError(f"must be a list of seeds or a range such as 1..10, not '{value}'")
@@ -43,7 +45,6 @@ def _tag(value: str) -> str:
 Seeds = Annotated[
     tuple[Annotated[int, NotNegative], ...],
     BeforeValidator(_seeds),
-    Field(min_length=1),
     WithJsonSchema(_SEEDS_SCHEMA),
 ]
 Tag = Annotated[str, BeforeValidator(_tag), WithJsonSchema({"type": "string"})]
@@ -52,7 +53,7 @@ Tag = Annotated[str, BeforeValidator(_tag), WithJsonSchema({"type": "string"})]
 class CasesConfig(StrictModel):
     """How `twin test` and pytest run the file; `twin run` runs it once, whatever stands here."""
 
-    seeds: Seeds | None = None
+    seeds: Seeds = ()
     """One test for each seed: a list, or a range with both ends, `1..10`; absent: the file's."""
     grid: Mapping[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = {}
     """Keys with dots, as `robots.0.pose.x`, each with a list of values: one test for each combination."""
@@ -69,11 +70,11 @@ class CasesConfig(StrictModel):
 
     def _faults(self) -> Iterator[Fault]:
         if "seed" in self.grid:
-            yield Fault(("grid",), "has the key seed; write seeds beside grid")
+            yield Fault(("grid",), "test.grid has the key seed; write seeds beside grid")
         for key in self.grid:
             if key.partition(".")[0] in ("test", "name"):
-                yield Fault(("grid",), f"has the key {key}, which changes no run")
+                yield Fault(("grid",), f"test.grid has the key {key}, which changes no run")
         if self.count > MOST:
-            yield Fault((), f"makes {self.count} tests; at most {MOST} (`twin sweep` is for more)")
+            yield Fault((), f"test makes {self.count} tests; at most {MOST} (`twin sweep` is for more)")
 
     _fits = faultless(_faults)

@@ -53,6 +53,9 @@ def _suite(verdict: Mapping[str, Any]) -> ElementTree.Element:
     for key in _PROPERTIES:
         if verdict.get(key) not in (None, ""):
             ElementTree.SubElement(properties, "property", name=key, value=_text(str(verdict[key])))
+    for fault in verdict.get("faults", ()):
+        told = _text(": ".join(filter(None, (fault["outcome"], fault["effect"]))))
+        ElementTree.SubElement(properties, "property", name=_text(f"fault.{fault['name']}"), value=told)
     suite.extend(cases)
     return suite
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from twin.errors import Problem
 from twin.files.kept import hash_of
+from twin.strict_yaml import Document, Loc
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,8 @@ class Source:
     """Absolute path; files that the data names are relative to its folder."""
     data: Mapping[str, Any] = field(compare=False)
     """Strings, numbers, lists and mappings as in YAML. Nobody changes them."""
+    document: Document | None = field(default=None, compare=False, repr=False)
+    """Where in the file it stands."""
 
     def with_params_file(self, path: str, navigates: Sequence[bool]) -> Source:
         """Return the same with a Nav2 parameter file for those robots that navigate."""
@@ -26,7 +30,11 @@ class Source:
         for robot, chosen in zip(data.get("robots", ()), navigates, strict=False):
             if chosen:
                 robot["navigation"] = {**(robot["navigation"] or {}), "params_file": path}
-        return Source(self.file, data)
+        return Source(self.file, data, self.document)
+
+    def problem(self, loc: Loc, message: str) -> Problem:
+        """Return what is wrong with a value that was valid by itself, at its line if that is known."""
+        return Problem(message) if self.document is None else self.document.problem(loc, message)
 
     def files(self) -> dict[str, str]:
         """Return the files that the data names, as it names them, and the SHA-256 of each."""

@@ -10,16 +10,25 @@ from twin.scenario.quantities import quantity
 
 def lines_of(verdict: Mapping[str, Any]) -> Iterator[str]:
     """Yield why checks do not hold, then the table of all."""
-    for check in verdict["checks"]:
+    checks = verdict["checks"]
+    for check in checks:
         if not check["passed"]:
             yield f"{check['name']}: {check['reason']}"
-    rows = [("", "check", "value", "limit", "at")]
-    for check in verdict["checks"]:
-        value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
-        rows.append(("ok" if check["passed"] else "FAIL", check["name"], value, limit, at))
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    numbers = ["value", "limit", *(["margin"] if any(c.get("margin") is not None for c in checks) else [])]
+    rows = [["", "check", *numbers, "at"]]
+    for check in checks:
+        shown = [
+            "" if check.get(key) is None else quantity(check[key], check["unit"], check["limit"])
+            for key in numbers
+        ]
+        at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
+        rows.append(
+            ["ok" if check["passed"] else "FAIL", check["name"], *shown, "" if at is None else f"{at:.2f} s"]
+        )
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        left = [text.ljust(width) for text, width in zip(row[:2], widths[:2], strict=True)]
-        right = [text.rjust(width) for text, width in zip(row[2:], widths[2:], strict=True)]
-        yield "  ".join(left + right).rstrip()
+        padded = [
+            text.rjust(width) if i > 1 else text.ljust(width)
+            for i, (text, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(padded).rstrip()

@@ -1,21 +1,13 @@
-"""Pictures of solids by MuJoCo's renderer, without a display.
-
-MuJoCo chooses its OpenGL when it is imported, and its default wants a display: who draws imports this first.
-"""
-# ruff: noqa: E402
+"""Pictures of solids by MuJoCo's renderer, without a display."""
 
 from __future__ import annotations
 
 import ctypes.util
-import os
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-
-BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
-"""Values of MUJOCO_GL that need no display, and the library of each."""
-_found = next((name for name, library in BACKENDS.items() if ctypes.util.find_library(library)), None)
-if _found is not None:
-    os.environ.setdefault("MUJOCO_GL", _found)
+from importlib import import_module
 
 import mujoco
 import numpy as np
@@ -25,6 +17,8 @@ from twin.errors import SimulationError
 from twin.geometry import Array, Pose3
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 
+BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
+"""Modules of MuJoCo that draw without a display, and the library of each."""
 _SKY, _HORIZON = (0.55, 0.66, 0.78), (0.93, 0.95, 0.97)
 
 
@@ -58,10 +52,6 @@ def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int 
     Raises:
         SimulationError: There is no OpenGL without a display here.
     """
-    if "MUJOCO_GL" not in os.environ:
-        raise SimulationError(
-            "MuJoCo needs EGL or OSMesa to draw without a display (`apt-get install libegl1` or `libosmesa6`)"
-        )
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     spec.visual.headlight.ambient = (0.45, 0.45, 0.45)
@@ -84,13 +74,47 @@ def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int 
     view = mujoco.MjvCamera()
     view.lookat[:] = camera.lookat
     view.distance, view.azimuth, view.elevation = camera.distance, camera.azimuth, camera.elevation
+    picture = np.empty((height, width, 3), dtype=np.uint8)
+    with _opengl(width, height):
+        scene = mujoco.MjvScene(model, len(solids) + 100)
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+        frame = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(frame, scene, context)
+        mujoco.mjr_readPixels(picture, None, frame, context)
+        context.free()
+    return picture[::-1]
+
+
+@contextmanager
+def _opengl(width: int, height: int) -> Iterator[None]:
+    """Let OpenGL draw in the block; raises SimulationError if there is none.
+
+    `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
+    """
     try:
-        renderer = mujoco.Renderer(model, height, width)
+        context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
+        context.make_current()
+    except SimulationError:
+        raise
     except Exception as fault:  # of three libraries, each with its own kinds
         raise SimulationError(f"MuJoCo finds no OpenGL without a display ({fault})") from fault
-    with renderer:
-        renderer.update_scene(data, view)
-        return renderer.render()
+    try:
+        yield
+    finally:
+        context.free()
+
+
+def _backend() -> str:
+    if sys.platform == "darwin":
+        return "cgl"
+    for name, library in BACKENDS.items():
+        if ctypes.util.find_library(library):
+            return name
+    raise SimulationError(
+        "MuJoCo needs EGL or OSMesa to draw without a display (`apt-get install libegl1` or `libosmesa6`)"
+    )
 
 
 def _add(spec: mujoco.MjSpec, name: str, solid: Solid) -> None:
@@ -107,9 +131,10 @@ def _add(spec: mujoco.MjSpec, name: str, solid: Solid) -> None:
         kind, size = mujoco.mjtGeom.mjGEOM_SPHERE, (geometry.radius, 0.0, 0.0)
     else:
         kind, mesh = mujoco.mjtGeom.mjGEOM_MESH, name
+        corners = np.vstack((geometry, geometry)).ravel()  # MuJoCo wants four at least
         spec.add_mesh(
             name=name,
-            uservert=geometry.ravel(),
+            uservert=corners,
             userface=np.arange(3 * len(geometry)),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
         )

@@ -24,15 +24,20 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
 
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
-    table.add_column("check", no_wrap=True)
-    for name in ("value", "limit", "at"):
+    table.add_column("check", overflow="fold")
+    for name in ("value", "limit", "margin", "at"):
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
         value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
-        table.add_row(mark, Text(check["name"]), value, limit, at)
+        margin = (
+            quantity(check["margin"], check["unit"], check["limit"]) if check["margin"] is not None else ""
+        )
+        moment = check["at_s"] if check["worst_s"] is None else check["worst_s"]
+        at = "" if moment is None else f"{moment:.2f} s"
+        table.add_row(mark, Text(check["name"]), value, limit, margin, at)
     lines: list[Table | Text] = [table] if verdict["checks"] else []
+    lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in _reasons(verdict)]
     lines.append(_summary(verdict))
     if losses := verdict["metrics"].get("pace_losses"):
@@ -42,6 +47,25 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     if folder is not None:
         lines.append(Text(f"written to {folder}", style="dim"))
     return Group(*lines)
+
+
+_OUTCOME = {"landed": "green", "no_effect": "yellow", "not_reached": "yellow"}
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the table of what became of each fault."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None)
+    for name, justify in (("outcome", "left"), ("fault", "left"), ("from", "right"), ("to", "right")):
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("effect")
+    for fault in faults:
+        outcome = Text(fault["outcome"].replace("_", " "), style=_OUTCOME[fault["outcome"]])
+        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        table.add_row(outcome, Text(fault["name"]), *times, Text(fault["effect"]))
+    return table
 
 
 def many_report(verdicts: Sequence[Mapping[str, Any]], folder: Path | None = None) -> Group:

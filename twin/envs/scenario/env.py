@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -79,8 +79,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         self._over = False
         self._begin(self._read)  # to see what there is
         assert self._episode is not None
-        period = self._episode.period_ns * 1e-9
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / (max(1, self._ticks) * period)))}
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self._episode.step_s))}
         self.observation_space, self.action_space = self._observer.space, self._agent.action_space
         self._end()
 
@@ -114,7 +113,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
                 f"the options of reset change the spaces of the environment of '{scenario.name}'; "
                 "make another environment with them as overrides"
             )
-        self._advance(0)
+        self._advance(1)
         episode = self._episode
         assert episode is not None
         if episode.over:
@@ -190,7 +189,9 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         self._over = False
         with uncollected():
             prepared = self._kind.prepared(scenario, self._config)
-            self._episode = episode = Episode(prepared, self._robot, self._screen.address)
+            self._episode = episode = Episode(
+                prepared, self._robot, ticks=self._ticks, viewer=self._screen.address
+            )
             try:
                 self._agent = self._kind(episode, self._config)
                 self._observer = Observer(episode, self._agent, self._wanted)
@@ -274,7 +275,9 @@ def config_of(kind: type[Agent], settings: Mapping[str, Any]) -> Any:
             more = ("agent", "observe", "overrides", "render_mode", "reward", "robot", "ticks")
             said = nearest(name, [*names, *more])
             raise GymError(f"an environment of the agent {kind.__name__} has no setting '{name}'; {said}")
-    try:
-        return kind.Config(**settings)
-    except TypeError as error:
-        raise GymError(f"the agent {kind.__name__}: {error}") from None
+    needed = [f.name for f in fields(kind.Config) if f.default is MISSING and f.name not in settings]
+    if needed:
+        raise GymError(
+            f"an environment of the agent {kind.__name__} needs the setting {', '.join(needed)}=..."
+        )
+    return kind.Config(**settings)

@@ -40,12 +40,15 @@ class Heard:
 class Episode:
     """A run, the robot that the agent is about, its task, and what the agent's node has heard."""
 
-    def __init__(self, scenario: Scenario, robot: str | None = None, viewer: str | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, robot: str | None = None, *, ticks: int = 1, viewer: str | None = None
+    ) -> None:
         """Build the run, up to its first tick.
 
         Args:
             scenario: What to run.
             robot: Its name; None: the only one, or the only one with a mission.
+            ticks: Control periods of a step of the agent.
             viewer: Address of a Rerun viewer that shows it, at the pace of real time.
 
         Raises:
@@ -57,7 +60,8 @@ class Episode:
         self.run = run = self._opened.run
         self.parts, self.world = run.parts, run.world
         self.stack: RobotStack = run.parts.stacks[robot]
-        self.period_ns = run.parts.control_period_ns
+        self.step_s = max(1, ticks) * run.parts.control_period_ns * 1e-9
+        """Simulated time of a step, if the agent is asked as often as it may be [s]."""
         self.verdict: Verdict | None = None
         """How the run ended; None while it goes on."""
         self.ticks = 0

@@ -10,25 +10,13 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from twin.envs.scenario.env import NOTHING, ScenarioEnv
+from twin.envs.scenario.registration import SCENARIO, register_scenarios
 from twin.runtime import end_threads
 
 if TYPE_CHECKING:
     from twin.envs.scenario.agents.agent import Agent
     from twin.envs.scenario.observations.channel import Channel
     from twin.scenario.schema import Scenario
-
-ID = "twin/Scenario-v0"
-
-
-def register_scenarios() -> None:
-    """Register `twin/Scenario-v0`, whose arguments are those of `make_env`. Harmless when repeated."""
-    if ID not in gym.registry:
-        gym.register(
-            ID,
-            entry_point="twin.envs.scenario.env:ScenarioEnv",
-            order_enforce=False,
-            disable_env_checker=True,
-        )
 
 
 def make_env(
@@ -79,7 +67,7 @@ def make_env(
     }
     made = ScenarioEnv(**options)
     register_scenarios()
-    made.spec = replace(gym.spec(ID), kwargs=options)
+    made.spec = replace(gym.spec(SCENARIO), kwargs=options)
     return made
 
 
@@ -110,7 +98,7 @@ def make_vec_env(
     register_scenarios()
     end_threads()  # processes may be forked
     return gym.make_vec(
-        ID,
+        SCENARIO,
         num_envs,
         vectorization_mode,
         vector_kwargs=dict(vector_kwargs),

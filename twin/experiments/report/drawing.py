@@ -36,6 +36,8 @@ _ROLES = {
 """Colours of the page by name -> colours that stand for them until the SVG is in the page."""
 _POINTS = 1200
 """Of a line; more cannot be seen, and make the file large."""
+_GAP_S = 0.5
+"""A line is broken where nothing came for so long, and for ten times what is usual [s]."""
 _WIDTH = 7.2
 """Of a picture [inches]: an A4 page without its margins."""
 _WALL_FROM, _WALL_TO = 0.05, 0.6
@@ -327,12 +329,15 @@ def _thinned(line: Array) -> Array:
 
 
 def _thinned_series(series: Series) -> tuple[Array, Array]:
-    """Return a series of fewer points, which keeps the least and the largest of each stretch."""
+    """Return a series of fewer points, which keeps the least and the largest of each stretch, and gaps."""
     times, values = series.times_s, series.values
-    if len(times) <= _POINTS:
-        return times, values
-    stretches = np.array_split(np.arange(len(times)), _POINTS // 2)
-    kept = sorted(
-        {int(i) for at in stretches for i in (at[np.argmin(values[at])], at[np.argmax(values[at])])}
-    )
-    return times[kept], values[kept]
+    steps = np.diff(times)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = times[1:][steps > max(_GAP_S, 10.0 * usual)]
+    if len(times) > _POINTS:
+        stretches = np.array_split(np.arange(len(times)), _POINTS // 2)
+        ends = ((at[np.argmin(values[at])], at[np.argmax(values[at])]) for at in stretches)
+        kept = sorted({int(i) for pair in ends for i in pair})
+        times, values = times[kept], values[kept]
+    at_gaps = np.searchsorted(times, gaps)
+    return np.insert(times, at_gaps, np.nan), np.insert(values, at_gaps, np.nan)

@@ -192,7 +192,7 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
             margin = check.get("margin")
             text = "" if margin is None else quantity(margin, check["unit"], check["limit"])
             cells.append(f"<td class=number>{escape(text)}</td>")
-        at = check["at_s"]
+        at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
         cells += [f"<td class=number>{'' if at is None else f'{at:.2f} s'}</td>", _cell(check["reason"])]
         rows.append(["" if check["passed"] else "bad", *cells])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
@@ -260,10 +260,12 @@ def _row_of_run(told: Told, link: str) -> list[str]:
     reasons = [f"{c['name']}: {c['reason']}" for c in verdict["checks"] if not c["passed"]]
     reason = str(verdict["error"] or "; ".join(reasons)).partition("\n")[0]
     title = escape(told.title)
+    if link:
+        title = f'<a href="{link}">{title}</a>'
     return [
         "" if told.word == "pass" else "bad",
         f'<td class="mark {told.word}">{_WORDS[told.word]}</td>',
-        f'<th scope="row">{f"<a href={link!r}>{title}</a>" if link else title}</th>',
+        f'<th scope="row">{title}</th>',
         f"<td class=number>{verdict['seed']}</td>",
         f"<td class=number>{_seconds(metrics.get('sim_time_s'))}</td>",
         f"<td class=number>{_seconds(metrics.get('wall_time_s'))}</td>",

@@ -17,6 +17,7 @@ from twin.errors import RecordingError
 from twin.geometry import Array
 from twin.recording.read_back import Recording, read
 from twin.recording.scene import RecordedScene
+from twin.scenario.quantities import quantity
 from twin.scenario.verdict import VERDICT
 
 _MOST_MOMENTS = 6
@@ -198,15 +199,16 @@ class Told:
         """What is worth a look, in the order of time: what failed, what came near to it, warnings."""
         found = []
         for check in self.verdict["checks"]:
-            at = check.get("worst_at_s", check["at_s"])
+            at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
             if at is None or (
                 check["passed"] and (at > self.end_s - _END_S or not _is_measured(check["value"]))
             ):
                 continue
             title = check["name"] if check["passed"] else f"{check['name']} fails"
-            found.append(
-                Moment(float(at), title, check["reason"] or "nearest to its limit", not check["passed"])
-            )
+            text = check["reason"] or "nearest to its limit"
+            if check.get("margin") is not None:
+                text += f", margin {quantity(check['margin'], check['unit'], check['limit'])}"
+            found.append(Moment(float(at), title, text, not check["passed"]))
         for robot in self.robots:
             for name, times, values in self.series(f"/localisation/{robot}/"):
                 if name == "position_error" and len(values):

@@ -73,7 +73,7 @@ def cases_of(file: Path) -> list[Case]:
     points = product(
         *([(key, i, value) for i, value in enumerate(values)] for key, values in config.grid.items())
     )
-    seeds = [None] if config.seeds is None else config.seeds
+    seeds = config.seeds or [None]
     return [_case(file, name, seed, point, short, config.tags) for point in points for seed in seeds]
 
 

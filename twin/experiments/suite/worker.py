@@ -24,6 +24,8 @@ from twin.scenario.verdict import VERDICT, Verdict
 
 OUTPUT = "output.txt"
 """What a run printed, in its folder."""
+_PATIENCE_S = 10.0
+"""For a run to write down that it was interrupted [s]; then its process is killed."""
 _COMMAND = (sys.executable, "-m", "twin.experiments.suite.worker")
 
 
@@ -93,21 +95,15 @@ class Worker:
     def stop(self) -> None:
         """Interrupt what another thread runs; its `run` raises KeyboardInterrupt."""
         self._stopped = True
-        process = self._process
-        if process is not None:
-            process.terminate()
+        if self._process is not None:
+            _end(self._process)
 
     def close(self) -> None:
         """End the process; a run that is under way says `interrupted` in its verdict."""
         process, self._process = self._process, None
         if process is None:
             return
-        process.terminate()
-        try:
-            process.wait(10.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        _end(process)
         for pipe in (process.stdin, process.stdout):
             assert pipe is not None
             with suppress(BrokenPipeError):
@@ -124,6 +120,15 @@ def _start(output: Path) -> subprocess.Popen[str]:
             text=True,
             encoding="utf-8",
         )
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    process.terminate()
+    try:
+        process.wait(_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _broken(case: Case, error: str) -> Verdict:
@@ -180,7 +185,13 @@ def _made(job: dict[str, Any]) -> Verdict:
     folder = Path(job["out"])
     name, seed = Path(job["file"]).stem, int(job["overrides"].get("seed", "0"))
     (folder / VERDICT).unlink(missing_ok=True)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupts: list[int] = []
+
+    def interrupt(number: int, frame: object) -> None:
+        interrupts.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
     with execution() as executed:
         try:
             scenario = schema.load(job["file"], job["overrides"], execute=True)
@@ -193,12 +204,19 @@ def _made(job: dict[str, Any]) -> Verdict:
         except KeyboardInterrupt:
             verdict = Verdict(scenario=name, seed=seed, error="interrupted", plugins=executed.versions)
         except Exception as bug:
+            if interrupts:  # what has become of it on its way
+                return _kept(job, Verdict(scenario=name, seed=seed, error="interrupted"))
             traceback.print_exc()
             error = f"{type(bug).__name__}: {bug} (all of it: {folder / OUTPUT})"
             verdict = Verdict(scenario=name, seed=seed, error=error, plugins=executed.versions)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    return _kept(job, verdict)
+
+
+def _kept(job: dict[str, Any], verdict: Verdict) -> Verdict:
+    """Write a verdict with what is told of its test, and return it."""
     verdict = replace(verdict, **job["told"])
-    verdict.write(folder)
+    verdict.write(Path(job["out"]))
     return verdict
 
 

@@ -21,7 +21,7 @@ from twin.scenario.verdict import VERDICT
 
 
 class RayCluster:
-    """As many runs at a time as there are cores; the machines have the scenario's files where they are here."""
+    """As many runs at a time as there are cores; the machines have the files where they are here."""
 
     def __init__(self, address: str, most: int | None = None, *, time_limit_s: float | None = None) -> None:
         """Join.

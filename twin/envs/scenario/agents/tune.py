@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -16,7 +16,7 @@ from twin.envs.scenario.agents.agent import Agent, Values, unit_box
 from twin.envs.scenario.episode import Episode
 from twin.errors import GymError, nearest
 
-_KINDS = {Type.DOUBLE: float, Type.INTEGER: round}
+_KINDS: Mapping[Type, Callable[[float], Any]] = {Type.DOUBLE: float, Type.INTEGER: round}
 
 
 class Tune(Agent):
@@ -105,7 +105,8 @@ class _Knob:
         told = self._node.describe_parameter(self._name)
         if told.read_only:
             raise GymError(f"the parameter '{name}' is read-only")
-        for allowed in (*told.floating_point_range, *told.integer_range):
+        ranges: list[Any] = [*told.floating_point_range, *told.integer_range]
+        for allowed in ranges:
             if self._low < allowed.from_value or self._high > allowed.to_value:
                 raise GymError(
                     f"the bounds of '{name}' are {self._low:g} and {self._high:g}; "

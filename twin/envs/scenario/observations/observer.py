@@ -14,8 +14,9 @@ from twin.envs.scenario.observations.channel import Channel
 from twin.envs.scenario.observations.costmap import Costmap
 from twin.envs.scenario.observations.odometry import Odometry
 from twin.envs.scenario.observations.pose import PoseInMap
+from twin.envs.scenario.observations.poses import Poses
 from twin.envs.scenario.observations.scan import Scan
-from twin.errors import GymError, nearest
+from twin.errors import GymError
 
 OLDEST_S = 10.0
 """Older than this is as good as nothing, which counts as so old [s]."""
@@ -24,9 +25,12 @@ CHANNELS: Mapping[str, type[Channel]] = {
     "nav_msgs/msg/Odometry": Odometry,
     "geometry_msgs/msg/PoseWithCovarianceStamped": PoseInMap,
     "geometry_msgs/msg/PoseStamped": PoseInMap,
+    "geometry_msgs/msg/PoseArray": Poses,
     "nav_msgs/msg/OccupancyGrid": Costmap,
 }
 """What shows a topic that is only named, by its type."""
+_RANGES = ("sensor_msgs/msg/LaserScan", "ranges")
+"""What shows a scan shows this field of it."""
 
 
 class Observer:
@@ -84,15 +88,16 @@ def channel_of(topic: str, episode: Episode) -> Channel:
     Raises:
         GymError: It is not there, or nothing shows its type.
     """
-    if "." in topic:
-        raise GymError(f"a field needs bounds: Field({topic!r}, low, high) of twin.envs.scenario")
-    msgtype = episode.publisher(topic).msgtype
+    name, _, field = topic.partition(".")
+    msgtype = episode.publisher(name).msgtype
+    if field and (msgtype, field) != _RANGES:
+        raise GymError(f"{topic} has no bounds; valid is Field({topic!r}, low, high)")
     if msgtype not in CHANNELS:
         raise GymError(
-            f"{topic} carries {msgtype}, of which a field with bounds can be shown, as in "
-            f"Field('{topic}.<field>', low, high); {nearest(msgtype, CHANNELS)}"
+            f"{topic} carries {msgtype}, of which fields can be shown, as Field('{topic}.<field>', low, "
+            f"high); whole are {', '.join(CHANNELS)}"
         )
-    return CHANNELS[msgtype](topic)
+    return CHANNELS[msgtype](name)
 
 
 def _within(values: Values | None, space: spaces.Space[Any]) -> Values:

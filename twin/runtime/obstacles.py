@@ -41,18 +41,26 @@ def hidden_pose(obstacle: Obstacle) -> Pose3:
 class ObstacleSchedule:
     """Puts obstacles in the robots' way as they drive."""
 
-    def __init__(self, world: World, obstacles: Sequence[Obstacle], footprints: Sequence[Array] = ()) -> None:
+    def __init__(
+        self,
+        world: World,
+        obstacles: Sequence[Obstacle],
+        footprints: Sequence[Array] = (),
+        comers: Sequence[Obstacle] = (),
+    ) -> None:
         """Take the world's obstacles.
 
         Args:
             world: Where they are.
             obstacles: As the scenario has them.
             footprints: Of the robots, in the order of `update`, each of shape (n, 2) [m].
+            comers: Obstacles that are hidden until they are let `come`.
         """
         self._world = world
         self._outlines = [Outline.of(footprint) for footprint in footprints]
         self._waiting = [obstacle for obstacle in obstacles if obstacle.appears_within is not None]
         self._walkers = [Walker(obstacle) for obstacle in obstacles if obstacle.route is not None]
+        self._comers = {obstacle.name: obstacle for obstacle in comers}
         self._time_ns = world.time_ns
         self._bases: Sequence[Pose2] = ()
 
@@ -66,6 +74,23 @@ class ObstacleSchedule:
     def active(self) -> bool:
         """Whether there is one that waits or walks."""
         return bool(self._waiting or self._walkers)
+
+    def come(self, name: str, pose: Pose2 | None = None) -> None:
+        """Put one of the comers where it starts, or at another pose."""
+        comer = self._comers[name]
+        self._world.place(name, _on_floor(comer, comer.pose.pose if pose is None else pose))
+        if comer.route is not None:
+            self._walkers.append(Walker(comer))
+            self._time_ns = self._world.time_ns
+
+    def leave(self, name: str) -> None:
+        """Hide one of the comers again."""
+        self._walkers = [walker for walker in self._walkers if walker.obstacle.name != name]
+        self._world.place(name, hidden_pose(self._comers[name]))
+
+    def gap(self, name: str, base: Pose2) -> float:
+        """Return how far a robot's base is from the footprint of one of the comers [m]."""
+        return _distance(self._comers[name], self._world.pose(name).to_pose2(), base)
 
     def update(self, bases: Sequence[Pose2]) -> None:
         """Take the robots' true poses at the world's present time."""

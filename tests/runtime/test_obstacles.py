@@ -12,7 +12,7 @@ from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.geometry import Pose2, Pose3
 from twin.navigation.costmaps.footprint import rectangle
-from twin.runtime.events.obstacles import ObstacleSchedule, Outline, Walker
+from twin.runtime.obstacles import ObstacleSchedule, Outline, Walker
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 from twin.scenario.world import Obstacle, PoseConfig
