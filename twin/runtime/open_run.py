@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
+import uuid
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -389,6 +390,6 @@ def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> Reru
     if viewer is not None:
         # Each is a recording of its own, which the viewer turns to.
         live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
-        return RerunSink(viewer, config=live, recording_id=f"{name}-{time.monotonic_ns()}")
+        return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
     assert out is not None
     return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)
