@@ -32,6 +32,7 @@ def test_noise_comes_on_top_of_one_sensor_and_changes_no_other(drive: Drive) -> 
     assert abs(off.mean()) < 0.005
     assert payloads(plain, "/scan", "/rosout") == payloads(noisy, "/scan", "/rosout"), "not another bit"
     assert noisy.reports["noise"].effect == "15 of 15 readings of scan altered"
+    assert not noisy.said["/scan"][0].message.ranges.flags.writeable, "as those of others: many hear it"
     other = drive("[{loss: {share: 1, topic: /imu}}, {noise: {sensor: scan, stddev: 0.05}}]")
     assert np.array_equal(scans(other), scans(noisy)), "another fault changes nothing of its numbers"
     assert not np.array_equal(scans(drive("[noise: {sensor: scan, stddev: 0.05}]", seed="2")), scans(noisy))
