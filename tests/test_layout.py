@@ -35,6 +35,11 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
     "twin/runtime/pacing.py": {"perf_counter", "sleep"},  # how a paced run waits
     "twin/runtime/open_run.py": {"perf_counter", "process_time"},  # how long the run took
+    "twin/experiments/processes.py": {"monotonic"},  # the time limit of a job
+    "twin/experiments/sweep/folder.py": {"monotonic", "time"},  # locks that other machines have left
+    "twin/experiments/sweep/making.py": {"sleep"},  # waits for what others make
+    "twin/experiments/sweep/sweep.py": {"monotonic"},  # how often is looked and told
+    "twin/experiments/sweep/ray_cluster.py": {"monotonic"},  # the time limit of a run
     "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
     "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose
@@ -50,6 +55,8 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
     "benchmarks/twin_benchmarks/grid_maps.py": {"perf_counter"},  # the same
     "benchmarks/twin_benchmarks/slam/trial.py": {"perf_counter"},  # times faster than the robot drove
+    "twin/experiments/pytest_plugin.py": {"now"},  # the name of a folder of runs
+    "twin/experiments/report/page.py": {"now"},  # when the page was written
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""

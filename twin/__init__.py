@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 """As `typing` has it, which need not be imported for it: Ctrl-C finds nothing to interrupt here."""
 if TYPE_CHECKING:
     from twin.api.bags import Bag, read_bag
-    from twin.api.files import load_arena, load_scenario, read_recording
+    from twin.api.files import load_arena, load_scenario, read_recording, read_runs
     from twin.api.robot import Robot, load_robot
     from twin.api.simulation import Simulation, run
     from twin.api.truth import Truth
@@ -50,6 +50,7 @@ __all__ = [
     "msgs",
     "read_bag",
     "read_recording",
+    "read_runs",
     "run",
     "srvs",
 ]
@@ -77,6 +78,7 @@ _HOMES = {
     "make_vec_env": "twin.envs.scenario.make",
     "read_bag": "twin.api.bags",
     "read_recording": "twin.api.files",
+    "read_runs": "twin.api.files",
     "run": "twin.api.simulation",
 }
 _MODULES = {"actions": "twin.bridge.action_types", "msgs": "twin.bridge.msgs", "srvs": "twin.bridge.srvs"}

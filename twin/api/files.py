@@ -8,6 +8,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pyarrow as pa  # type: ignore[import-untyped]
+
     from twin.recording.read_back import Recording
     from twin.scenario.schema import Scenario
     from twin.warehouse.arena import Arena
@@ -49,6 +51,23 @@ def load_scenario(
     from twin.scenario.overrides import read_scenario
 
     return read_scenario(scenario, overrides, execute=execute)
+
+
+def read_runs(folder: str | Path) -> pa.Table:
+    """Read the verdicts of all runs below a folder, as `twin test` writes them: an Arrow table.
+
+    It has a row for each run, with `test`, `scenario`, `seed`, `verdict`, the metrics, and of each check
+    `<name>.passed`, `.value`, `.limit`, `.margin`; `to_pandas()` and `polars.from_arrow` make frames of it.
+
+    Args:
+        folder: Of one run, or of many.
+
+    Raises:
+        RecordingError: There is no run, or a verdict cannot be read.
+    """
+    from twin.experiments.runs_table import runs_table
+
+    return runs_table(Path(folder))
 
 
 def read_recording(path: str | Path) -> Recording:

@@ -30,11 +30,11 @@ def read_scenario(
                 "or the file instead of the scenario"
             )
         return scenario
-    texts = {key: _as_yaml(value) for key, value in overrides.items()}
+    texts = {key: as_yaml(value) for key, value in overrides.items()}
     return schema.load(scenario, texts, execute=execute)
 
 
-def _as_yaml(value: Any) -> str:
+def as_yaml(value: Any) -> str:
     """Return a value as in a file (JSON is YAML); text is taken as it is, as that of `twin run --set`."""
     if isinstance(value, str):
         return value
