@@ -1,4 +1,4 @@
-"""Writes the tables of docs/scenarios.md, arenas.md, navigation.md and api.md: `python docs/reference.py`.
+"""Writes the tables of docs/ (scenarios, checks, arenas, navigation, api): `python docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
 the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
@@ -44,6 +44,7 @@ from twin.parameters.declaration import fields_of
 from twin.runtime.build import build
 from twin.scenario.faults import LastingRobotFault
 from twin.scenario.schema import json_schema, load
+from twin.scenario.signals import SIGNALS
 from twin.warehouse.arena_file import ArenaFile
 
 DOCS = Path(__file__).parent
@@ -363,12 +364,26 @@ def pages() -> dict[Path, str]:
         navigation: updated(text, "parameters", parameters),
         DOCS / "api.md": updated((DOCS / "api.md").read_text("utf-8"), "names", api()),
         scenarios: updated(scenarios.read_text("utf-8"), "scenario keys", tables(json_schema(), {})),
+        DOCS / "checks.md": updated((DOCS / "checks.md").read_text("utf-8"), "signals", signals()),
         arenas: updated(
             arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)
         ),
         JAZZY: "{\n" + ",\n".join(f'"{name}": {json.dumps(of)}' for name, of in FIELDDEFS.items()) + "\n}\n",
         HASHES: json.dumps({"note": "written by docs/reference.py", "hashes": hashes()}, indent=0) + "\n",
     }
+
+
+def signals() -> str:
+    """Return the table of the simulator's signals."""
+    rows = ["| Signal | Unit | Meaning |", "|---|---|---|"]
+    units_of = {bool: "true or false", str: "text"}
+    for name in SIGNALS.shipped:
+        signal = SIGNALS.find(name).load()
+        arguments = ", ".join(argument for argument, _ in signal.takes)
+        called = f"{name}({arguments})" if arguments else name
+        unit = units_of.get(signal.kind, signal.unit) or "–"
+        rows.append(f"| `{called}` | {unit} | {_flow(signal.__doc__ or '')} |")
+    return "\n".join(rows)
 
 
 def hashes() -> dict[str, str]:

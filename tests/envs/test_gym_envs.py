@@ -157,6 +157,45 @@ def test_the_vector_truncates_by_itself(env_id):
         gym.make_vec(env_id, num_envs=2, max_episode_steps=0)
 
 
+def test_in_the_next_step_as_within_the_same_only_later(vector):
+    """Each episode has the same observations, whenever it begins."""
+    later = NavigationVectorEnv(vector.unwrapped.navigation, 3, autoreset_mode="NextStep")
+    taken = [later.reset(seed=1)[0]]
+    ends = []
+    for step in range(8):
+        observations, rewards, _, truncated, info = later.step(np.full((4, 2), 0.3))
+        taken.append(observations)
+        ends.append(bool(truncated.all()))
+        assert "final_obs" not in info
+        if step in (3, 7):
+            assert not rewards.any()
+    assert ends == [False, False, True, False] * 2
+    now = NavigationVectorEnv(vector.unwrapped.navigation, 3)
+    expected = [now.reset(seed=1)[0]]
+    for _ in range(6):
+        observations, *_, info = now.step(np.full((4, 2), 0.3))
+        if "final_obs" in info:
+            expected.append(np.stack(list(info["final_obs"])))
+        expected.append(observations)
+    np.testing.assert_array_equal(taken, expected)
+
+
+def test_where_it_is_disabled_the_user_resets(vector):
+    made = NavigationVectorEnv(
+        vector.unwrapped.navigation, 2, autoreset_mode=gym.vector.AutoresetMode.DISABLED
+    )
+    made.reset(seed=1)
+    for _ in range(2):
+        *_, truncated, _ = made.step(np.zeros((4, 2)))
+    assert truncated.all()
+    with pytest.raises(GymError, match="environment 0 is over; valid: reset it"):
+        made.step(np.zeros((4, 2)))
+    made.reset(options={"reset_mask": truncated})
+    made.step(np.zeros((4, 2)))
+    with pytest.raises(GymError, match="autoreset_mode is 'never'; valid: NextStep, SameStep, Disabled"):
+        NavigationVectorEnv(vector.unwrapped.navigation, 2, autoreset_mode="never")
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

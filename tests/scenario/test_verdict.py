@@ -56,6 +56,7 @@ def test_json_has_the_documented_keys_and_no_infinities(tmp_path: Path) -> None:
     assert wanted <= set(data)
     assert data["checks"][0] == {
         "name": "energy", "passed": True, "value": 1.0, "limit": 2.0, "unit": "m", "at_s": 3.0, "reason": "",
+        "margin": None, "worst_s": None,
     }  # fmt: skip
     assert data["checks"][1]["value"] is None
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from twin.envs.gym_envs import NavigationEnv, NavigationVectorEnv
 from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig
@@ -126,6 +127,8 @@ class DiffDriveGoalVectorEnv(NavigationVectorEnv):
         config: DiffDriveGoalConfig | None = None,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         threads: int = 0,
     ) -> None:
-        super().__init__(_navigation(config, num_envs, threads), max_episode_steps, render_mode)
+        navigation = _navigation(config, num_envs, threads)
+        super().__init__(navigation, max_episode_steps, render_mode, autoreset_mode)

@@ -72,19 +72,34 @@ class NavigationEnv(gym.Env[Observation, Observation]):
 class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     """n environments; one that is over begins its next episode within the same step."""
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": ["rgb_array"],
-        "render_fps": _FPS,
-        "autoreset_mode": AutoresetMode.SAME_STEP,
-    }
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": _FPS}  # noqa: RUF012
 
     def __init__(
-        self, navigation: Navigation, max_episode_steps: int | None, render_mode: str | None = None
+        self,
+        navigation: Navigation,
+        max_episode_steps: int | None,
+        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ) -> None:
+        """Take n environments.
+
+        Args:
+            navigation: They.
+            max_episode_steps: An episode is truncated after so many; None: never.
+            render_mode: `rgb_array` or None.
+            autoreset_mode: When one that is over begins its next episode: within the same step, in the next
+                one (as some of gymnasium's wrappers want it), or, where it is disabled, when it is reset.
+
+        Raises:
+            GymError: One of them is wrong.
+        """
         if max_episode_steps is not None and max_episode_steps < 1:
             raise GymError(f"max_episode_steps is {max_episode_steps}; valid: a whole number from 1 on")
         self.navigation, self.num_envs = navigation, navigation.count
         self.render_mode = _known(render_mode, self.metadata)
+        self._mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
+        self._over = np.zeros(self.num_envs, np.bool_)
         self.single_action_space = navigation.agent.action_space
         self.single_observation_space = navigation.agent.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -111,6 +126,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         self._take_seeds(seed, which)
         for i in which:
             self._begin(int(i), options)
+        self._over[which] = False
         self._observations[which] = self.navigation.observe(which)
         return self._observations.copy(), _masked({"distance": self.navigation.distances()})
 
@@ -146,16 +162,24 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     def step(
         self, actions: ArrayLike
     ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Drive for a decision period; who is over then begins anew."""
+        """Drive for a decision period; who is over begins anew as the autoreset mode says."""
         if not self._seeds:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(np.asarray(actions), self.num_envs))
+        checked, ended = _checked(np.asarray(actions), self.num_envs), self._over
+        if self._mode == AutoresetMode.DISABLED and ended.any():
+            which = int(np.argmax(ended))
+            raise GymError(f"environment {which} is over; valid: reset it, with option 'reset_mask'")
+        outcome = self.navigation.act(checked)
+        for i in np.flatnonzero(ended):
+            self._begin(int(i))
+            outcome.clear(int(i), self.navigation.distances()[i])
         terminated = outcome.success | outcome.collision
         truncated = self.navigation.steps >= self._longest
         observations, info = self.navigation.observe(), _masked(_info(outcome))
-        over = np.flatnonzero(terminated | truncated)
-        if len(over):
-            self._begin_anew(over, observations, info)
+        self._over = terminated | truncated
+        if self._mode == AutoresetMode.SAME_STEP and self._over.any():
+            self._begin_anew(np.flatnonzero(self._over), observations, info)
+            self._over = np.zeros(self.num_envs, np.bool_)
         self._observations = observations
         return observations.copy(), outcome.reward, terminated, truncated, info
 
@@ -180,6 +204,14 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     def close_extras(self, **kwargs: Any) -> None:
         """Free what drawing took."""
         self.navigation.close()
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        valid = ", ".join(mode.value for mode in AutoresetMode)
+        raise GymError(f"autoreset_mode is {mode!r}; valid: {valid}") from None
 
 
 def _known(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:

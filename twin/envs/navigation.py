@@ -114,6 +114,10 @@ class Outcome(NamedTuple):
     distance: Array
     """True, to the goal [m]."""
 
+    def clear(self, i: int, distance: float) -> None:
+        """Let nothing have happened in environment `i`, which is so far from its goal [m]."""
+        self.reward[i], self.success[i], self.collision[i], self.distance[i] = 0.0, False, False, distance
+
 
 class Navigation:
     """n environments on one course, without any convention of gymnasium's on top."""

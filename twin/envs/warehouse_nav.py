@@ -9,6 +9,7 @@ from itertools import count, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from twin.envs import kernels
@@ -231,7 +232,8 @@ class WarehouseNavVectorEnv(NavigationVectorEnv):
         config: WarehouseNavConfig | None = None,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         threads: int = 0,
     ) -> None:
         navigation = WarehouseNavigation(config or WarehouseNavConfig(), num_envs, threads)
-        super().__init__(navigation, max_episode_steps, render_mode)
+        super().__init__(navigation, max_episode_steps, render_mode, autoreset_mode)

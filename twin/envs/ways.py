@@ -98,14 +98,21 @@ class Ways:
             way: Written: the length of the way, shape (n,) [m].
             points: Written: x, y of the next points, shape (n, 2) [m].
         """
-        steps = round(ahead / _SPACING)
         x, y = self.origin
-        _look_up(lengths, places, x, y, _SPACING, steps, way, points)
+        _look_up(lengths, self._nearest, places, x, y, _SPACING, ahead, way, points)
 
 
 @jit
 def _look_up(
-    lengths: Array, places: Array, x0: float, y0: float, spacing: float, steps: int, way: Array, points: Array
+    lengths: Array,
+    nearest: NDArray[np.intp],
+    places: Array,
+    x0: float,
+    y0: float,
+    spacing: float,
+    ahead: float,
+    way: Array,
+    points: Array,
 ) -> None:
     rows, columns = lengths.shape[1], lengths.shape[2]
     for i in range(places.shape[0]):
@@ -117,12 +124,17 @@ def _look_up(
         way[i] = (1.0 - y) * ((1.0 - x) * field[row, column] + x * field[row, column + 1]) + y * (
             (1.0 - x) * field[row + 1, column] + x * field[row + 1, column + 1]
         )
-        row, column = row + (y >= 0.5), column + (x >= 0.5)
-        for _ in range(steps):
+        first = nearest[(row + (y >= 0.5)) * columns + column + (x >= 0.5)]
+        row, column, gone = first // columns, first % columns, 0.0
+        while gone < ahead - 1e-9:
             best_row, best_column = row, column
             for near_row in range(max(row - 1, 0), min(row + 2, rows)):
                 for near_column in range(max(column - 1, 0), min(column + 2, columns)):
-                    if field[near_row, near_column] < field[best_row, best_column]:
+                    near = near_row * columns + near_column
+                    if nearest[near] == near and field[near_row, near_column] < field[best_row, best_column]:
                         best_row, best_column = near_row, near_column
+            if best_row == row and best_column == column:
+                break  # at the goal
+            gone += spacing * math.sqrt(float((best_row - row) ** 2 + (best_column - column) ** 2))
             row, column = best_row, best_column
         points[i, 0], points[i, 1] = x0 + spacing * column, y0 + spacing * row

@@ -58,6 +58,7 @@ from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
 from twin.parameters.units import Metres as Metres
 from twin.parameters.units import MetresPerSecond as MetresPerSecond
+from twin.parameters.units import MetresPerSecondCubed as MetresPerSecondCubed
 from twin.parameters.units import MetresPerSecondSquared as MetresPerSecondSquared
 from twin.parameters.units import Newtons as Newtons
 from twin.parameters.units import PerMetre as PerMetre

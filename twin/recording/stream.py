@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import rerun_bindings
 
 from twin.errors import RecordingError
 from twin.files.writing import replaced
+from twin.recording.columns import Chunk, Component, send, sim_time
 from twin.recording.frames import WORLD, Frames
 
 WALL_CLOCK_METRICS = frozenset(
@@ -175,7 +176,26 @@ def log_verdict(recording: rr.RecordingStream, verdict: Mapping[str, Any]) -> No
     plain = {key: str(verdict[key]) for key in ("scenario", "seed", "verdict", "digest") if key in verdict}
     whole = json.dumps(verdict, sort_keys=True, default=str)
     recording.send_property("verdict", rr.AnyValues(drop_untyped_nones=True, **plain, json=whole))
+    send(recording, _worst_moments(verdict.get("checks", ())))
     recording.log("/verdict", rr.TextDocument(verdict_text(verdict), media_type="text/markdown"), static=True)
+
+
+def _worst_moments(checks: Iterable[Mapping[str, Any]]) -> Iterator[Chunk]:
+    """Yield lines of the log where each check came closest to being otherwise: what it was then."""
+    known = sorted((c for c in checks if c.get("worst_s") is not None), key=lambda check: check["worst_s"])
+    if not known:
+        return
+    times = [round(check["worst_s"] * 1e9) for check in known]
+    levels = ["INFO" if check["passed"] else "ERROR" for check in known]
+    text, level = (Component(rr.TextLog, name) for name in ("text", "level"))
+    yield "/log/checks", sim_time(times), (text.column(list(map(_moment, known))), level.column(levels))
+
+
+def _moment(check: Mapping[str, Any]) -> str:
+    unit = check.get("unit") or ""
+    said = check.get("reason") or f"worst moment, {_number(check.get('value'))} {unit}".rstrip()
+    margin = "" if check.get("margin") is None else f", margin {_number(check['margin'])} {unit}".rstrip()
+    return f"{check.get('name', '')}: {said}{margin}"
 
 
 def verdict_text(verdict: Mapping[str, Any]) -> str:
@@ -184,7 +204,7 @@ def verdict_text(verdict: Mapping[str, Any]) -> str:
     lines = [f"**{word}: {verdict.get('scenario', '')}**, seed {verdict.get('seed', '–')}", ""]
     checks = verdict.get("checks", ())
     if checks:
-        lines += ["| check | | value | limit | at |", "|---|---|---|---|---|"]
+        lines += ["| check | | value | limit | margin | at |", "|---|---|---|---|---|---|"]
         lines += [_check_row(check) for check in checks]
         lines.append("")
     if faults := verdict.get("faults", ()):
@@ -208,10 +228,12 @@ def _fault_row(fault: Mapping[str, Any]) -> str:
 
 def _check_row(check: Mapping[str, Any]) -> str:
     unit = check.get("unit") or ""
-    at = check.get("at_s")
+    at = check.get("at_s") if check.get("worst_s") is None else check["worst_s"]
+    margin = "" if check.get("margin") is None else f"{_number(check['margin'])} {unit}"
+    name = str(check.get("name", "")).replace("|", "\\|")
     return (
-        f"| {check.get('name', '')} | {'pass' if check.get('passed') else '**FAIL**'} "
-        f"| {_number(check.get('value'))} {unit} | {_number(check.get('limit'))} {unit} "
+        f"| {name} | {'pass' if check.get('passed') else '**FAIL**'} "
+        f"| {_number(check.get('value'))} {unit} | {_number(check.get('limit'))} {unit} | {margin} "
         f"| {'' if at is None else f'{_number(at)} s'} |"
     )
 

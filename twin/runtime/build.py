@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.missions import AnyMission, build_missions
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
+from twin.runtime.topics import topic_types
 from twin.savings import ALL, Savings
 from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation
@@ -85,6 +87,7 @@ def build(
     outside: Outside = ALONE,
     crash_folder: Path | None = None,
     savings: Savings = ALL,
+    before_nodes: Callable[[World, Bus], None] | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
 
@@ -95,6 +98,7 @@ def build(
         outside: The user's own nodes, and how the run keeps time with other processes.
         crash_folder: Where the last states go if the physics diverges.
         savings: What is not done over again.
+        before_nodes: Called when the world is there, and the bus without a node.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -140,6 +144,8 @@ def build(
     for tap in taps:
         bus.tap(tap)
     try:
+        if before_nodes is not None:
+            before_nodes(world, bus)
         control_period_ns = round(scenario.physics.control_period * 1e9)
         alone = len(scenario.robots) == 1
         bus.node_options = None if alone else _TREE_EACH
@@ -177,7 +183,7 @@ def build(
         stacks=stacks,
         mission=mission,
         deciders=deciders,
-        checks=_check_context(scenario, scene, arena, stacks),
+        checks=replace(_check_context(scenario, scene, arena, stacks), topics=partial(topic_types, bus)),
         comers=comers,
         control_period_ns=control_period_ns,
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from twin.geometry import Pose3
 from twin.runtime.defaults.from_description import GRASP_FRAME
+from twin.runtime.on_demand import ON_DEMAND
 from twin.runtime.payload import Payload
 from twin.runtime.stacks.missions import AnyMission
 from twin.runtime.stacks.robot import RobotStack
@@ -30,11 +31,14 @@ class Observer:
         stacks: Sequence[RobotStack],
         mission: AnyMission,
         goods: Sequence[str],
+        needs: Collection[str] = (),
     ) -> None:
+        """Bind to a run; `needs` are the fields of `RobotObservation` that are only computed if asked for."""
         self._world = world
         self._stacks = stacks
         self._mission = mission
         self._goods = tuple(goods)
+        self._needed = {name: reader(world, stacks) for name, reader in ON_DEMAND.items() if name in needs}
         self._last: dict[str, tuple[int, Pose3]] = {}
         self._payload = Payload(world, self._goods)
         self._contacts: dict[tuple[str, str], Contact | ContactObservation] = {}
@@ -88,15 +92,18 @@ class Observer:
         self._last[stack.name] = (now, pose)
         elapsed = (now - then) * 1e-9
         speed = math.dist(pose.xyz[:2].tolist(), before.xyz[:2].tolist()) / elapsed if elapsed else 0.0
+        navigator = stack.navigator
         return RobotObservation(
             pose=pose,
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            work_J=self._world.work(stack.name),
-            goals=stack.navigator.goals if stack.navigator is not None else 0,
-            recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
+            goals=navigator.goals if navigator is not None else 0,
+            recoveries=navigator.recoveries if navigator is not None else 0,
+            recovering=navigator is not None and navigator.recovering,
+            goal=navigator.goal if navigator is not None else None,
             map=stack.slam.map if stack.slam is not None else None,
+            **{name: read(stack.name) for name, read in self._needed.items()},
         )
 
     def _note_moved(self) -> frozenset[str]:

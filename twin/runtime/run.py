@@ -39,18 +39,21 @@ class Run:
         self.scenario = scenario
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
+        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
-        if any(check.measures_work for check in self.checks):
-            self.world.measure_work()
         goods = [good.name for good in self.world.scene.goods]
-        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
+        needs = {field for check in self.checks for field in check.needs}
+        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods, needs)
+        if any(check.topics for check in self.checks):
+            from twin.runtime.topics import watch_topics
+
+            watch_topics(self.bus, self.checks)
         self._sink = sink
         self.schedule = SensorSchedule(
             [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
         )
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = parts.control_period_ns // self.world.timestep_ns
-        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.bus.started()
         self.lockstep: Lockstep | None = None
         if outside.wait_for:
@@ -67,6 +70,7 @@ class Run:
         self.faults: FaultSchedule | None = self._schedule_faults() if scenario.faults else None
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
+        """When the run ends, at the latest."""
         self._mission_end_ns: int | None = None
         self._check()  # where everything starts
 
@@ -172,6 +176,13 @@ class Run:
         observation = self._observer.observe()
         for check in self.checks:
             check.observe(observation)
+        if self.scenario.early_stop != "never" and self._is_decided():
+            self._end_ns = min(self._end_ns, self.world.time_ns)
+
+    def _is_decided(self) -> bool:
+        """Whether the run may end, by its key `early_stop`."""
+        decided = [check.decided for check in self.checks]
+        return False in decided or (self.scenario.early_stop == "decided" and None not in decided)
 
     def sinks(self) -> None:
         """7. Checks and recording."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.periods import period_of
+from twin.scenario.checks.check import RobotCheckConfig
 from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.scenario.missions import (
@@ -197,7 +198,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
-        if robot is not None or ("robot" in subjects and entry.kind != "no_collision"):
+        if robot is not None or isinstance(entry.config, RobotCheckConfig):
             yield from _robot(robot, robots, loc, entry.kind)
         subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
         if subject is not None and "robot" in subjects:

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr
 
-from twin.errors import ScenarioError
+from twin.errors import Problem, ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
 from twin.savings import uncollected
@@ -58,6 +58,9 @@ class Scenario(StrictModel):
     """What must hold for the run to pass."""
     pass_rate: PassRate | None = None
     """What share of the runs of `twin sweep` is to pass; absent: all."""
+    early_stop: Literal["never", "failed", "decided"] = "never"
+    """When checks end the run: `failed`, as soon as one has failed whatever comes; `decided`, also when
+    nothing that comes could change any of them."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
     test: CasesConfig = CasesConfig()
@@ -98,8 +101,23 @@ class Scenario(StrictModel):
         return changed
 
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
-        """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
-        return tuple(entry.build(context) for entry in self.checks)
+        """Return a fresh fold for each check.
+
+        Raises:
+            ScenarioError: The run lacks what some name, such as a zone or a topic.
+        """
+        checks, problems = [], list[Problem]()
+        for i, entry in enumerate(self.checks):
+            try:
+                checks.append(entry.build(context))
+            except ScenarioError as wrong:
+                problems += [
+                    problem if problem.file else self.source.problem(("checks", i), problem.message)
+                    for problem in wrong.problems
+                ]
+        if problems:
+            raise ScenarioError(problems)
+        return tuple(checks)
 
 
 def load(

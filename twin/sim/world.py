@@ -249,7 +249,7 @@ class World:
 
     def model_to_see(self) -> mujoco.MjModel:
         """Return the same world with what is seen only, to draw it at this one's `qpos` and `mocap_pos`."""
-        return self._spec.copy().compile()
+        return build_spec(self.scene, self._placements, self.physics).compile()
 
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""

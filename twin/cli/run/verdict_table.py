@@ -24,14 +24,18 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
 
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
-    table.add_column("check", no_wrap=True)
-    for name in ("value", "limit", "at"):
+    table.add_column("check", overflow="fold")
+    for name in ("value", "limit", "margin", "at"):
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
         value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
-        table.add_row(mark, Text(check["name"]), value, limit, at)
+        margin = (
+            quantity(check["margin"], check["unit"], check["limit"]) if check["margin"] is not None else ""
+        )
+        moment = check["at_s"] if check["worst_s"] is None else check["worst_s"]
+        at = "" if moment is None else f"{moment:.2f} s"
+        table.add_row(mark, Text(check["name"]), value, limit, margin, at)
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in _reasons(verdict)]

@@ -164,6 +164,11 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
     # -- inside ----------------------------------------------------------------------------------------------
 
     @property
+    def page_url(self) -> str | None:
+        """Address of the viewer in a browser; None without one, or if it has a window of its own."""
+        return self._screen.page_url
+
+    @property
     def agent(self) -> Agent:
         """The agent of the run under way."""
         return self._agent

@@ -43,7 +43,7 @@ def perform(job: Job) -> dict[str, Any]:
     """
     made = None
     try:
-        job.workshop.mkdir(exist_ok=True)
+        job.workshop.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(prefix=f"{job.folder.name}-", dir=job.workshop))
         text = _verdict(job, made).to_json()
         put(made, text, job.folder)
@@ -94,7 +94,7 @@ def _verdict(job: Job, made: Path) -> Verdict:
 def lost(job: Job, reason: str) -> dict[str, Any]:
     """Put the folder of a run that gave no result, and return its verdict."""
     verdict = Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason).to_json()
-    job.workshop.mkdir(exist_ok=True)
+    job.workshop.mkdir(parents=True, exist_ok=True)
     made = Path(tempfile.mkdtemp(dir=job.workshop))
     put(made, verdict, job.folder)
     result: dict[str, Any] = json.loads(verdict)
