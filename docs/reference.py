@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ (scenarios, checks, arenas, navigation, gymnasium, api): `python docs/reference.py`.
+"""Writes the tables of scenarios, checks, arenas, navigation, gymnasium, api: `python docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
 the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
