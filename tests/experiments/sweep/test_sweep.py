@@ -62,6 +62,7 @@ def test_a_table_has_a_row_for_each_run(undisturbed: bytes) -> None:
         "error",
         "check.final_pose",
         "check.final_pose.passed",
+        "check.final_pose.margin",
         "check.final_pose.at_s",
         "metric.sim_time_s",
         "metric.recoveries",

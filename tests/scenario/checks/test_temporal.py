@@ -10,7 +10,7 @@ import pytest
 
 from tests.scenario.checks.test_checks import at, bot
 from twin.bridge.types import get
-from twin.errors import ScenarioError
+from twin.errors import PluginError, ScenarioError
 from twin.geometry import Pose2
 from twin.scenario.checks import Check, CheckEntry, CheckResult
 from twin.scenario.observation import CheckContext, Observation, Zone
@@ -231,3 +231,40 @@ def test_what_is_wrong_is_told_with_its_line(entry: str, message: str, tmp_path:
     file.write_text(f"name: wrong\nduration: 1 s\nrobots: [model: diff_bot]\nchecks:\n  - {entry}\n")
     with pytest.raises(ScenarioError, match=rf"wrong.yaml:5: .*{message}"):
         run(load(file), record=False)
+
+
+WOBBLE = """
+from twin.scenario.signals import RobotSignal
+
+class Wobble(RobotSignal):
+    unit = "rad/s"
+
+    def of(self, robot, time_s):
+        return {value}
+"""
+
+
+@pytest.mark.parametrize(
+    ("value", "entry", "said"),
+    [
+        ("0.25", "below: 20 deg/s", None),
+        ("1 / 0", "below: 1", "signal 'wobble.py:Wobble' .*ZeroDivisionError: division by zero"),
+        ("'fast'", "below: 1", "signal 'wobble.py:Wobble' returns 'fast'; it must be a float, or None"),
+        ("0.25", "below: 3 kg", "below: the limit of wobble.py:Wobble must have a unit of turn rate"),
+    ],
+)
+def test_a_signal_of_the_users_own(value: str, entry: str, said: str | None, tmp_path: Path) -> None:
+    from twin.runtime import run
+
+    (tmp_path / "wobble.py").write_text(WOBBLE.replace("{value}", value), encoding="utf-8")
+    file = tmp_path / "wobbles.yaml"
+    check = f'always: {{signal: "wobble.py:Wobble", {entry}}}'
+    file.write_text(f"name: wobbles\nduration: 1 s\nrobots: [model: diff_bot]\nchecks: [{check}]\n")
+    if said is not None:
+        with pytest.raises((PluginError, ScenarioError), match=said):
+            run(load(file, execute=True), record=False)
+        return
+    (result,) = run(load(file, execute=True), record=False).checks
+    assert (result.passed, result.value, result.unit) == (True, 0.25, "rad/s")
+    assert result.margin == pytest.approx(math.radians(20.0) - 0.25)
+    assert load(file).checks[0].kind == "always", "it can be read without running the file"

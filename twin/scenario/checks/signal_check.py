@@ -26,11 +26,11 @@ class SignalCheck(Check):
         super().__init__(name, config, context)
         self._formula = self.formula()
         self._monitor = Monitor(self._formula)
-        self._references = {text: self.reference(text) for text in self._monitor.signals}
         self._signals: dict[str, Signal] = {}
         self.topics: dict[str, TopicReader] = {}
-        self._unseen = dict.fromkeys(self._references)
-        for text, reference in self._references.items():
+        self._unseen = dict.fromkeys(self._monitor.signals)
+        for text in self._monitor.signals:
+            reference = self.reference(text)
             if reference.field is None:
                 self._signals[text] = reference.make(config.robot, context)
             else:
@@ -49,9 +49,13 @@ class SignalCheck(Check):
 
     def sentence(self, predicate: Predicate, margin: Margin) -> str:
         """Return why it failed, by the predicate whose value it was."""
-        value, unit = margin.value, self._references[predicate.signal].unit
+        value, unit = margin.value, self._unit(predicate)
         said = f"{value:.4g} {unit}".rstrip() if isinstance(value, float) else repr(value)
         return f"{predicate.signal} was {said} at {margin.at_ns / 1e9:.2f} s"
+
+    def _unit(self, predicate: Predicate) -> str:
+        signal = self._signals.get(predicate.signal)
+        return "" if signal is None else signal.unit
 
     def nothing(self) -> str:
         """Return why there was nothing to look at, if the formula holds only for that; else nothing."""
@@ -113,7 +117,7 @@ class SignalCheck(Check):
             passed=margin.holds and not nothing,
             value=None if isinstance(margin.value, str) else margin.value,
             limit=None if isinstance(predicate.limit, str) else predicate.limit,
-            unit=self._references[predicate.signal].unit,
+            unit=self._unit(predicate),
             at_s=at_s,
             reason=(nothing and NOTHING + nothing) if margin.holds else self.sentence(predicate, margin),
             margin=margin.number,

@@ -9,11 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import cast
 
-from twin.errors import PluginError, nearest
+from twin.errors import PluginError, ScenarioError, nearest
 from twin.parameters.bounds import LARGEST
 from twin.parameters.units import UNITS, Unit
 from twin.scenario.observation import CheckContext
 from twin.scenario.signals import SIGNALS, Signal
+from twin.scenario.signals.signal import GuardedSignal
 from twin.scenario.signals.topics import TopicField
 from twin.scenario.temporal.formula import Predicate, Relation, Value
 from twin.scenario.temporal.text import Raw
@@ -152,7 +153,11 @@ class Reference:
         """
         plugin = SIGNALS.find(str(self._named["name"]), self.folder)
         executed = Reference(self.text, self.folder, execute=True)
-        return plugin.create(self.robot or robot, executed._arguments(), context)
+        try:
+            signal = plugin.create(self.robot or robot, executed._arguments(), context)
+        except ValueError as wrong:
+            raise ScenarioError(str(wrong)) from None
+        return signal if plugin.ships else GuardedSignal(plugin, signal)
 
 
 def _number(raw: Raw) -> float | str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, SupportsFloat
 
 from twin.errors import ScenarioError
 from twin.parameters.units import Unit
+from twin.plugins import Plugin
 from twin.scenario.observation import CheckContext, Observation, RobotObservation
 from twin.scenario.temporal.formula import Value
 
@@ -51,6 +52,26 @@ class RobotSignal(Signal):
     @abstractmethod
     def of(self, robot: RobotObservation, time_s: float) -> Value | None:
         """Return the value of what the robot does at a time [s]."""
+
+
+class GuardedSignal(Signal):
+    """Hands everything on to a user's signal."""
+
+    def __init__(self, plugin: Plugin[Signal], signal: Signal) -> None:
+        self._plugin, self._signal = plugin, signal
+        self.unit, self.kind, self.needs = signal.unit, signal.kind, signal.needs  # type: ignore[misc]
+
+    def value(self, observation: Observation) -> Value | None:
+        """Return the value now; raises PluginError if the signal raises, or has one of another kind."""
+        with self._plugin.guard:
+            value = self._signal.value(observation)
+        if value is None:
+            return None
+        if self.kind is float and isinstance(value, SupportsFloat) and not isinstance(value, bool):
+            return float(value)
+        if type(value) is not self.kind:
+            raise self._plugin.error(f"returns {value!r}; it must be a {self.kind.__name__}, or None")
+        return value
 
 
 def text_argument(arguments: Sequence[float | str], index: int = 0) -> str:
