@@ -224,7 +224,7 @@ def _again(verdict: Mapping[str, Any]) -> str:
 
 def _made_with(verdict: Mapping[str, Any]) -> str:
     rows = [("digest", verdict["digest"] or "none: the run was not finished"), ("CPU", verdict["cpu"])]
-    rows += [(name, version) for name, version in verdict["versions"].items()]
+    rows.append(("versions", ", ".join(f"{name} {version}" for name, version in verdict["versions"].items())))
     rows += [(f"plugin {name}", version) for name, version in verdict["plugins"].items()]
     cells = [
         ["", f'<th scope="row">{escape(name)}</th>', f"<td><code>{escape(str(value))}</code></td>"]
@@ -236,7 +236,7 @@ def _made_with(verdict: Mapping[str, Any]) -> str:
     )
     if not verdict["deterministic"]:
         says = "Other processes could change this run: its digest need not come again."
-    return "<h2>Made with</h2>" + _table(says, ["what", "value"], cells)
+    return "<h2>Made with</h2>" + _table(says, ["what", "which"], cells)
 
 
 def _moments(told: Told, moments: Iterable[Moment]) -> str:

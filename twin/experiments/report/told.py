@@ -20,6 +20,7 @@ from twin.recording.scene import RecordedScene
 from twin.scenario.quantities import quantity
 from twin.scenario.verdict import VERDICT
 
+_BAD = ("WARN", "ERROR", "CRITICAL")
 _MOST_MOMENTS = 6
 _END_S = 1.5
 """A check that was decided so shortly before the end was decided by it [s]."""
@@ -209,6 +210,11 @@ class Told:
             if check.get("margin") is not None:
                 text += f", margin {quantity(check['margin'], check['unit'], check['limit'])}"
             found.append(Moment(float(at), title, text, not check["passed"]))
+        found += [
+            Moment(float(fault["at_s"]), f"fault {fault['name']}", fault["effect"])
+            for fault in self.verdict.get("faults", ())
+            if fault["at_s"]
+        ]
         for robot in self.robots:
             for name, times, values in self.series(f"/localisation/{robot}/"):
                 if name == "position_error" and len(values):
@@ -222,7 +228,7 @@ class Told:
                     )
         found += [
             Moment(line.time_s, line.level.lower(), line.text, line.level != "WARN")
-            for line in [each for each in self.log if each.level in ("WARN", "ERROR", "CRITICAL")][:4]
+            for line in [each for each in self.log if each.level in _BAD and "[faults]" not in each.text][:4]
         ]
         found.sort(key=lambda moment: not moment.bad)
         return sorted(found[:_MOST_MOMENTS], key=lambda moment: moment.time_s)
