@@ -33,7 +33,7 @@ def work(job: str) -> Any:
 
 @pytest.fixture
 def processes() -> Iterator[Processes[str]]:
-    made = Processes(work, 2, preload="os", time_limit_s=None)
+    made = Processes(work, 2, time_limit_s=None)
     yield made
     made.close()
 
@@ -70,7 +70,7 @@ def test_a_dead_process_takes_only_its_own_job_with_it(processes: Processes[str]
 
 
 def test_a_job_that_takes_too_long_is_ended() -> None:
-    processes = Processes(work, 2, preload="os", time_limit_s=0.5)
+    processes = Processes(work, 2, time_limit_s=0.5)
     try:
         lost = result(processes, "hang")
         assert lost == Lost(reason="the run took longer than 0.5 s of wall time", too_long=True)
@@ -90,7 +90,7 @@ import sys
 from tests.experiments.test_processes import work
 from twin.experiments.processes import Processes
 
-processes = Processes(work, 1, preload="os")
+processes = Processes(work, 1)
 processes.start("a")
 [(_, pid)] = processes.wait(60.0)
 processes.start("hang")

@@ -52,7 +52,6 @@ class ResultFolder:
             "scenario": plan.name,
             "set": {axis.key: [*(axis.values or (axis.low, axis.high))] for axis in plan.axes},
             "points": len(plan.points),
-            "seeds": len(plan.seeds),
             "twin": version("twin"),
         }
         there = self._there()
@@ -195,10 +194,10 @@ def _lives(host: str, pid: str = "") -> bool:
 
 
 def _difference(there: dict[str, Any], told: dict[str, Any]) -> str:
-    for key, what in (("scenario", "of"), ("set", "over"), ("points", "points:"), ("seeds", "seeds:")):
+    for key, what in (("scenario", "of"), ("set", "over"), ("points", "points:")):
         if there.get(key) != told[key]:
             was = ", ".join(there[key]) or "seeds alone" if key == "set" and key in there else there.get(key)
             return f"{what} {was}"
     if there.get("twin") != told["twin"]:
         return f"made by twin {there.get('twin')}"
-    return "its scenario, a file that it names or its seeds have changed since"
+    return "its scenario, or a file that it names, has changed since"

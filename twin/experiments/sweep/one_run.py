@@ -13,7 +13,6 @@ from typing import Any
 
 from twin.errors import RecordingError, TwinError
 from twin.plugins import execution
-from twin.runtime.open_run import run
 from twin.scenario.schema import load
 from twin.scenario.verdict import VERDICT, Verdict
 
@@ -78,6 +77,8 @@ def put(made: Path, verdict: str, folder: Path) -> None:
 
 
 def _verdict(job: Job, made: Path) -> Verdict:
+    from twin.runtime.open_run import run  # who plans and waits does without
+
     try:
         with execution():
             scenario = load(job.scenario, job.overrides, execute=True)

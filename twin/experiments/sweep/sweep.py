@@ -22,6 +22,7 @@ from twin.experiments.sweep.table import make_table, write_parquet
 from twin.files.writing import write_whole
 
 Recordings = Literal["none", "few", "failures", "all"]
+_PRELOADED = (perform.__module__, "twin.runtime.open_run")
 FEW = 8
 """So many failing runs at most are recorded if nothing else is asked for, the first of each point."""
 _LOOK_S = 5.0
@@ -55,7 +56,7 @@ def local(processes: int, folder: Path, time_limit_s: float | None = None) -> Ba
         time_limit_s: Of one run [s of wall time].
     """
     log = folder / OUTPUT
-    return Processes(perform, processes, preload=perform.__module__, time_limit_s=time_limit_s, log=log)
+    return Processes(perform, processes, preload=_PRELOADED, time_limit_s=time_limit_s, log=log)
 
 
 def sweep(
