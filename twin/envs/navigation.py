@@ -235,10 +235,11 @@ class Navigation:
         points = self._points(row, self._believed(row, np.zeros((1, self.NOISES))))[0].tolist()
         marks = [Mark(points[0], self.config.goal_tolerance, (0.15, 0.7, 0.25, 0.9))]
         marks += [Mark(point, 0.1, (0.1, 0.4, 0.9, 0.9)) for point in points[1:]]
-        robot = self.simulations.root[i, :3] * (1.0, 1.0, 0.0)
+        simulations = self.simulations
+        state = simulations.qpos[i], simulations.mocap_pos[i], simulations.mocap_quat[i]
         if (distance := self.course.overview) is None:
-            return self._painter.draw(i, marks, robot, _NEAR_M)
-        return self._painter.draw(i, marks, (0.0, 0.0, 0.0), distance)
+            return self._painter.draw(state, marks, simulations.root[i, :3] * (1.0, 1.0, 0.0), _NEAR_M)
+        return self._painter.draw(state, marks, (0.0, 0.0, 0.0), distance)
 
     def begin_showing(self) -> None:
         """Show that the first environment begins an episode in Rerun's viewer, which starts if need be.
@@ -269,7 +270,7 @@ class Navigation:
 
     @cached_property
     def _painter(self) -> Painter:
-        return Painter(self.simulations, self.course.looks)
+        return Painter(self.simulations.robot.compile(self.course.looks, visuals=True))
 
     def close(self) -> None:
         """Free what drawing took, and end the viewer."""

@@ -1,8 +1,10 @@
-"""Pictures of an environment by MuJoCo's renderer, without a display."""
+"""Pictures of environments by MuJoCo's renderer, without a display."""
 
 from __future__ import annotations
 
+import atexit
 import os
+import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,9 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.envs.simulations import Simulations
 from twin.errors import GymError
-from twin.sim.scene import Scene
+from twin.geometry import Array
 
 _PLATFORMS = ("egl", "osmesa")
 """MuJoCo's ways to draw without a display, in the order in which they are tried."""
@@ -31,25 +32,22 @@ class Mark(NamedTuple):
 
 
 class Painter:
-    """Draws simulations of one model."""
+    """Draws a model at states of simulations."""
 
-    def __init__(
-        self, simulations: Simulations, looks: Scene, *, width: int = 640, height: int = 480
-    ) -> None:
-        """Compile what is to be seen.
+    def __init__(self, model: mujoco.MjModel, *, width: int = 640, height: int = 480) -> None:
+        """Open a renderer.
 
         Args:
-            simulations: To be drawn.
-            looks: Their scene, perhaps with more that never moves.
+            model: That of the simulations, with all that is to be seen.
             width: Of pictures [pixels].
             height: Of pictures [pixels].
 
         Raises:
-            GymError: This computer can draw nothing.
+            GymError: A size below 1, or this computer can draw nothing.
         """
-        self._simulations = simulations
-        self._model = simulations.robot.compile(looks, visuals=True)
-        self._data = mujoco.MjData(self._model)
+        if min(width, height) < 1:
+            raise GymError(f"a picture of {width} x {height} pixels; valid is 1 or more each way")
+        self._model, self._data = model, mujoco.MjData(model)
         self._size = height, width
         self._model.vis.quality.offsamples = 4
         self._model.vis.global_.offwidth, self._model.vis.global_.offheight = width, height
@@ -57,24 +55,27 @@ class Painter:
         self._context.make_current()
         self._target = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._target)
+        self._free = weakref.finalize(self, _free, self._target, self._context)
+        atexit.register(self._free)  # before what MuJoCo's module of the driver has registered
         self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 100)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = False  # without a graphics card they take most of the time
         self._options, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
         self._camera.elevation, self._camera.azimuth = _ELEVATION_DEG, _AZIMUTH_DEG
 
-    def draw(self, i: int, marks: Sequence[Mark], lookat: ArrayLike, distance: float) -> NDArray[np.uint8]:
-        """Return a picture of simulation `i`, shape (height, width, 3).
+    def draw(
+        self, state: tuple[Array, Array, Array], marks: Sequence[Mark], lookat: ArrayLike, distance: float
+    ) -> NDArray[np.uint8]:
+        """Return a picture, shape (height, width, 3).
 
         Args:
-            i: Which.
+            state: MuJoCo's qpos, mocap_pos and mocap_quat.
             marks: To be drawn beside it.
             lookat: x, y, z of the picture's middle [m].
             distance: Of the camera from there [m].
         """
-        data, simulations = self._data, self._simulations
-        data.qpos[:] = simulations.qpos[i]
-        data.mocap_pos[:], data.mocap_quat[:] = simulations.mocap_pos[i], simulations.mocap_quat[i]
+        data = self._data
+        data.qpos[:], data.mocap_pos[:], data.mocap_quat[:] = state
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
         self._camera.lookat[:], self._camera.distance = lookat, distance
@@ -102,9 +103,14 @@ class Painter:
         scene.ngeom += 1
 
     def close(self) -> None:
-        """Free what the graphics driver holds."""
-        self._target.free()
-        self._context.free()
+        """Free what the graphics driver holds. Harmless when repeated."""
+        self._free()
+        atexit.unregister(self._free)
+
+
+def _free(target: mujoco.MjrContext, context: Any) -> None:
+    target.free()
+    context.free()
 
 
 def _gl_context(width: int, height: int) -> Any:

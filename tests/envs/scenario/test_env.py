@@ -70,6 +70,19 @@ def test_options_change_one_run(make: MakeEnv, small: Path) -> None:
     assert env.reset()[1]["mission_goal"].tolist() == pytest.approx([-0.9, -0.8, 0.0])
 
 
+def test_checks_that_end_a_run_terminate_it(make: MakeEnv, small: Path) -> None:
+    checks = [{"never": "x > -1.45"}]
+    env = make(small, overrides={"checks": checks, "early_stop": "failed"}, ticks=20)
+    assert list(env.reset()[1]["checks"].values()) == ["open"]
+    for _ in range(20):
+        _, _, terminated, truncated, info = env.step(np.array([0.4, 0.0]))
+        if terminated or truncated:
+            break
+    assert (terminated, truncated) == (True, False)
+    assert list(info["checks"].values()) == ["fail"]
+    assert info["time_s"] < 4.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "options"),

@@ -26,6 +26,8 @@ from twin.scenario.schema import Scenario
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 _OF_THE_VERDICT = ("scenario", "seed", "verdict", "checks", "digest")
 """What is the same in two equal runs; `episode.verdict` has all."""
+_STANDS = {True: "pass", False: "fail", None: "open"}
+"""How a check stands, by whether it is decided."""
 _SEEDS = 2**31
 """Seeds of runs that are not given are drawn below this."""
 
@@ -35,7 +37,8 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
 
     A step lasts `ticks` control periods, or until the agent is asked again. The run ends as that of
     `twin run` does: `terminated` when its mission is over (after the second in which a run lets things
-    settle), `truncated` when its time is up. Then `info` has the verdict, with the digest of the run.
+    settle) or its checks end it early, `truncated` when its time is up. Then
+    `info` has the verdict, with the digest of the run.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"]}  # noqa: RUF012  gymnasium's own type
@@ -145,8 +148,9 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             verdict = episode.verdict.to_dict()
             info["verdict"] = {name: verdict[name] for name in _OF_THE_VERDICT}
             info["is_success"] = episode.verdict.exit_code == 0
-        done = episode.over and episode.parts.mission.done
-        return self._observer.observe(), sum(terms.values()), done, episode.over and not done, info
+        in_time = episode.parts.mission.done or episode.time < episode.scenario.duration - 1e-9
+        reward, over = sum(terms.values()), episode.over
+        return self._observer.observe(), reward, over and in_time, over and not in_time, info
 
     def render(self) -> Any:
         """Return a picture of the robot from above, shape (height, width, 3), if the mode is `rgb_array`.
@@ -248,7 +252,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             "mission_goal": np.array((0.0, 0.0, 0.0) if goal is None else goal),
             "has_goal": goal is not None,
             "goals_reached": episode.task.reached,
-            "checks": {check.name: check.result().passed for check in episode.run.checks},
+            "checks": {check.name: _STANDS[check.decided] for check in episode.run.checks},
             **self._agent.info(),
         }
 
