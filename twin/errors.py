@@ -9,6 +9,7 @@ TwinError
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── PluginError       a user's plugin lacks something, cannot be found, or fails while it runs
 ├── RecordingError    a recording cannot be written or read
+├── GymError          a gymnasium environment was made or used wrongly
 └── SimulationError   the physics cannot go on (diverged)
 
 The message is one sentence: what, where (file:line), what would be valid. `twin` prints it on stderr and
@@ -114,6 +115,10 @@ class PluginError(TwinError):
 
 class RecordingError(TwinError):
     """A recording cannot be written or read."""
+
+
+class GymError(TwinError, ValueError):
+    """A gymnasium environment was made or used wrongly."""
 
 
 class SimulationError(TwinError):
