@@ -62,7 +62,9 @@ def test_a_table_has_a_row_for_each_run(undisturbed: bytes) -> None:
         "error",
         "check.final_pose",
         "check.final_pose.passed",
+        "check.final_pose.margin",
         "check.final_pose.at_s",
+        "check.final_pose.worst_s",
         "metric.sim_time_s",
         "metric.recoveries",
         "digest",
@@ -187,13 +189,20 @@ def test_a_run_that_somebody_is_at_is_left_to_him(
     assert table(out) == undisturbed
 
 
-def test_the_folder_of_another_sweep_is_refused(plan: MakePlan, tmp_path: Path) -> None:
+def test_the_folder_of_another_sweep_is_refused(plan: MakePlan, scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     in_turn(plan(f"{SPEED}=0.1", seeds=(1,)), out)
     with pytest.raises(RecordingError, match=r"holds another sweep: over mission\.steps\.0\.linear"):
         in_turn(plan(f"{LIMIT}=1,2"), out)
+    with pytest.raises(
+        RecordingError, match=r"another sweep: with other values of mission\.steps\.0\.linear"
+    ):
+        in_turn(plan(f"{SPEED}=0.2"), out)
+    text = scenario.read_text()
+    scenario.write_text(text.replace("0.6 s", "0.7 s"))
     with pytest.raises(RecordingError, match="its scenario, or a file that it names, has changed since"):
-        in_turn(plan(f"{SPEED}=0.1 m/s"), out)
+        in_turn(plan(f"{SPEED}=0.1"), out)
+    scenario.write_text(text)
     with pytest.raises(RecordingError, match="holds something else than a sweep"):
         in_turn(plan(), tmp_path)
     (out / "sweep.json").write_text("half")

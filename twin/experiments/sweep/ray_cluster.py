@@ -11,6 +11,7 @@ import logging
 import os
 import shutil
 import socket
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -99,8 +100,9 @@ class RayCluster:
         """Leave the cluster; tasks of this sweep end."""
         if self._is_there:
             self._ray.shutdown()
-        else:  # it would wait for the head, and end this process as if a check had failed
+        else:  # Ray would wait for the head, then end this process as if a check had failed
             atexit.unregister(self._ray.shutdown)
+            atexit.register(_leave)
 
     def _ask(self) -> None:
         """Raise SimulationError if the head is gone: Ray would end this process a minute later."""
@@ -137,6 +139,13 @@ def _reach(address: str) -> None:
     if colon:
         with socket.create_connection((host.strip("[]"), int(port)), timeout=_REACHED_S):
             pass
+
+
+def _leave() -> None:
+    """End the process, which Ray's threads would let crash while it ends, as what is gone is an error."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(2)
 
 
 def _written(job: Job, files: dict[str, bytes]) -> dict[str, Any]:
