@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -16,6 +17,7 @@ import pytest
 from tests.experiments.sweep.conftest import LIMIT, SPEED, FullDisk, InTurn, MakePlan
 from tests.processes import wait_for
 from twin.errors import RecordingError
+from twin.experiments.sweep.one_run import Job
 from twin.experiments.sweep.plan import Plan
 from twin.experiments.sweep.result import SweepResult
 from twin.experiments.sweep.sweep import local, sweep
@@ -120,6 +122,7 @@ _KILLED = """
 import sys
 import time
 from pathlib import Path
+from typing import Any
 from tests.experiments.sweep.test_sweep import WORDS
 from twin.experiments.sweep.axes import parse_axis
 from twin.experiments.sweep.plan import make_plan
@@ -186,6 +189,21 @@ def test_a_run_that_somebody_is_at_is_left_to_him(
     assert [run.key for run in six.in_turn() if not (out / "runs" / run.key).exists()] == [left[1].key]
     (out / "locks" / left[1].key).unlink()
     assert in_turn(six, out).made == 1
+    assert table(out) == undisturbed
+
+
+def test_what_others_make_meanwhile_is_not_made_again(six: Plan, tmp_path: Path, undisturbed: bytes) -> None:
+    """Another process makes every second run while this one is at its first."""
+    out = tmp_path / "out"
+
+    class Beside(InTurn):
+        def wait(self, timeout_s: float) -> list[tuple[Job, Any]]:
+            if not self.made:
+                in_turn(six, out, shard=(2, 2))
+            return super().wait(timeout_s)
+
+    result = sweep(six, out, Beside(), record="none", page=False)
+    assert (result.made, result.complete) == (9, True)
     assert table(out) == undisturbed
 
 
