@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -16,6 +17,7 @@ import pytest
 from tests.experiments.sweep.conftest import LIMIT, SPEED, FullDisk, InTurn, MakePlan
 from tests.processes import wait_for
 from twin.errors import RecordingError
+from twin.experiments.sweep.one_run import Job
 from twin.experiments.sweep.plan import Plan
 from twin.experiments.sweep.result import SweepResult
 from twin.experiments.sweep.sweep import local, sweep
@@ -64,6 +66,7 @@ def test_a_table_has_a_row_for_each_run(undisturbed: bytes) -> None:
         "check.final_pose.passed",
         "check.final_pose.margin",
         "check.final_pose.at_s",
+        "check.final_pose.worst_s",
         "metric.sim_time_s",
         "metric.recoveries",
         "digest",
@@ -119,6 +122,7 @@ _KILLED = """
 import sys
 import time
 from pathlib import Path
+from typing import Any
 from tests.experiments.sweep.test_sweep import WORDS
 from twin.experiments.sweep.axes import parse_axis
 from twin.experiments.sweep.plan import make_plan
@@ -188,13 +192,35 @@ def test_a_run_that_somebody_is_at_is_left_to_him(
     assert table(out) == undisturbed
 
 
-def test_the_folder_of_another_sweep_is_refused(plan: MakePlan, tmp_path: Path) -> None:
+def test_what_others_make_meanwhile_is_not_made_again(six: Plan, tmp_path: Path, undisturbed: bytes) -> None:
+    """Another process makes every second run while this one is at its first."""
+    out = tmp_path / "out"
+
+    class Beside(InTurn):
+        def wait(self, timeout_s: float) -> list[tuple[Job, Any]]:
+            if not self.made:
+                in_turn(six, out, shard=(2, 2))
+            return super().wait(timeout_s)
+
+    result = sweep(six, out, Beside(), record="none", page=False)
+    assert (result.made, result.complete) == (9, True)
+    assert table(out) == undisturbed
+
+
+def test_the_folder_of_another_sweep_is_refused(plan: MakePlan, scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     in_turn(plan(f"{SPEED}=0.1", seeds=(1,)), out)
     with pytest.raises(RecordingError, match=r"holds another sweep: over mission\.steps\.0\.linear"):
         in_turn(plan(f"{LIMIT}=1,2"), out)
+    with pytest.raises(
+        RecordingError, match=r"another sweep: with other values of mission\.steps\.0\.linear"
+    ):
+        in_turn(plan(f"{SPEED}=0.2"), out)
+    text = scenario.read_text()
+    scenario.write_text(text.replace("0.6 s", "0.7 s"))
     with pytest.raises(RecordingError, match="its scenario, or a file that it names, has changed since"):
-        in_turn(plan(f"{SPEED}=0.1 m/s"), out)
+        in_turn(plan(f"{SPEED}=0.1"), out)
+    scenario.write_text(text)
     with pytest.raises(RecordingError, match="holds something else than a sweep"):
         in_turn(plan(), tmp_path)
     (out / "sweep.json").write_text("half")

@@ -15,7 +15,7 @@ from twin.models import load as load_robot
 from twin.models.shapes import Mesh
 from twin.scenario.schema import Scenario
 
-_IRRELEVANT = {"seed", "description", "pass_rate", "recording"}
+_IRRELEVANT = {"seed", "description", "pass_rate", "recording", "test"}
 """Keys that change no message of a run; the seed is told beside."""
 
 

@@ -194,10 +194,15 @@ def _lives(host: str, pid: str = "") -> bool:
 
 
 def _difference(there: dict[str, Any], told: dict[str, Any]) -> str:
-    for key, what in (("scenario", "of"), ("set", "over"), ("points", "points:")):
-        if there.get(key) != told[key]:
-            was = ", ".join(there[key]) or "seeds alone" if key == "set" and key in there else there.get(key)
-            return f"{what} {was}"
+    if there.get("scenario") != told["scenario"]:
+        return f"of {there.get('scenario')}"
+    was, now = there.get("set") or {}, told["set"]
+    if list(was) != list(now):
+        return f"over {', '.join(was) or 'seeds alone'}"
+    if was != now or there.get("points") != told["points"]:
+        return (
+            f"with other values of {', '.join(key for key in was if was[key] != now[key]) or 'its samples'}"
+        )
     if there.get("twin") != told["twin"]:
         return f"made by twin {there.get('twin')}"
     return "its scenario, or a file that it names, has changed since"

@@ -33,6 +33,7 @@ td.few { text-align: left; color: #c8372d }
 code { background: #f4f4f4; padding: .1rem .35rem; border-radius: .2rem; font-size: .85rem; user-select: all }
 svg { max-width: 100%; height: auto }
 figure { margin: 0; display: inline-block; width: 22rem; vertical-align: top }
+figure { margin-bottom: 1.5rem }
 figcaption { font-size: .85rem; color: #555 } .dim { color: #777 }
 """
 

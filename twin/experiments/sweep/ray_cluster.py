@@ -5,11 +5,13 @@ Ray is loaded here alone, when somebody asks for a cluster.
 
 from __future__ import annotations
 
+import atexit
 import json
 import logging
 import os
 import shutil
 import socket
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -20,6 +22,8 @@ from twin.experiments.processes import Lost
 from twin.experiments.sweep.one_run import Job, carried, put
 from twin.scenario.verdict import VERDICT
 
+_ASKED_S = 5.0
+"""How often is asked whether the head is still there [s]."""
 _REACHED_S = 10.0
 """So long a head may take to answer [s]."""
 
@@ -58,6 +62,8 @@ class RayCluster:
         except Exception as fault:
             reason = (str(fault).strip() or type(fault).__name__).splitlines()[0]
             raise SimulationError(f"--ray {address}: no such Ray cluster: {reason}") from None
+        self._head, self._asked = ray.get_runtime_context().gcs_address, time.monotonic()
+        self._is_there = True
         self._count = most or int(ray.cluster_resources().get("CPU", 1))
         # A run that kills its process is told of, and not made four times.
         self._carried = ray.remote(num_cpus=1, max_retries=0)(carried)
@@ -85,13 +91,28 @@ class RayCluster:
             RecordingError: A run's files cannot be written here.
             SimulationError: The cluster is gone.
         """
+        self._ask()
         ready, _ = self._ray.wait(list(self._jobs), timeout=timeout_s)
         late = [task for task, (_, deadline) in self._jobs.items() if deadline < time.monotonic()]
         return [self._end(task, too_late=task not in ready) for task in {*ready, *late}]
 
     def close(self) -> None:
         """Leave the cluster; tasks of this sweep end."""
-        self._ray.shutdown()
+        if self._is_there:
+            self._ray.shutdown()
+        else:  # Ray would wait for the head, then end this process as if a check had failed
+            atexit.unregister(self._ray.shutdown)
+            atexit.register(_leave)
+
+    def _ask(self) -> None:
+        """Raise SimulationError if the head is gone: Ray would end this process a minute later."""
+        if time.monotonic() - self._asked > _ASKED_S:
+            try:
+                _reach(self._head)
+            except OSError as fault:
+                self._is_there = False
+                raise SimulationError(f"the Ray cluster is gone: {self._head}: {fault.strerror}") from None
+            self._asked = time.monotonic()
 
     def _end(self, task: Any, *, too_late: bool) -> tuple[Job, Any]:
         job, _ = self._jobs.pop(task)
@@ -118,6 +139,13 @@ def _reach(address: str) -> None:
     if colon:
         with socket.create_connection((host.strip("[]"), int(port)), timeout=_REACHED_S):
             pass
+
+
+def _leave() -> None:
+    """End the process, which Ray's threads would let crash while it ends, as what is gone is an error."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(2)
 
 
 def _written(job: Job, files: dict[str, bytes]) -> dict[str, Any]:

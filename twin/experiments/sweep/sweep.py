@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from twin.errors import RecordingError
+from twin.errors import RecordingError, TwinError
 from twin.experiments.processes import Processes
 from twin.experiments.sweep.folder import OUTPUT, ResultFolder
 from twin.experiments.sweep.judging import PointJudge
@@ -93,8 +93,8 @@ def sweep(
             if result.complete:
                 _write(result, page=page)
             return result
-        except RecordingError as fault:  # of a process
-            raise RecordingError(f"{fault}{_KEEPS}") from None
+        except TwinError as fault:  # a process could not write, or the cluster is gone
+            raise type(fault)(f"{fault}{_KEEPS}") from None
         except OSError as fault:
             raise RecordingError(f"{path}: cannot be written: {fault.strerror}{_KEEPS}") from fault
         finally:

@@ -15,6 +15,11 @@ from twin.files.writing import replaced
 COSTS = ("wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s")
 """Metrics that differ from one run to its repetition."""
 
+_OF_CHECKS = {"": "value", ".passed": "passed", ".margin": "margin", ".at_s": "at_s", ".worst_s": "worst_s"}
+"""Columns of a check -> keys of its result."""
+_OPTIONAL = ("margin", "worst_s")
+"""Keys that not every check has."""
+
 
 @dataclass
 class Column:
@@ -26,7 +31,7 @@ class Column:
 
 @dataclass
 class Table:
-    """The columns, in order; those of checks are `check.NAME`, `check.NAME.passed`, `check.NAME.margin`."""
+    """The columns, in order; those of checks are `check.NAME`, `check.NAME.passed` and so on."""
 
     columns: dict[str, Column] = field(default_factory=dict)
     costs: dict[str, Column] = field(default_factory=dict)
@@ -51,9 +56,9 @@ def make_table(plan: Plan, runs: Sequence[tuple[PlannedRun, Mapping[str, Any]]])
     for checks in named:
         table.checks.update({name: check for name, check in checks.items() if name not in table.checks})
     for name, one in table.checks.items():
-        for part, key in (("", "value"), (".passed", "passed"), (".margin", "margin"), (".at_s", "at_s")):
+        for part, key in _OF_CHECKS.items():
             values = [checks[name].get(key) if name in checks else None for checks in named]
-            if key != "margin" or any(value is not None for value in values):
+            if key not in _OPTIONAL or any(value is not None for value in values):
                 unit = one["unit"] if key in ("value", "margin") else ""
                 columns[f"check.{name}{part}"] = Column(_of_one_type(values), unit)
     metrics = dict.fromkeys(name for _, verdict in runs for name in verdict["metrics"])
