@@ -50,7 +50,7 @@ mutate: $(VENV)/.ready  ## 200 small wrong changes, each of which tests should n
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,mutate]'
 	$(BIN)/python -m tests.mutation.mutate $(ARGS)
 
-oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy
+oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy, checks against rtamt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
 	$(BIN)/python -m pytest tests/convert/test_pinocchio.py tests/models/test_kinematics.py
 	$(BIN)/python -m tests.oracles.example_robots
@@ -60,6 +60,9 @@ oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fide
 	$(PYTHON) -m venv build/rclpy_oracle
 	build/rclpy_oracle/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/bridge/cdr/rclpy_requirements.txt
 	TWIN_RCLPY_ORACLE=build/rclpy_oracle/bin/python $(BIN)/python -m pytest tests/bridge/cdr/test_rclpy.py
+	$(PYTHON) -m venv build/stl_oracle
+	build/stl_oracle/bin/python -m pip install --quiet --disable-pip-version-check rtamt==0.4.10
+	TWIN_STL_ORACLE=build/stl_oracle/bin/python $(BIN)/python -m pytest tests/scenario/temporal/test_rtamt.py
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios

@@ -1,4 +1,4 @@
-"""Writes the tables of scenarios.md, arenas.md, navigation.md, gymnasium.md, api.md: `python docs/reference.py`.
+"""Writes the tables of scenarios.md, arenas.md, navigation.md, gymnasium.md, api.md: `docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
 the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
@@ -13,6 +13,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -47,6 +48,7 @@ from twin.parameters import units
 from twin.parameters.declaration import fields_of
 from twin.parameters.texts import texts_of
 from twin.runtime.build import build
+from twin.scenario.faults import LastingRobotFault
 from twin.scenario.schema import json_schema, load
 from twin.warehouse.arena_file import ArenaFile
 
@@ -94,10 +96,15 @@ ARENA_MEANING = {
 """Meaning of keys that the arena schema does not describe."""
 
 
+ALL_FAULTS = "faults[].<kind>"
+COMMON_KEYS = [field.name for field in fields(LastingRobotFault)]
+"""Of all faults: told once."""
+
+
 def tables(schema: Mapping[str, Any], meanings: Mapping[str, str]) -> str:
     """Return one table per kind of mapping in a schema, in the order in which a file nests them."""
     parts = []
-    sections = list(_sections(schema))
+    sections = list(_with_all_faults(_sections(schema)))
     homes = {node["title"]: path for path, node in sections}
     for path, node in sections:
         if set(node["properties"]) == {"type"}:
@@ -106,7 +113,12 @@ def tables(schema: Mapping[str, Any], meanings: Mapping[str, str]) -> str:
         parts += [heading, "", _flow(node.get("description", "")), ""]
         parts += ["| Key | Value | Default | Meaning |", "|---|---|---|---|"]
         required = node.get("required", ())
+        common = COMMON_KEYS if path.startswith("faults[].") and path != ALL_FAULTS else ()
+        if alike := [f"`{key}`" for key in common if key in node["properties"]]:
+            parts.append(f"| {', '.join(alike)} | | | as in `{ALL_FAULTS}` |")
         for key, item in node["properties"].items():
+            if key in common:
+                continue
             meaning = item.get("description") or meanings.get(key) or _described(schema, item)
             default = "required" if key in required else _default(item)
             elsewhere = [homes.get(name, "") for _, name in _references(item)]
@@ -119,6 +131,27 @@ def tables(schema: Mapping[str, Any], meanings: Mapping[str, str]) -> str:
             parts.append(f"| `{key}` | {_value(schema, item)} | {default} | {_flow(meaning)} |")
         parts.append("")
     return "\n".join(parts)
+
+
+def _with_all_faults(
+    sections: Iterator[tuple[str, Mapping[str, Any]]],
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Put a section of what all faults have before the first of them."""
+    first = ""
+    for path, node in sections:
+        if path.startswith("faults[].") and not first:
+            first, properties = path, node["properties"]
+            described = "What faults have in common; those that happen at once last no time."
+            yield (
+                ALL_FAULTS,
+                {
+                    **node,
+                    "required": (),
+                    "description": described,
+                    "properties": {key: properties[key] for key in COMMON_KEYS},
+                },
+            )
+        yield path.replace(f"{first}.when", f"{ALL_FAULTS}.when") if first else path, node
 
 
 def _sections(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -156,6 +189,8 @@ def _references(item: Mapping[str, Any], suffix: str = "") -> Iterator[tuple[str
 def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     """Return what a key takes, in words."""
     choices = [choice for choice in item.get("anyOf", (item,)) if choice.get("type") != "null"]
+    if len(choices) > 1 and "$ref" in choices[0] and "$ref" not in choices[1]:  # one number can stand for all
+        return f"mapping, or {_value(schema, {'anyOf': choices[1:]})}"
     brings = any(choice.get("pattern") == ":" for choice in choices)  # a plugin's name
     units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice and not brings), None)
     if units is not None:

@@ -50,6 +50,8 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/grid.py": {"perf_counter"},  # time per plan is what is measured
     "benchmarks/twin_benchmarks/grid_maps.py": {"perf_counter"},  # the same
     "benchmarks/twin_benchmarks/slam/trial.py": {"perf_counter"},  # times faster than the robot drove
+    "twin/experiments/pytest_plugin.py": {"now"},  # the name of a folder of runs
+    "twin/experiments/report/page.py": {"now"},  # when the page was written
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""

@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 """As `typing` has it, which need not be imported for it: Ctrl-C finds nothing to interrupt here."""
 if TYPE_CHECKING:
     from twin.api.bags import Bag, read_bag
-    from twin.api.files import load_arena, load_scenario, read_recording
+    from twin.api.files import load_arena, load_scenario, read_recording, read_runs
     from twin.api.robot import Robot, load_robot
     from twin.api.simulation import Simulation, run
     from twin.api.truth import Truth
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from twin.bridge import action_types as actions
     from twin.bridge import msgs, srvs
     from twin.bridge.wire.session import SessionConfig
+    from twin.envs.scenario.make import make_env, make_vec_env
     from twin.errors import TwinError
     from twin.geometry import Pose2, Pose3
     from twin.recording.read_back import Recording
@@ -44,9 +45,12 @@ __all__ = [
     "load_arena",
     "load_robot",
     "load_scenario",
+    "make_env",
+    "make_vec_env",
     "msgs",
     "read_bag",
     "read_recording",
+    "read_runs",
     "run",
     "srvs",
 ]
@@ -70,8 +74,11 @@ _HOMES = {
     "load_arena": "twin.api.files",
     "load_robot": "twin.api.robot",
     "load_scenario": "twin.api.files",
+    "make_env": "twin.envs.scenario.make",
+    "make_vec_env": "twin.envs.scenario.make",
     "read_bag": "twin.api.bags",
     "read_recording": "twin.api.files",
+    "read_runs": "twin.api.files",
     "run": "twin.api.simulation",
 }
 _MODULES = {"actions": "twin.bridge.action_types", "msgs": "twin.bridge.msgs", "srvs": "twin.bridge.srvs"}

@@ -73,7 +73,7 @@ class Pose3(NamedTuple):
     @staticmethod
     def from_xyz_rpy(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Pose3:
         """Build from URDF's origin: translation [m] and fixed-axis roll, pitch, yaw [rad]."""
-        return Pose3(np.array(xyz, dtype=np.float64), quat_wxyz_from_rpy(*np.asarray(rpy, dtype=np.float64)))
+        return Pose3(np.array(xyz, dtype=np.float64), quat_wxyz_from_rpy(*_floats(rpy)))
 
     @staticmethod
     def from_pose2(pose: Pose2, z: float = 0.0) -> Pose3:

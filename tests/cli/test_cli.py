@@ -9,7 +9,7 @@ import re
 import subprocess
 import sys
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -28,6 +28,7 @@ from twin.cli.run import batch
 from twin.cli.run.batch import run_in_child
 from twin.cli.run.options import RunOptions, parse_overrides
 from twin.errors import RecordingError, ScenarioError, SimulationError
+from twin.experiments.suite.cases import Case
 from twin.files.writing import written_alone
 from twin.models import catalogue
 from twin.scenario.checks import CheckResult
@@ -369,6 +370,7 @@ def test_two_commands_do_not_write_into_one_folder(
     demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.setattr("twin.cli.run.batch.run_in_child", _no_run)
+    monkeypatch.setattr("twin.experiments.suite.run.run_all", _no_run)
     held = demo.parent / "held"
     held.mkdir()
     (held / "verdict.json").write_text("the other's", encoding="utf-8")
@@ -415,6 +417,7 @@ def test_where_nothing_can_be_written_is_told_before_any_work(
 ) -> None:
     for work in (
         "twin.cli.run.batch.run_in_child",
+        "twin.experiments.suite.run.run_all",
         "twin.models.loader.load",
         "twin.cli.ros.joining.Joining.open",
         "twin.scenario.schema.json_schema",
@@ -528,17 +531,74 @@ def test_repeat_compares_digests(
     assert says in out
 
 
+def results(words: str) -> Callable[..., Iterator[dict[str, Any]]]:
+    """Return a stand-in for `run_all` whose tests end in turn with p(ass), f(ail) and e(rror)."""
+
+    def run_all(cases: Sequence[Case], folder: Path, **options: Any) -> Iterator[dict[str, Any]]:
+        for case, word in zip(cases, words, strict=True):
+            options["on_begin"](case)
+            check = CheckResult(name="c", passed=word == "p", reason="" if word == "p" else "too far")
+            checks, error = ((), "broken") if word == "e" else ((check,), None)
+            verdict = Verdict(
+                scenario="demo", seed=0, checks=checks, error=error, test=case.name, command=case.command
+            ).to_dict()
+            options["on_end"](case, verdict)
+            yield verdict
+
+    return run_all
+
+
 def test_test_runs_all_and_writes_one_junit(
     demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (demo.parent / "second.yaml").write_text(SCENARIO, encoding="utf-8")
-    monkeypatch.setattr("twin.cli.run.batch.run_in_child", child(iter("ab"), passed=False))
-    code, out, _ = invoke("test", str(demo.parent), "--junit", "reports/all.xml")
-    assert code == 1
-    assert "0 of 2 passed" in out
-    assert "c: too far" in out
+    (demo.parent / "second.yaml").write_text(SCENARIO + "test: {seeds: 1..2}\n", encoding="utf-8")
+    monkeypatch.setattr("twin.experiments.suite.run.run_all", results("pfe"))
+    code, out, _ = invoke("test", ".", "--junit", "reports/all.xml", "--out", "here")
+    assert code == 2
+    lines = out.splitlines()
+    assert [line.split()[:2] for line in lines[1:4]] == [
+        ["PASS", "demo"],
+        ["FAIL", "demo[seed=1]"],
+        ["ERROR", "demo[seed=2]"],
+    ]
+    assert lines[4:] == [
+        "demo[seed=1]: c: too far",
+        "  run it again: twin run second.yaml --seed 1",
+        "demo[seed=2]: broken",
+        "  run it again: twin run second.yaml --seed 2",
+        "1 of 3 passed",
+        "written to here; `twin report here` makes a page of it",
+    ]
     root = ElementTree.parse(demo.parent / "reports" / "all.xml").getroot()
-    assert [suite.get("name") for suite in root] == ["demo", "second"]
+    assert [suite.get("name") for suite in root] == ["demo", "demo[seed=1]", "demo[seed=2]"]
+
+
+def test_tests_are_listed_and_chosen(demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
+    demo.write_text(SCENARIO + "test: {seeds: 1..4, tags: [quick]}\n", encoding="utf-8")
+    names = [f"demo[seed={seed}]\n" for seed in range(1, 5)]
+    assert invoke("test", ".", "--list") == (0, "".join(names), "")
+    assert invoke("test", ".", "--list", "--shard", "2/3")[1] == names[1]
+    assert invoke("test", ".", "--list", "-k", "seed=4 or seed=2", "-m", "quick")[1] == names[1] + names[3]
+    code, out, err = invoke("test", ".", "-m", "nightly")
+    assert (code, out) == (2, "")
+    assert err == "error: -m nightly: chooses none of 4 tests; tags: quick\n"
+    monkeypatch.setattr("twin.experiments.suite.run.run_all", results("ppp"))
+    assert invoke("test", ".", "-k", "not seed=3")[0] == 0
+
+
+def test_what_ended_before_a_ctrl_c_is_in_the_junit(
+    demo: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demo.write_text(SCENARIO + "test: {seeds: 1..2}\n", encoding="utf-8")
+
+    def run_all(cases: Sequence[Case], folder: Path, **options: Any) -> Iterator[dict[str, Any]]:
+        yield from results("p")(cases[:1], folder, **options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("twin.experiments.suite.run.run_all", run_all)
+    assert invoke("test", ".", "--junit", "all.xml")[0] == 130
+    (suite,) = ElementTree.parse(demo.parent / "all.xml").getroot()
+    assert suite.get("name") == "demo[seed=1]"
 
 
 def test_test_names_a_wrong_path(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ PROGRAMS = Path(__file__).parents[2] / "examples" / "python"
         ("own_check", ["pass: 1.05 of 1.2 m/s²"]),
         ("own_controller", ["succeeded: True"]),
         ("own_sensor", ["°C at x 0.00 m", "°C at x 1."]),
+        ("pick_tote", ["seed 1: picked after 1", "seed 2: picked after 1"]),
         ("parameter_study", ["0.2 m/s: ", "0.6 m/s: ", "written to study.png"]),
     ],
 )

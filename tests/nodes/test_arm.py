@@ -127,6 +127,67 @@ def test_a_cancelled_move_stops_where_it_is(bench: Bench, arm: Arm) -> None:
     assert 0.1 < stopped < 0.3
 
 
+def said(
+    arm: Arm, names: tuple[str, ...], *points: tuple[float, tuple[float, ...], tuple[float, ...]]
+) -> None:
+    """Say a trajectory of (time [s], positions, velocities) on the topic."""
+    publisher = arm.bench.node.create_publisher(JointTrajectory, "arm_controller/joint_trajectory")
+    messages = [
+        new(
+            JointTrajectoryPoint,
+            positions=np.array(p),
+            velocities=np.array(v),
+            time_from_start=duration(round(t * 1e9)),
+        )
+        for t, p, v in points
+    ]
+    publisher.publish(JointTrajectory(header=header(0, ""), joint_names=list(names), points=messages))
+
+
+def test_messages_follow_one_another_without_a_stop(bench: Bench, arm: Arm) -> None:
+    """As from somebody who decides ten times a second."""
+    speeds = []
+    for i in range(1, 11):
+        said(arm, ("lift",), (0.1, (0.03 * i,), (0.3,)))
+        bench.run(0.1)
+        speeds.append(abs(arm.joints.velocity[0]))
+    assert arm.joints.position[0] == pytest.approx(0.3, abs=0.03)
+    assert min(speeds[2:]) > 0.2, "it is as fast between two messages as it was told"
+    bench.run(0.5)
+    assert arm.joints.velocity[0] == 0.0, "nobody says anything more"
+
+
+def test_a_message_takes_the_place_of_a_goal_and_a_goal_that_of_a_message(bench: Bench, arm: Arm) -> None:
+    goal = arm.move(("lift",), (2.0, (0.4,)))
+    bench.run(0.5)
+    said(arm, ("lift",), (3.0, (0.0,), ()))
+    result = arm.ended(goal)
+    assert goal.status == GoalStatus.STATUS_ABORTED
+    assert result.error_string == "another trajectory has taken its place"
+    bench.run(0.1)
+    assert arm.ended(arm.move(("lift",), (1.0, (0.5,)))).error_code == 0
+    bench.run(3.0)
+    assert arm.joints.position[0] == pytest.approx(0.5, abs=0.005), "what the message said is over"
+
+
+@pytest.mark.parametrize(
+    ("names", "point"),
+    [
+        (("elbow",), (1.0, (0.2,), ())),
+        (("lift",), (1.0, (0.2,), (0.1, 0.1))),
+        (("lift",), (1.0, (0.2,), (math.inf,))),
+        (("lift",), (1.0, (math.nan,), ())),
+    ],
+)
+def test_a_message_that_cannot_be_followed_moves_nothing(
+    bench: Bench, arm: Arm, names: tuple[str, ...], point: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    said(arm, names, point)
+    bench.run(0.5)
+    assert not arm.joints.target.any()
+    assert "joint_trajectory refused: " in caplog.text
+
+
 def test_gripper_reaches_its_goal_in_the_open(arm: Arm) -> None:
     goal = arm.grip(0.1)
     result = arm.ended(goal)

@@ -63,3 +63,20 @@ def test_a_tote_that_is_taken_away_ends_the_mission_within_a_second(
     for _ in range(25):
         run.tick()
     assert math.dist(run.world.pose("warehouse_bot/base_footprint").xyz, before) < 0.3, "it stops"
+
+
+@pytest.mark.slow
+def test_a_gripper_that_lets_go_drops_what_it_has_grasped(make_run: MakeRun, tmp_path: Path) -> None:
+    (tmp_path / "hall.yaml").write_text(HALL, encoding="utf-8")
+    fault = 'faults: [dropped_good: {when: {grasped: "t?te"}, after: 3 s}]\n'
+    (tmp_path / "run.yaml").write_text(SCENARIO + fault, encoding="utf-8")
+    run = make_run(load(tmp_path / "run.yaml"))
+    assert run.faults is not None
+    (report,) = run.faults.reports()
+    assert report.outcome == "not_reached"
+    while report.end_s is None:
+        assert not run.over
+        run.tick()
+        (report,) = run.faults.reports()
+    assert (report.outcome, report.effect) == ("landed", "tote was dropped")
+    assert report.at_s == pytest.approx(report.end_s - 1.0)

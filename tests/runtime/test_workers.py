@@ -131,7 +131,8 @@ def test_a_worker_runs_the_nodes_of_its_robots_and_nobody_else_does(trio: Scenar
     try:
         opened.advance(lambda: opened.run.world.time_ns >= 500_000_000)
         timers = {node.fully_qualified_name: node.due_ns for node in opened.run.bus.nodes if node.due_ns}
-        assert not [name for name in timers if name.startswith(("/a/", "/b/", "/c/"))]
+        assert not [name for name in timers if name.startswith(("/b/", "/c/"))]
+        assert [name for name in timers if name.startswith("/a/")], "whose hardware fails here, it stays"
         assert opened.run.workers is not None
         assert opened.run.workers.cpu_s > 0.0
     finally:
@@ -179,7 +180,7 @@ def test_a_worker_that_dies_ends_the_run_in_one_sentence(trio: Scenario) -> None
     opened, pids = _half_way(trio)
     try:
         os.kill(pids[1], signal.SIGKILL)
-        with pytest.raises(SimulationError, match=r"^worker 1 \(b\) has ended by SIGKILL at t = 0\.2\d\d s"):
+        with pytest.raises(SimulationError, match=r"^worker 1 \(c\) has ended by SIGKILL at t = 0\.2\d\d s"):
             opened.advance()
     finally:
         opened.close()

@@ -95,7 +95,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("tasks: [{tote: tote_a, to: unloading}]", "tasks: []", "demo.yaml:13: mission.tasks: must have at least 1 items, not []"),
         ("to: unloading", "too: unloading", "demo.yaml:13: unknown key 'too' in mission.tasks.0; did you mean 'to'? Valid: to, tote"),
         ("- mission_succeeded:", "- mission_suceeded:", "demo.yaml:15: unknown key 'mission_suceeded' in checks.0; did you mean 'mission_succeeded'? Valid: "),
-        ("- mission_succeeded:", "- {}", "demo.yaml:15: checks.0: must have exactly one of the keys closed_loop, delivered"),
+        ("- mission_succeeded:", "- {}", "demo.yaml:15: checks.0: must have exactly one of the keys always, closed_loop, delivered"),
         ("- mission_succeeded:", "- delivered:", "demo.yaml:15: missing key 'tote' in checks.0.delivered"),
         ("- mission_succeeded:", "- localisation_error:", "demo.yaml:15: checks.0.localisation_error: must have at least one of the keys rms, max, not {}"),
         ("- mission_succeeded:", "- driven_distance: {min: 3, max: 2}", "demo.yaml:15: checks.0.driven_distance: min (3 m) must not exceed max (2 m)"),

@@ -15,6 +15,8 @@ from twin.sim.world import World
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena import Arena
 from twin.warehouse.arena_file import covered
+from twin.warehouse.arena_scene import goods
+from twin.warehouse.catalogue import catalogue
 from twin.warehouse.footprint import Rectangle, overlap
 
 NAMED = ("tote_a", "tote_b", "tote_c")
@@ -23,6 +25,29 @@ NAMED = ("tote_a", "tote_b", "tote_c")
 @pytest.fixture(scope="module")
 def warehouse() -> Arena:
     return arenas.load("warehouse")
+
+
+def test_runs_share_an_arena_as_long_as_its_file_is_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "hall.yaml"
+    text = catalogue()["warehouse"].read_text(encoding="utf-8")
+    file.write_text(text, encoding="utf-8")
+    first, named = arenas.shared(file), "name: warehouse"
+    assert arenas.shared(file) is first
+    assert arenas.load(file) is not first, "a user's own may be changed"
+    assert named in text
+    file.write_text(text.replace(named, "name: other"), encoding="utf-8")
+    assert (first.name, arenas.shared(file).name) == ("warehouse", "other")
+
+
+def test_stock_that_runs_share_is_what_it_would_be_anew_and_cannot_be_changed(warehouse: Arena) -> None:
+    asked = (warehouse, frozenset(NAMED), 3, (0.01, 0.02))
+    shared = goods(*asked)
+    assert goods(*asked) is shared
+    assert repr(shared) == repr(goods.__wrapped__(*asked))
+    for body in (*shared[0], *shared[1]):
+        for pose in (body.T_world_body, *(shape.T_body_geometry for shape in body.shapes)):
+            assert not pose.xyz.flags.writeable
+            assert not pose.quat_wxyz.flags.writeable
 
 
 def test_it_has_three_racks_of_three_levels(warehouse: Arena) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from operator import attrgetter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +12,11 @@ from numpy.typing import NDArray
 from twin.bridge.bags.definitions import learn
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.cdr.codec import codec
-from twin.bridge.msgs import ns
 from twin.bridge.types import get
-from twin.bridge.types.fields import fields_of
 from twin.errors import BridgeError, RecordingError
 
-_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
+if TYPE_CHECKING:
+    import pyarrow as pa  # type: ignore[import-untyped]
 
 
 class Message(NamedTuple):
@@ -54,10 +52,32 @@ class Bag(Mapping[str, Mapping[str, NDArray[Any]]]):
             RecordingError: The bag has no such topic, or its type cannot be told.
         """
         messages = list(self.messages(topic))
+        from twin.api.bag_tables import leaves
+
         found = {"time_ns": np.array([message.time_ns for message in messages], dtype=np.int64)}
-        for name, read in _columns(self.types[topic]):
-            found[name] = _array([read(each.message) for each in messages])
+        for leaf in leaves(self.types[topic]):
+            found[leaf.name] = _array([leaf.read(each.message) for each in messages])
         return found
+
+    def table(self, topic: str, fields: Iterable[str] | None = None) -> pa.Table:
+        """Return a topic as an Arrow table, of which `to_pandas()` and `polars.from_arrow` make frames.
+
+        Columns are `time`, when each message was received [s], and its fields, by names such as
+        `twist.twist.linear.x`, times in [ns]. Arrays of a fixed length are fixed-size lists, others lists.
+        Each field's unit, where it is known, is `table.schema.field(name).metadata[b"unit"]`.
+
+        Args:
+            topic: Of the bag.
+            fields: Which to read, `twist.twist` with all in it; None: all.
+
+        Raises:
+            RecordingError: As of `bag[topic]`; or the type has no such field.
+        """
+        from twin.api.bag_tables import table
+
+        messages = list(self.messages(topic))
+        times = [message.time_ns for message in messages]
+        return table(self.types[topic], times, [message.message for message in messages], fields)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.types)
@@ -103,23 +123,6 @@ def read_bag(path: str | Path) -> Bag:
         RecordingError: It is no bag.
     """
     return Bag(Path(path))
-
-
-def _columns(typename: str, prefix: str = "", path: str = "") -> Iterator[tuple[str, Callable[[Any], Any]]]:
-    """Yield name and reader of every field, those of nested messages included."""
-    for field in fields_of(typename):
-        name, attribute = f"{prefix}{field.name}", f"{path}{field.attribute}"
-        read = attrgetter(attribute)
-        if field.message in _TIMES and not field.many:
-            yield name, _nanoseconds(read)
-        elif field.message and not field.many:
-            yield from _columns(field.message, f"{name}.", f"{attribute}.")
-        else:
-            yield name, read
-
-
-def _nanoseconds(read: Callable[[Any], Any]) -> Callable[[Any], int]:
-    return lambda message: ns(read(message))
 
 
 def _array(rows: list[Any]) -> NDArray[Any]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pyarrow as pa  # type: ignore[import-untyped]
+
     from twin.recording.read_back import Recording
     from twin.scenario.schema import Scenario
     from twin.warehouse.arena import Arena
@@ -47,25 +48,26 @@ def load_scenario(
     Raises:
         ScenarioError: With every problem of the file and of the overrides, each with its line.
     """
-    from twin.errors import ScenarioError
-    from twin.scenario import schema
+    from twin.scenario.overrides import read_scenario
 
-    if isinstance(scenario, schema.Scenario):
-        if overrides:
-            raise ScenarioError(
-                f"scenario '{scenario.name}' is read already; give overrides to load_scenario, "
-                "or the file instead of the scenario"
-            )
-        return scenario
-    texts = {key: _as_yaml(value) for key, value in overrides.items()}
-    return schema.load(scenario, texts, execute=execute)
+    return read_scenario(scenario, overrides, execute=execute)
 
 
-def _as_yaml(value: Any) -> str:
-    """Return a value as in a file (JSON is YAML); text is taken as it is, as that of `twin run --set`."""
-    if isinstance(value, str):
-        return value
-    return json.dumps(value, default=lambda other: other.tolist() if hasattr(other, "tolist") else str(other))
+def read_runs(folder: str | Path) -> pa.Table:
+    """Read the verdicts of all runs below a folder, as `twin test` writes them: an Arrow table.
+
+    It has a row for each run, with `test`, `scenario`, `seed`, `verdict`, the metrics, and of each check
+    `<name>.passed`, `.value`, `.limit`, `.margin`; `to_pandas()` and `polars.from_arrow` make frames of it.
+
+    Args:
+        folder: Of one run, or of many.
+
+    Raises:
+        RecordingError: There is no run, or a verdict cannot be read.
+    """
+    from twin.experiments.runs_table import runs_table
+
+    return runs_table(Path(folder))
 
 
 def read_recording(path: str | Path) -> Recording:

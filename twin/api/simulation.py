@@ -6,6 +6,7 @@ import math
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -103,6 +104,7 @@ class Simulation(Participant):
         self._outside = partial(
             Outside, nodes=tuple(nodes), wait_for=tuple(wait_for), wait_timeout_s=wait_timeout, free=free
         )
+        self._others = {"node": list(nodes), "wait-for": list(wait_for)}
         self._executed = Execution(on_execute)
         self._name, self._seed = Path(str(scenario)).stem, 0
         self._clock: ClockMode = "inproc"
@@ -140,7 +142,7 @@ class Simulation(Participant):
         if self._verdict is None:
             run = self._running
             with self._told():
-                verdict = run.finish()
+                verdict = replace(run.finish(), command=self._command)
                 self._close(verdict)
                 if self.folder is not None:
                     verdict.write(self.folder)
@@ -289,11 +291,12 @@ class Simulation(Participant):
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""
+        from twin.recording.hashes import HASHES
         from twin.scenario.verdict import VERDICT
 
         self._held.enter_context(written_alone(make_folder(folder)))
         self.folder = folder
-        for file in (folder / "junit.xml", folder / VERDICT):
+        for file in (folder / "junit.xml", folder / HASHES, folder / VERDICT):
             check_file(file, "--out")
             file.unlink(missing_ok=True)
 
@@ -313,6 +316,7 @@ class Simulation(Participant):
             scenario=self._name,
             seed=self._seed,
             error=error,
+            command=self._command,
             clock=self._clock,
             plugins=self._executed.versions,
         )
@@ -321,6 +325,20 @@ class Simulation(Participant):
         if self.folder is not None:
             with suppress(RecordingError):
                 verdict.write(self.folder)
+
+    @property
+    def _command(self) -> str:
+        """The command that makes the run again; empty if the scenario was not named by a file."""
+        from twin.scenario.command import twin_run
+        from twin.scenario.overrides import as_yaml
+
+        if not isinstance(self._given, str | Path):
+            return ""
+        options: dict[str, Sequence[object]] = {
+            "params-file": [] if self._params_file is None else [self._params_file],
+            **self._others,
+        }
+        return twin_run(self._given, {key: as_yaml(v) for key, v in self._overrides.items()}, options=options)
 
     def _close(self, verdict: Verdict) -> None:
         self._verdict, self._run = verdict, None

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
 
@@ -18,8 +18,9 @@ from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
-from twin.bridge.topics import Endpoint, Sample
+from twin.bridge.topics import Endpoint, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
+from twin.bridge.topics.link import Carried, Link
 from twin.bridge.wire import Wire
 from twin.bridge.wire.external import Arrival, ExternalQueue
 from twin.bridge.wire.interrupts import guard
@@ -29,6 +30,9 @@ from twin.bridge.wire.ros2dds import bridge_token
 from twin.bridge.wire.session import SessionConfig, open_session, session_id
 from twin.errors import BridgeError
 from twin.savings import ALL, Savings
+
+if TYPE_CHECKING:
+    from twin.bridge.actions.client import ActionClient, ClientGoal
 
 _EXTERNAL_DEPTH = 10_000
 
@@ -61,6 +65,8 @@ class Bus:
         self.taps: list[Tap] = []
         self.arrival_taps: list[Callable[[Arrival], None]] = []
         """Called for everything from outside when it enters, before a node has it."""
+        self.link: Link | None = None
+        """What messages go through, if it is not perfect."""
         self.node_options: NodeOptions | None = None
         """Of nodes that are created without options: the program's command line."""
         self.group = ""
@@ -71,6 +77,8 @@ class Bus:
         """What becomes of what a running node tells another group."""
         self.announced: Callable[[Endpoint], None] | None = None
         """Called with every new endpoint."""
+        self.hold_goal: Callable[[ActionClient, ClientGoal, Any], bool] | None = None
+        """Is shown each goal before its message is sent, and may hold it back: see `ActionClient.post`."""
         self._put_offs: list[tuple[Member, Any]] = []
         self._nodes: list[Node] = []
         self._away: frozenset[str] = frozenset()
@@ -209,12 +217,22 @@ class Bus:
         """Move what came from outside into inboxes, sorted by (topic, source, sequence); return how much."""
         if guard.pending:
             guard.deliver()
+        if self.link is not None:
+            self.link.release()
         arrivals = self.external.drain()
         for arrival in arrivals:
-            for tap in self.arrival_taps:
-                tap(arrival)
-            arrival.receiver.enqueue(arrival.data, True)
+            receiver = arrival.receiver
+            if self.link is not None and isinstance(receiver, Subscription):
+                heard = Carried(receiver.name, "", arrival.source.sequence, receiver.is_latched, True)
+                self.link.carry(heard, partial(self._enter, arrival))
+            else:
+                self._enter(arrival)
         return len(arrivals)
+
+    def _enter(self, arrival: Arrival) -> None:
+        for tap in self.arrival_taps:
+            tap(arrival)
+        arrival.receiver.enqueue(arrival.data, True)
 
     def spin(self) -> None:
         """Run every node that has something to do once, in the order of creation."""

@@ -6,6 +6,8 @@ Importing this module registers them, so `gym.make("twin.envs:twin/DiffDriveGoal
 
 from gymnasium.envs.registration import register, registry
 
+from twin.envs.scenario.registration import register_scenarios
+
 _NAVIGATION = (("DiffDriveGoal", "diff_drive_goal", 300), ("WarehouseNav", "warehouse_nav", 600))
 
 for _name, _module, _steps in _NAVIGATION:
@@ -16,3 +18,4 @@ for _name, _module, _steps in _NAVIGATION:
             vector_entry_point=f"twin.envs.{_module}:{_name}VectorEnv",
             max_episode_steps=_steps,
         )
+register_scenarios()

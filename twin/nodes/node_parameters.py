@@ -63,11 +63,8 @@ def descriptor_of(declaration: Declaration, *, read_only: bool = False) -> Param
     """
     domain = declaration.domain
     assert domain is not None
-    descriptor = new(
-        ParameterDescriptor,
-        additional_constraints=domain.said,
-        read_only=read_only or ReadOnly in declaration.markers,
-    )
+    read_only = read_only or ReadOnly in declaration.markers
+    descriptor = new(ParameterDescriptor, additional_constraints=domain.said, read_only=read_only)
     least, most = domain.bounds.least, domain.bounds.most
     if least is None and most is None:
         return descriptor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from twin.bridge.bus import Bus
@@ -28,6 +29,8 @@ class SensorPublisher:
 
     def __init__(self, bus: Bus, sensor: SensorDevice, *, namespace: str = "") -> None:
         self.sensor = sensor
+        self.filters: list[Callable[[Any, int], Any]] = []
+        """What faults make of a message at a time [ns]; None: nothing is said."""
         self.node = bus.create_node(f"{sensor.spec.name}_driver", namespace)
         self._plugin = plugin_of(sensor.spec)
         kind = self._plugin.load()
@@ -58,4 +61,8 @@ class SensorPublisher:
         spec, reading = self.sensor.spec, self.sensor.sample(time_ns)
         if reading is None:
             return None
-        return self._to_message(spec, Header(stamp(time_ns), spec.link), reading)
+        message = self._to_message(spec, Header(stamp(time_ns), spec.link), reading)
+        for passed in self.filters:
+            if message is not None:
+                message = passed(message, time_ns)
+        return message

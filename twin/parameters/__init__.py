@@ -58,6 +58,7 @@ from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
 from twin.parameters.units import Metres as Metres
 from twin.parameters.units import MetresPerSecond as MetresPerSecond
+from twin.parameters.units import MetresPerSecondCubed as MetresPerSecondCubed
 from twin.parameters.units import MetresPerSecondSquared as MetresPerSecondSquared
 from twin.parameters.units import Newtons as Newtons
 from twin.parameters.units import PerMetre as PerMetre
@@ -65,6 +66,7 @@ from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
 from twin.parameters.units import RadiansPerSecondSquared as RadiansPerSecondSquared
 from twin.parameters.units import Seconds as Seconds
+from twin.parameters.units import Share as Share
 from twin.parameters.units import SquareMetres as SquareMetres
 from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit

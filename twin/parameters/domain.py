@@ -6,6 +6,7 @@ import math
 import types
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Len
@@ -49,7 +50,7 @@ class Domain:
         """Smallest and largest size of a number that is not 0."""
         return (SMALLEST, LARGEST) if self.unit is None else self.unit.sizes
 
-    @property
+    @cached_property
     def said(self) -> str:
         """What is valid, as the rest of a sentence; '' where type and size tell it."""
         if self.choices:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -86,6 +86,7 @@ RadiansPerSecondSquared = Annotated[
     float,
     Unit("angular acceleration", (("rad/s²", "1"), ("rad/s^2", "1"), ("deg/s²", _DEG), ("deg/s^2", _DEG))),
 ]
+MetresPerSecondCubed = Annotated[float, Unit("jerk", (("m/s³", "1"), ("m/s^3", "1")))]
 PerMetre = Annotated[float, Unit("inverse length", (("1/m", "1"),))]
 Newtons = Annotated[float, Unit("force", (("N", "1"), ("mN", "1/1000"), ("kN", "1000")))]
 Hertz = Annotated[float, Unit("frequency", (("Hz", "1"), ("kHz", "1000")), sizes=(1e-9, 1e9))]
@@ -95,3 +96,16 @@ SquareMetres = Annotated[
 ]
 SquareRadians = Annotated[float, Unit("squared angle", (("rad²", "1"), ("rad^2", "1")))]
 Amperes = Annotated[float, Unit("current", (("A", "1"), ("mA", "1/1000")))]
+Share = Annotated[float, Unit("share", (("1", "1"), ("%", "1/100")))]
+
+
+def unit_of(annotation: Any) -> Unit:
+    """Return the unit of one of these types."""
+    return next(part for part in get_args(annotation) if isinstance(part, Unit))
+
+
+SECONDS = unit_of(Seconds)
+UNITS = {
+    part.si: part for hint in list(globals().values()) for part in get_args(hint) if isinstance(part, Unit)
+}
+"""By SI unit."""

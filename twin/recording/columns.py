@@ -8,7 +8,7 @@ imports rerun (0.4 s): only a run that records does.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,16 +50,23 @@ class Column(NamedTuple):
         """Return a list of instances for each row."""
         return self.array
 
+    def row(self, index: int) -> Column:
+        """Return one row as a column; they share memory."""
+        return Column(self.descriptor, self.array.slice(index, 1))
 
-Chunk = tuple[str, Times, Sequence[Column]]
-"""Entity, index and columns."""
+
+Chunk = tuple[str, Times | None, Sequence[Column]]
+"""Entity, index and columns; without an index they hold at all times."""
 
 
 def send(recording: rr.RecordingStream, chunks: Iterable[Chunk]) -> None:
     """Send chunks, all at once: to wake up Rerun's threads for each would cost as much again."""
     recording.send_chunks(
-        # only the two methods of a `Column` are asked for
-        [rc.Chunk.from_columns(entity, (times,), columns) for entity, times, columns in chunks]  # type: ignore[arg-type]
+        [
+            # only the two methods of a `Column` are asked for
+            rc.Chunk.from_columns(entity, () if times is None else (times,), columns)  # type: ignore[arg-type]
+            for entity, times, columns in chunks
+        ]
     )
 
 
@@ -92,6 +99,10 @@ class Component:
         n, offsets = (len(array), _one_each(len(array))) if lengths is None else _offsets(lengths)
         rows = pa.Array.from_buffers(self._rows, n, [None, offsets], children=[array])
         return Column(self._descriptor, rows)
+
+
+component = cache(Component)
+"""As `Component`, which is looked up once."""
 
 
 def _arrow(values: Any, kind: pa.DataType) -> pa.Array:

@@ -28,12 +28,13 @@ def bounds(shapes: Iterable[BodyShape], pose_of: Callable[[str], Pose3]) -> tupl
 
     Without shapes, the lower one is infinite and the upper one minus infinite.
     """
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    corners = [(np.full(3, np.inf), np.full(3, -np.inf))]
     for shape in shapes:
         pose = pose_of(shape.body) @ shape.T_body_geometry
         near, far = span(shape.geometry, matrix_from_quat_wxyz(pose.quat_wxyz))
-        low, high = np.minimum(low, pose.xyz + near), np.maximum(high, pose.xyz + far)
-    return low, high
+        corners.append((pose.xyz + near, pose.xyz + far))
+    low, high = np.swapaxes(corners, 0, 1)
+    return low.min(axis=0), high.max(axis=0)
 
 
 def span(geometry: Geometry, R: Array) -> tuple[Array, Array]:
@@ -46,7 +47,7 @@ def span(geometry: Geometry, R: Array) -> tuple[Array, Array]:
         mesh = read_mesh(geometry.path, apply_up_axis=geometry.apply_up_axis)
         points = (mesh.points * geometry.scale) @ R.T
         return points.min(axis=0), points.max(axis=0)
-    half = np.array([reach(geometry, row) for row in R])
+    half = np.array([reach(geometry, row) for row in R.tolist()])
     return -half, half
 
 

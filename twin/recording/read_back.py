@@ -6,6 +6,7 @@ Works on the file of a killed run too, up to its last complete block.
 from __future__ import annotations
 
 import hashlib
+import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -22,6 +23,14 @@ from twin.files.reading import open_file
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""
 
+_UNITS = (
+    (r"/velocity/.*/linear/.*", "m/s"),
+    (r"/velocity/.*/angular/.*", "rad/s"),
+    (r"/localisation/.*/position_error", "m"),
+    (r"/localisation/.*/yaw_error", "rad"),
+    (r".* Transform3D:translation", "m"),
+)
+"""Of numbers, by entity, or entity and component."""
 _Part = tuple[NDArray[np.int64] | None, pa.Array]
 
 
@@ -65,17 +74,57 @@ class Recording:
         Raises:
             RecordingError: There is no such entity or component.
         """
-        if entity not in self.columns:
-            raise RecordingError(f"no entity {entity!r} in the recording; {nearest(entity, self.columns)}")
-        components = self.columns[entity]
+        components = self._components_of(entity)
         if component not in components:
             raise RecordingError(f"no component {component!r} at {entity}; {nearest(component, components)}")
         return components[component]
+
+    def table(self, entity: str) -> pa.Table:
+        """Return what changes at an entity as an Arrow table, for `to_pandas()` and `polars.from_arrow`.
+
+        Columns are `time`, simulated [s], and its components, as `scalars`; of those that are one number or
+        vector at a time, the rows are that, others are lists. A unit that is known is
+        `table.schema.field(name).metadata[b"unit"]`.
+
+        Raises:
+            RecordingError: There is no such entity, or nothing changes there, or not all of it at once.
+        """
+        self._components_of(entity)
+        moving = {
+            name: each
+            for name, each in self.columns[entity].items()
+            if len(each.times_ns) and name != "CoordinateFrame:frame"  # it is told when it changes
+        }
+        if not moving:
+            raise RecordingError(f"nothing changes at {entity}; `column` has its components")
+        times = next(iter(moving.values())).times_ns
+        other = [name for name, each in moving.items() if not np.array_equal(each.times_ns, times)]
+        if other:
+            raise RecordingError(
+                f"the components of {entity} have different times; `column` has each: {', '.join(moving)}"
+            )
+        arrays = [pa.array(times * 1e-9)]
+        fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})]
+        for name, each in moving.items():
+            array = each.array
+            if (array.value_lengths().to_numpy(zero_copy_only=False) == 1).all():
+                array = array.flatten()
+            unit = _unit(entity, name)
+            arrays.append(array)
+            fields.append(
+                pa.field(name.rpartition(":")[2], array.type, metadata={"unit": unit} if unit else None)
+            )
+        return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
     def scalars(self, entity: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return times [ns], shape (n,), and the first number of each row, shape (n,)."""
         column = self.column(entity, "Scalars:scalars")
         return column.times_ns, np.array([row[0] for row in column.values], dtype=np.float64)
+
+    def _components_of(self, entity: str) -> dict[str, Column]:
+        if entity not in self.columns:
+            raise RecordingError(f"no entity {entity!r} in the recording; {nearest(entity, self.columns)}")
+        return self.columns[entity]
 
 
 def check_recording(path: Path) -> Path:
@@ -108,7 +157,10 @@ def read(path: Path) -> Recording:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # it needs none
         reader = rc.RrdReader(check_recording(path))
-    stores = reader.recordings()
+    try:
+        stores = reader.recordings()
+    except RuntimeError as fault:
+        raise RecordingError(f"{path}: the recording is damaged: {fault}") from fault
     if not stores:
         raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
     store = stores[0]
@@ -147,6 +199,11 @@ def content_digest(path: Path) -> str:
             digest.update(column.times_ns.tobytes())
             _hash_array(digest, column.array)
     return digest.hexdigest()
+
+
+def _unit(entity: str, component: str) -> str:
+    names = entity, f"{entity} {component}"
+    return next((unit for form, unit in _UNITS if any(re.fullmatch(form, name) for name in names)), "")
 
 
 def _components(batch: pa.RecordBatch) -> Iterator[tuple[str, NDArray[np.int64] | None, pa.Array]]:

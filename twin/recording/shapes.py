@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import rerun as rr
+from rerun.components import FillMode
 
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, xyzw_from_wxyz
 from twin.models.mesh.meshes import read_mesh
 from twin.models.shapes import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
+from twin.recording.columns import Column, component, send
 from twin.recording.frames import WORLD
 
 if TYPE_CHECKING:
@@ -22,7 +24,6 @@ FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
 Rgba8 = tuple[int, int, int, int]
-FillMode = Literal["solid", "majorwireframe", "transparentfillmajorwireframe"]
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,14 @@ class Solid:
     geometry: Geometry
     pose: Pose3
     colour: Rgba8
+
+
+class Drawing(NamedTuple):
+    """Shapes in one frame."""
+
+    entity: str
+    frame: str
+    solids: Sequence[Solid]
 
 
 def body_entity(body: str, static: bool) -> str:
@@ -54,33 +63,29 @@ def declare_shapes(
     by_body: dict[tuple[str, bool], list[BodyShape]] = {}
     for shape in shapes:
         by_body.setdefault((shape.body, shape.static), []).append(shape)
+    drawings = []
     for (body, static), group in by_body.items():
-        entity = body_entity(body, static)
         T_frame_body = pose_of(body) if static else Pose3.from_xyz_rpy()
-        drawn = [Solid(s.geometry, T_frame_body @ s.T_body_geometry, rgba8(s.rgba)) for s in group]
-        draw_solids(recording, entity, WORLD if static else body, drawn)
+        solids = [Solid(s.geometry, T_frame_body @ s.T_body_geometry, rgba8(s.rgba)) for s in group]
+        drawings.append(Drawing(body_entity(body, static), WORLD if static else body, solids))
+    draw_solids(recording, drawings)
 
 
 def draw_solids(
-    recording: rr.RecordingStream,
-    entity: str,
-    frame: str,
-    solids: Sequence[Solid],
-    *,
-    see_through: bool = False,
+    recording: rr.RecordingStream, drawings: Iterable[Drawing], *, see_through: bool = False
 ) -> None:
-    """Log shapes in a frame, each mesh below `entity`; those that are seen through have their edges, too.
+    """Log shapes, each mesh below the entity; those that are seen through have their edges, too.
 
     Raises:
         ModelError: A mesh cannot be read.
     """
-    if not solids:
-        return
-    at = rr.CoordinateFrame(frame)
-    fill_mode: FillMode = "transparentfillmajorwireframe" if see_through else "solid"
-    recording.log(entity, at, *_primitives(solids, fill_mode), static=True)
-    for i, solid in enumerate(solids):
-        _declare_mesh(recording, f"{entity}/mesh_{i}", at, solid, own_colours=not see_through)
+    shown = [drawing for drawing in drawings if drawing.solids]
+    columns = _columns(shown, FillMode.TransparentFillMajorWireframe if see_through else FillMode.Solid)
+    send(recording, [(one.entity, None, told) for one, told in zip(shown, columns, strict=True)])
+    for entity, frame, solids in shown:
+        for i, solid in enumerate(solids):
+            path = f"{entity}/mesh_{i}"
+            _declare_mesh(recording, path, rr.CoordinateFrame(frame), solid, own_colours=not see_through)
 
 
 def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
@@ -101,41 +106,46 @@ def rgba8(rgba: Sequence[float]) -> Rgba8:
     return r, g, b, a
 
 
-def _primitives(solids: Sequence[Solid], fill_mode: FillMode) -> list[rr.AsComponents]:
-    """Return one archetype for each kind of primitive among `solids`; meshes are left out."""
-    found: list[rr.AsComponents] = []
-    if boxes := [(s, s.geometry) for s in solids if isinstance(s.geometry, Box)]:
-        sizes = [box.size for _, box in boxes]
-        found.append(rr.Boxes3D(sizes=sizes, centers=_centres(boxes), **_look(boxes, fill_mode)))
-    if cylinders := [(s, s.geometry) for s in solids if isinstance(s.geometry, Cylinder)]:
-        size = _length_and_radius([cylinder for _, cylinder in cylinders])
-        found.append(rr.Cylinders3D(centers=_centres(cylinders), **size, **_look(cylinders, fill_mode)))
-    if capsules := [(s, s.geometry) for s in solids if isinstance(s.geometry, Capsule)]:
-        # Rerun's origin is the centre of the lower cap, URDF's the middle of the capsule.
-        origins = [s.pose.apply((0.0, 0.0, -capsule.length / 2.0)) for s, capsule in capsules]
-        size = _length_and_radius([capsule for _, capsule in capsules])
-        found.append(rr.Capsules3D(translations=origins, **size, **_look(capsules, fill_mode)))
-    if spheres := [(s, s.geometry) for s in solids if isinstance(s.geometry, Sphere)]:
-        radii = [sphere.radius for _, sphere in spheres]
-        found.append(rr.Ellipsoids3D(radii=radii, centers=_centres(spheres), **_look(spheres, fill_mode)))
-    return found
+def _columns(drawings: Sequence[Drawing], fill_mode: FillMode) -> list[list[Column]]:
+    """Return for each drawing what its one row tells of primitives; meshes are left out.
+
+    All are made at once, as columns that the drawings have a row of.
+    """
+    frames = component(rr.CoordinateFrame, "frame").column([drawing.frame for drawing in drawings])
+    columns = [[frames.row(i)] for i in range(len(drawings))]
+    for kind, (archetype, fields) in _ARCHETYPES.items():
+        found = [[solid for solid in one.solids if isinstance(solid.geometry, kind)] for one in drawings]
+        having = [i for i, solids in enumerate(found) if solids]
+        solids, lengths = [solid for solids in found for solid in solids], [len(found[i]) for i in having]
+        told = {name: [tell(solid) for solid in solids] for name, tell in (_LOOK | fields).items()}
+        made = [component(archetype, name).column(values, lengths) for name, values in told.items()]
+        made.append(component(archetype, "fill_mode").column([fill_mode.value] * len(having)))
+        for row, i in enumerate(having):
+            columns[i] += [column.row(row) for column in made]
+    return columns
 
 
-def _centres(solids: Sequence[tuple[Solid, object]]) -> list[Array]:
-    return [solid.pose.xyz for solid, _ in solids]
-
-
-def _length_and_radius(geometries: Sequence[Cylinder | Capsule]) -> dict[str, Any]:
-    return {"lengths": [item.length for item in geometries], "radii": [item.radius for item in geometries]}
-
-
-def _look(solids: Sequence[tuple[Solid, object]], fill_mode: FillMode) -> dict[str, Any]:
-    """Return what all archetypes of primitives share: orientation, colour and fill."""
-    return {
-        "quaternions": [rr.Quaternion(xyzw=xyzw_from_wxyz(solid.pose.quat_wxyz)) for solid, _ in solids],
-        "colors": [solid.colour for solid, _ in solids],
-        "fill_mode": fill_mode,
-    }
+_Fields = dict[str, Callable[[Any], Any]]
+_LOOK: _Fields = {
+    "quaternions": lambda solid: xyzw_from_wxyz(solid.pose.quat_wxyz),
+    "colors": lambda solid: int.from_bytes(solid.colour),
+}
+_CENTRE: _Fields = {"centers": lambda solid: solid.pose.xyz}
+_ROUND: _Fields = {
+    "lengths": lambda solid: solid.geometry.length,
+    "radii": lambda solid: solid.geometry.radius,
+}
+_ARCHETYPES: Mapping[type[Geometry], tuple[Any, _Fields]] = {
+    Box: (rr.Boxes3D, _CENTRE | {"half_sizes": lambda solid: np.divide(solid.geometry.size, 2.0)}),
+    Cylinder: (rr.Cylinders3D, _CENTRE | _ROUND),
+    # Rerun's origin is the centre of the lower cap, URDF's the middle of the capsule.
+    Capsule: (
+        rr.Capsules3D,
+        _ROUND | {"translations": lambda solid: solid.pose.apply((0.0, 0.0, -solid.geometry.length / 2.0))},
+    ),
+    Sphere: (rr.Ellipsoids3D, _CENTRE | {"half_sizes": lambda solid: (solid.geometry.radius,) * 3}),
+}
+"""What each kind of primitive is to Rerun, and what its fields tell of a `Solid`."""
 
 
 def _declare_mesh(

@@ -85,7 +85,7 @@ class RerunSink:
 
     def __init__(
         self,
-        path: Path,
+        target: Path | str,
         *,
         config: RecordingConfig | None = None,
         application_id: str = "twin",
@@ -94,12 +94,12 @@ class RerunSink:
         """Prepare; the file is created by `declare`.
 
         Args:
-            path: Of the `.rrd` file; its folder is created.
+            target: Of the `.rrd` file, whose folder is created; or the address of a viewer.
             config: What to keep.
             application_id: Under which the viewer stores changes to the layout.
             recording_id: Fixed by the caller, so that two equal runs write equal recordings.
         """
-        self._path = Path(path)
+        self._target = target
         self._config = config or RecordingConfig()
         self._ids = (application_id, recording_id)
         self._world: World | None = None
@@ -136,7 +136,7 @@ class RerunSink:
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
         blueprint = layout(self._stage, self._robots)
-        self._recording: rr.RecordingStream = open_recording(self._path, *self._ids, blueprint)
+        self._recording: rr.RecordingStream = open_recording(self._target, *self._ids, blueprint)
         self._poses: Poses = Poses(
             world.body_names,
             self._stage,
@@ -216,7 +216,7 @@ class RerunSink:
             with handed_over(blueprint):
                 self._recording.send_blueprint(blueprint)
         finally:
-            end_recording(self._recording, self._path)
+            end_recording(self._recording, self._target)
 
     def _taker(self, topic: str, msgtype: str) -> _Take | None:
         """Return what to do with the messages of a topic, if anything."""
@@ -255,7 +255,7 @@ class RerunSink:
 
         if self._under_way:
             self._under_way = False
-            flush(self._recording, self._path)
+            flush(self._recording, self._target)
 
     def _set_stage(self) -> None:
         """Log what depends on how much floor there is to see; it takes the place of what was."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import rerun_bindings
 
 from twin.errors import RecordingError
 from twin.files.writing import replaced
+from twin.recording.columns import Chunk, Component, send, sim_time
 from twin.recording.frames import WORLD, Frames
 
 WALL_CLOCK_METRICS = frozenset(
@@ -28,9 +29,9 @@ _abandoned: list[Any] = []
 
 
 def open_recording(
-    path: Path, application_id: str, recording_id: str, blueprint: rrb.Blueprint
+    target: Path | str, application_id: str, recording_id: str, blueprint: rrb.Blueprint
 ) -> rr.RecordingStream:
-    """Return a stream into a new file.
+    """Return a stream into a new file, or to a viewer at an address.
 
     Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
     It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
@@ -38,13 +39,14 @@ def open_recording(
     Raises:
         RecordingError: The file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("wb").close()
-    except OSError as error:
-        raise RecordingError(
-            f"{path}: cannot write the recording: {error.strerror}; choose another folder"
-        ) from error
+    if isinstance(target, Path):
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.open("wb").close()
+        except OSError as error:
+            raise RecordingError(
+                f"{target}: cannot write the recording: {error.strerror}; choose another folder"
+            ) from error
     recording = rr.RecordingStream(
         application_id,
         recording_id=recording_id,
@@ -55,7 +57,10 @@ def open_recording(
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
     with handed_over(blueprint):
-        recording.save(path, default_blueprint=blueprint, write_footer=False)
+        if isinstance(target, Path):
+            recording.save(target, default_blueprint=blueprint, write_footer=False)
+        else:
+            recording.connect_grpc(target, default_blueprint=blueprint)
     return recording
 
 
@@ -90,8 +95,8 @@ def begin_flush(recording: rr.RecordingStream) -> None:
         recording.flush(timeout_sec=0.0)
 
 
-def flush(recording: rr.RecordingStream, path: Path) -> None:
-    """Wait until everything so far is in the file.
+def flush(recording: rr.RecordingStream, target: Path | str) -> None:
+    """Wait until everything so far is in the file, or has reached the viewer.
 
     A full disk ends Rerun's writer, for which its flush then may wait for ever.
 
@@ -103,12 +108,13 @@ def flush(recording: rr.RecordingStream, path: Path) -> None:
             recording.flush(timeout_sec=1.0)
             return
         except RuntimeError as fault:
-            if "timed out" not in str(fault) or not _has_room(path.parent):
+            waits = "timed out" in str(fault) and isinstance(target, Path) and _has_room(target.parent)
+            if not waits:
                 break
     # When it is collected, or the process ends, Rerun would wait for that writer, too.
     _abandoned.append(recording.inner)
     rr.unregister_shutdown()
-    raise _not_whole(path)
+    raise _not_whole(target)
 
 
 def _has_room(folder: Path) -> bool:
@@ -120,7 +126,7 @@ def _has_room(folder: Path) -> bool:
     return True
 
 
-def end_recording(recording: rr.RecordingStream, path: Path) -> None:
+def end_recording(recording: rr.RecordingStream, target: Path | str) -> None:
     """See that all is in the file, and close it.
 
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
@@ -128,7 +134,7 @@ def end_recording(recording: rr.RecordingStream, path: Path) -> None:
     Raises:
         RecordingError: The file is not whole.
     """
-    flush(recording, path)
+    flush(recording, target)
     recording.disconnect()
 
 
@@ -146,7 +152,10 @@ def whole_recording(path: Path) -> Iterator[Path]:
         raise _not_whole(path) from fault
 
 
-def _not_whole(path: Path) -> RecordingError:
+def _not_whole(target: Path | str) -> RecordingError:
+    if isinstance(target, str):
+        return RecordingError(f"the viewer at {target} takes nothing any more; was it closed?")
+    path = target
     return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 
@@ -167,7 +176,26 @@ def log_verdict(recording: rr.RecordingStream, verdict: Mapping[str, Any]) -> No
     plain = {key: str(verdict[key]) for key in ("scenario", "seed", "verdict", "digest") if key in verdict}
     whole = json.dumps(verdict, sort_keys=True, default=str)
     recording.send_property("verdict", rr.AnyValues(drop_untyped_nones=True, **plain, json=whole))
+    send(recording, _worst_moments(verdict.get("checks", ())))
     recording.log("/verdict", rr.TextDocument(verdict_text(verdict), media_type="text/markdown"), static=True)
+
+
+def _worst_moments(checks: Iterable[Mapping[str, Any]]) -> Iterator[Chunk]:
+    """Yield lines of the log where each check came closest to being otherwise: what it was then."""
+    known = sorted((c for c in checks if c.get("worst_s") is not None), key=lambda check: check["worst_s"])
+    if not known:
+        return
+    times = [round(check["worst_s"] * 1e9) for check in known]
+    levels = ["INFO" if check["passed"] else "ERROR" for check in known]
+    text, level = (Component(rr.TextLog, name) for name in ("text", "level"))
+    yield "/log/checks", sim_time(times), (text.column(list(map(_moment, known))), level.column(levels))
+
+
+def _moment(check: Mapping[str, Any]) -> str:
+    unit = check.get("unit") or ""
+    said = check.get("reason") or f"worst moment, {_number(check.get('value'))} {unit}".rstrip()
+    margin = "" if check.get("margin") is None else f", margin {_number(check['margin'])} {unit}".rstrip()
+    return f"{check.get('name', '')}: {said}{margin}"
 
 
 def verdict_text(verdict: Mapping[str, Any]) -> str:
@@ -176,8 +204,12 @@ def verdict_text(verdict: Mapping[str, Any]) -> str:
     lines = [f"**{word}: {verdict.get('scenario', '')}**, seed {verdict.get('seed', '–')}", ""]
     checks = verdict.get("checks", ())
     if checks:
-        lines += ["| check | | value | limit | at |", "|---|---|---|---|---|"]
+        lines += ["| check | | value | limit | margin | at |", "|---|---|---|---|---|---|"]
         lines += [_check_row(check) for check in checks]
+        lines.append("")
+    if faults := verdict.get("faults", ()):
+        lines += ["| fault | | from | effect |", "|---|---|---|---|"]
+        lines += [_fault_row(fault) for fault in faults]
         lines.append("")
     metrics = {k: v for k, v in verdict.get("metrics", {}).items() if k not in WALL_CLOCK_METRICS}
     if metrics:
@@ -189,12 +221,19 @@ def verdict_text(verdict: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _fault_row(fault: Mapping[str, Any]) -> str:
+    at = "" if fault["at_s"] is None else f"{fault['at_s']:.2f} s"
+    return f"| {fault['name']} | {fault['outcome'].replace('_', ' ')} | {at} | {fault['effect']} |"
+
+
 def _check_row(check: Mapping[str, Any]) -> str:
     unit = check.get("unit") or ""
-    at = check.get("at_s")
+    at = check.get("at_s") if check.get("worst_s") is None else check["worst_s"]
+    margin = "" if check.get("margin") is None else f"{_number(check['margin'])} {unit}"
+    name = str(check.get("name", "")).replace("|", "\\|")
     return (
-        f"| {check.get('name', '')} | {'pass' if check.get('passed') else '**FAIL**'} "
-        f"| {_number(check.get('value'))} {unit} | {_number(check.get('limit'))} {unit} "
+        f"| {name} | {'pass' if check.get('passed') else '**FAIL**'} "
+        f"| {_number(check.get('value'))} {unit} | {_number(check.get('limit'))} {unit} | {margin} "
         f"| {'' if at is None else f'{_number(at)} s'} |"
     )
 

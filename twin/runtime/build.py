@@ -5,31 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.names import RemapRule
+from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.programs.factory import create_nodes
 from twin.bridge.programs.ros_args import RosArguments
 from twin.bridge.topics import Sample
 from twin.bridge.wire.session import SessionConfig
 from twin.convert import convert
-from twin.errors import MapError
+from twin.errors import MapError, ScenarioError, TwinError
 from twin.geometry import Pose2
 from twin.models import ReadOptions, load
 from twin.models.sensors import SENSORS
 from twin.models.shapes import Box
 from twin.runtime.defaults.drives import with_drive
-from twin.runtime.events.obstacles import hidden_pose, standing_pose
+from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished_scans
 from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.missions import AnyMission, build_missions
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
+from twin.runtime.topics import topic_types
 from twin.savings import ALL, Savings
+from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation
 from twin.scenario.missions import PickAndPlace
 from twin.scenario.observation import CheckContext, Zone
@@ -67,7 +71,11 @@ class Parts:
     clock: Clock
     stacks: Mapping[str, RobotStack]
     mission: AnyMission
+    deciders: Sequence[Node]
+    """The nodes of the missions."""
     checks: CheckContext
+    comers: Sequence[Obstacle]
+    """Obstacles that faults bring."""
     control_period_ns: int
 
 
@@ -97,7 +105,7 @@ def build(
     if scenario.world.arena is not None:
         from twin.warehouse import arena as arenas
 
-        arena = arenas.load(scenario.world.arena)
+        arena = arenas.shared(scenario.world.arena)
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
     reading = ReadOptions(sensors=tuple(map(SENSORS.find, scenario.sensors)), execute=True)
@@ -116,7 +124,8 @@ def build(
                 command_latency=robot.command_latency,
             )
         )
-    scene = _scene(scenario, _as_it_is(scenario, arena))
+    comers = _comers(scenario)
+    scene = _scene(scenario, _as_it_is(scenario, arena), comers)
     maps = _maps(scenario.robots, arena)
     world = World.compose(
         scene,
@@ -153,7 +162,9 @@ def build(
             )
             for robot in scenario.robots
         }
+        robots_nodes = len(bus.nodes)
         mission = build_missions(scenario.tasks, stacks, arena)
+        deciders = bus.nodes[robots_nodes:]
         bus.node_options, bus.group = None, ""
         for place in outside.nodes:
             create_nodes(bus, place)
@@ -167,7 +178,9 @@ def build(
         clock=clock,
         stacks=stacks,
         mission=mission,
-        checks=_check_context(scenario, scene, arena, stacks),
+        deciders=deciders,
+        checks=replace(_check_context(scenario, scene, arena, stacks), topics=partial(topic_types, bus)),
+        comers=comers,
         control_period_ns=control_period_ns,
     )
 
@@ -183,14 +196,27 @@ def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:
 
 def _as_it_is(scenario: Scenario, arena: Arena | None) -> Arena | None:
     """Return the arena that is built, which need not be the one that robots and maps know of."""
-    for fault in scenario.faults:
-        if fault.displacement is not None and arena is not None:
-            arena = arena.with_moved(fault.displacement.name, fault.displacement.by.pose)
+    for i, fault in enumerate(scenario.faults):
+        if fault.kind == "displacement" and arena is not None:
+            try:
+                arena = arena.with_moved(fault.given["name"], fault.given["by"].pose)
+            except TwinError as wrong:
+                raise ScenarioError(
+                    scenario.source.problem(("faults", i, "displacement", "name"), str(wrong))
+                ) from None
     return arena
 
 
-def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
+def _comers(scenario: Scenario) -> list[Obstacle]:
+    """Return the obstacles that faults bring, by the names of the faults."""
+    named = zip(scenario.faults, titles(scenario.faults), strict=True)
+    found = [(entry.resolved()[1], name) for entry, name in named if entry.kind in ("person", "pallet")]
+    return [config.obstacle(name) for config, name in found]
+
+
+def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) -> Scene:
     obstacles = [_obstacle(obstacle) for obstacle in scenario.world.obstacles]
+    obstacles += [_obstacle(comer, hidden=True) for comer in comers]
     statics = [o for o in obstacles if isinstance(o, StaticBody)]
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
@@ -204,13 +230,14 @@ def _scene(scenario: Scenario, arena: Arena | None) -> Scene:
     return replace(scene, goods=(*goods, *movable), placed=placed)
 
 
-def _obstacle(obstacle: Obstacle) -> StaticBody | FreeBody | PlacedBody:
-    pose = standing_pose(obstacle) if obstacle.appears_within is None else hidden_pose(obstacle)
+def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeBody | PlacedBody:
+    hidden = hidden or obstacle.appears_within is not None
+    pose = hidden_pose(obstacle) if hidden else standing_pose(obstacle)
     shapes = (Shape(geometry=Box(size=obstacle.size), rgba=_OBSTACLE_RGBA),)
     name, friction = obstacle.name, obstacle.friction
     if obstacle.mass is not None:
         return FreeBody(name=name, T_world_body=pose, shapes=shapes, mass=obstacle.mass, friction=friction)
-    moves = obstacle.appears_within is not None or obstacle.route is not None
+    moves = hidden or obstacle.route is not None
     kind = PlacedBody if moves else StaticBody
     return kind(name=name, T_world_body=pose, shapes=shapes, friction=friction)
 

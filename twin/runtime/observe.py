@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from twin.geometry import Pose3
 from twin.runtime.defaults.from_description import GRASP_FRAME
+from twin.runtime.on_demand import ON_DEMAND
 from twin.runtime.payload import Payload
 from twin.runtime.stacks.missions import AnyMission
 from twin.runtime.stacks.robot import RobotStack
@@ -30,11 +31,14 @@ class Observer:
         stacks: Sequence[RobotStack],
         mission: AnyMission,
         goods: Sequence[str],
+        needs: Collection[str] = (),
     ) -> None:
+        """Bind to a run; `needs` are the fields of `RobotObservation` that are only computed if asked for."""
         self._world = world
         self._stacks = stacks
         self._mission = mission
         self._goods = tuple(goods)
+        self._needed = {name: reader(world, stacks) for name, reader in ON_DEMAND.items() if name in needs}
         self._last: dict[str, tuple[int, Pose3]] = {}
         self._payload = Payload(world, self._goods)
         self._contacts: dict[tuple[str, str], Contact | ContactObservation] = {}
@@ -71,7 +75,7 @@ class Observer:
             time_ns=world.time_ns,
             robots={stack.name: self._robot(stack) for stack in self._stacks},
             goods=goods,
-            held=self._held(world.contacts(), goods),
+            held=self._held(goods),
             contacts=tuple(map(_observed, self._contacts.values())),
             moved=self._note_moved(),
             mission_state=mission.state,
@@ -88,15 +92,18 @@ class Observer:
         self._last[stack.name] = (now, pose)
         elapsed = (now - then) * 1e-9
         speed = math.dist(pose.xyz[:2].tolist(), before.xyz[:2].tolist()) / elapsed if elapsed else 0.0
+        navigator = stack.navigator
         return RobotObservation(
             pose=pose,
             estimate=stack.robot_pose.in_map(),
             odometry=stack.robot_pose.in_odom(),
             speed=speed,
-            work_J=self._world.work(stack.name),
-            goals=stack.navigator.goals if stack.navigator is not None else 0,
-            recoveries=stack.navigator.recoveries if stack.navigator is not None else 0,
+            goals=navigator.goals if navigator is not None else 0,
+            recoveries=navigator.recoveries if navigator is not None else 0,
+            recovering=navigator is not None and navigator.recovering,
+            goal=navigator.goal if navigator is not None else None,
             map=stack.slam.map if stack.slam is not None else None,
+            **{name: read(stack.name) for name, read in self._needed.items()},
         )
 
     def _note_moved(self) -> frozenset[str]:
@@ -114,18 +121,19 @@ class Observer:
             self._moved |= {self._roots[i] for i in np.flatnonzero(new)}
         return self._moved
 
-    def _held(self, contacts: Sequence[Contact], goods: Mapping[str, Pose3]) -> dict[str, Held]:
-        """Return the goods that both fingers of a robot touch."""
+    def holders(self) -> dict[str, str]:
+        """Return which robot holds each good that both its fingers touch."""
         touching: dict[str, set[str]] = {}
-        for contact in contacts:
-            if contact.body2 in goods and contact.body1 in self._fingers:
+        for contact in self._world.contacts():
+            if contact.body2 in self._goods and contact.body1 in self._fingers:
                 touching.setdefault(contact.body2, set()).add(contact.body1)
+        return {name: self._fingers[min(fingers)] for name, fingers in touching.items() if len(fingers) >= 2}
+
+    def _held(self, goods: Mapping[str, Pose3]) -> dict[str, Held]:
         held = {}
-        for name, fingers in touching.items():
-            if len(fingers) >= 2:
-                robot = self._fingers[min(fingers)]
-                grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
-                held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
+        for name, robot in self.holders().items():
+            grasp = self._world.pose(f"{robot}/{GRASP_FRAME}")
+            held[name] = Held(robot=robot, T_gripper_good=grasp.inverse() @ goods[name])
         return held
 
 

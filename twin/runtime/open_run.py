@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from twin.bridge.topics import Sample
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
@@ -19,13 +20,14 @@ from twin.plugins import execution
 from twin.recording.digest import RunDigest
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
+from twin.runtime.kept_run import KeptRun
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.threads import end_threads
 from twin.savings import ALL, Savings, uncollected
 from twin.scenario.outside import ALONE, Outside
-from twin.scenario.provenance import cpu_class, versions
+from twin.scenario.provenance import Provenance, cpu_class, versions
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
+_LIVE_S = 0.2
+"""A viewer is as much behind the run, at most."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -71,6 +75,8 @@ class OpenRun:
         save_model: Path | None = None,
         workers: int = 0,
         savings: Savings = ALL,
+        taps: Sequence[Callable[[Sample[Any]], None]] = (),
+        viewer: str | None = None,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -90,6 +96,8 @@ class OpenRun:
             save_model: Folder for the compiled world as MJCF.
             workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
+            taps: Called with every sample that a node publishes, from the first one on.
+            viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -97,24 +105,28 @@ class OpenRun:
         OpenRun._ended[:] = [ended for ended in OpenRun._ended if ended() is not None]
         if len(OpenRun._ended) >= _MOST_ENDED:
             end_threads()
-        self._digest = RunDigest()
+        self.digest = RunDigest()
+        """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out) if record else None
+        self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
+        self._finished: str | None = None
+        self._thought = False
+        """Whether a tick is under way, at an agent's place."""
         bag_tap = None
         if bag is not None:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = [tap.on_sample for tap in (self._sink, bag_tap) if tap is not None]
+        taps = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0
         with execution() as self._executed, ExitStack() as ending, uncollected(), kernels_ahead(needed):
             parts = build(
                 scenario,
-                taps=[self._digest.on_sample, *taps],
+                taps=[self.digest.on_sample, *taps],
                 network=network,
                 outside=outside,
                 crash_folder=out,
@@ -139,6 +151,8 @@ class OpenRun:
                 self._sink.declare(parts.world, wheels)
             self._pace = None if pace is None else Pace(pace)
             self._ending = ending.pop_all()
+            if out is not None:
+                self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
 
     def advance(
@@ -162,6 +176,8 @@ class OpenRun:
         with self._executed.going_on(), self._timed():
             while not run.over:
                 run.tick()
+                if run.world.time_ns >= self.digest.second_ends_ns:
+                    self.digest.end_second(run.world.state_digest())
                 if until is not None and until():
                     return True
                 if self._pace is not None:
@@ -178,6 +194,33 @@ class OpenRun:
                         )
                     )
             return False
+
+    def advance_to_agent(self, until: Callable[[], bool]) -> bool:
+        """Go on until a condition holds at an agent's place in a tick, or the run is over; see `Run.think`.
+
+        The tick under way is finished first. All ticks together are those of `advance`.
+
+        Args:
+            until: Asked in each tick when its nodes have run.
+
+        Raises:
+            TwinError: The run cannot go on.
+        """
+        run = self.run
+        guard.take_again()
+        with self._executed.going_on(), self._timed():
+            while True:
+                if self._thought:
+                    run.act()
+                    self._thought = False
+                    if self._pace is not None:
+                        self._pace.keep(run.world.time_ns * 1e-9)
+                if run.over:
+                    return False
+                run.think()
+                self._thought = True
+                if until():
+                    return True
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
@@ -210,6 +253,7 @@ class OpenRun:
         """
         with self._ending:
             verdict = self._verdict()
+            self._finished = verdict.digest
             if self._out is not None:
                 _save_maps(self.run.parts.stacks, self._out)
             if self._sink is not None:
@@ -219,6 +263,24 @@ class OpenRun:
     def close(self) -> None:
         """End the run as it stands, without a verdict. Harmless when repeated."""
         self._ending.close()
+
+    def kept(self) -> KeptRun:
+        """Return what other runs are compared with, and of what this one is made again; at its end."""
+        source = self.run.scenario.source
+        return KeptRun(
+            provenance=Provenance(
+                file=str(source.file),
+                scenario=source.data,
+                nodes=self._outside.nodes,
+                clock=self._outside.clock(self.run.bus.networked),
+                files=source.files(),
+                plugins=self._executed.versions,
+                versions=versions(),
+                cpu=cpu_class(),
+            ),
+            digest=self._finished,
+            hashes=self.digest.hashes(self.run.world.state_digest()),
+        )
 
     def _verdict(self) -> Verdict:
         run, pace = self.run, self._pace
@@ -230,6 +292,7 @@ class OpenRun:
             scenario=run.scenario.name,
             seed=run.scenario.seed,
             checks=tuple(check.result() for check in run.checks),
+            faults=() if run.faults is None else run.faults.reports(),
             metrics={
                 "sim_time_s": simulated,
                 "wall_time_s": self._wall_s,
@@ -240,7 +303,7 @@ class OpenRun:
                 **{f"refused_{reason.replace(' ', '_')}": float(count) for reason, count in refused},
                 **({"trailing_bytes": float(run.bus.trailing)} if run.bus.trailing else {}),
             },
-            digest=self._digest.finish(run.world.state_digest()),
+            digest=self.digest.finish(run.world.state_digest()),
             deterministic=clock != "free" and not (run.lockstep and run.lockstep.surplus),
             clock=clock,
             versions=versions(),
@@ -312,14 +375,15 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None) -> RerunSink | None:
-    if out is None or not scenario.recording.enabled:
+def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> RerunSink | None:
+    if viewer is None and (out is None or not scenario.recording.enabled):
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    config = RecordingConfig(poses_hz=scenario.recording.poses_hz)
-    return RerunSink(
-        out / f"{scenario.name}.rrd",
-        config=config,
-        recording_id=f"{scenario.name}-{scenario.seed}",
-    )
+    rate, name = scenario.recording.poses_hz, f"{scenario.name}-{scenario.seed}"
+    if viewer is not None:
+        # Each is a recording of its own, which the viewer turns to.
+        live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
+        return RerunSink(viewer, config=live, recording_id=f"{name}-{time.monotonic_ns()}")
+    assert out is not None
+    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)

@@ -51,6 +51,8 @@ class Lockstep:
 
     def admit(self) -> None:
         """Let requests of services that only read in; refuse everything else from outside."""
+        if self._bus.link is not None:
+            self._bus.link.release()
         admit_questions(self._bus, self._answered)
 
     def step(self) -> None:

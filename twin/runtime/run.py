@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
 from twin.runtime.build import Parts
-from twin.runtime.events.faults import FaultSchedule
-from twin.runtime.events.obstacles import ObstacleSchedule
 from twin.runtime.observe import Observer
+from twin.runtime.obstacles import ObstacleSchedule
 from twin.runtime.sensing import SensorSchedule
 from twin.scenario.checks import Check
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.schema import Scenario
 
 if TYPE_CHECKING:
+    from twin.faults.schedule import FaultSchedule
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
     from twin.runtime.workers.workers import Workers
@@ -30,6 +30,8 @@ class Run:
     """A built scenario that can be ticked; `PHASES` is the order of one tick."""
 
     PHASES = ("admit", "nodes", "actuate", "step", "sense", "clock", "sinks")
+    THINKING = 2
+    """So many phases are over when all nodes have run and nothing has been done yet: an agent's place."""
 
     def __init__(
         self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
@@ -38,10 +40,13 @@ class Run:
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
-        if any(check.measures_work for check in self.checks):
-            self.world.measure_work()
         goods = [good.name for good in self.world.scene.goods]
-        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods)
+        needs = {field for check in self.checks for field in check.needs}
+        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods, needs)
+        if any(check.topics for check in self.checks):
+            from twin.runtime.topics import watch_topics
+
+            watch_topics(self.bus, self.checks)
         self._sink = sink
         self.schedule = SensorSchedule(
             [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
@@ -56,12 +61,16 @@ class Run:
 
             self.lockstep = Lockstep(self.bus, outside)
         self.workers: Workers | None = None
-        self._obstacles = ObstacleSchedule(
-            self.world, scenario.world.obstacles, [stack.footprint for stack in parts.stacks.values()]
+        self.obstacles = ObstacleSchedule(
+            self.world,
+            scenario.world.obstacles,
+            [stack.footprint for stack in parts.stacks.values()],
+            parts.comers,
         )
-        self.faults = FaultSchedule(self.world, self.bus, parts.stacks, scenario.faults)
+        self.faults: FaultSchedule | None = self._schedule_faults() if scenario.faults else None
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
+        """When the run ends, at the latest."""
         self._mission_end_ns: int | None = None
         self._check()  # where everything starts
 
@@ -81,9 +90,39 @@ class Run:
         self.workers = Workers(self, count)
         return self.workers
 
+    def _schedule_faults(self) -> FaultSchedule:
+        """Prepare the faults, and let those happen that are there from the start."""
+        from twin.faults.fault import FaultContext
+        from twin.faults.schedule import FaultSchedule
+
+        parts = self.parts
+        context = FaultContext(
+            world=self.world,
+            bus=self.bus,
+            robots=parts.stacks,
+            obstacles=self.obstacles,
+            held=self._observer.holders,
+            mission_state=lambda: parts.mission.state,
+            control_period_ns=parts.control_period_ns,
+            zones=parts.checks.zones,
+        )
+        faults = FaultSchedule(self.scenario, context)
+        faults.update()
+        return faults
+
     def tick(self) -> None:
         """Advance by one tick."""
         for phase in self._phases:
+            phase()
+
+    def think(self) -> None:
+        """Begin a tick, up to the place of an agent, who acts as a node would that runs after all others."""
+        for phase in self._phases[: self.THINKING]:
+            phase()
+
+    def act(self) -> None:
+        """Go on to the end of the tick that `think` began."""
+        for phase in self._phases[self.THINKING :]:
             phase()
 
     def admit(self) -> None:
@@ -106,10 +145,11 @@ class Run:
         """3. Actuators take the commands; obstacles come into the way, faults happen."""
         for stack in self.parts.stacks.values():
             stack.handle.hardware.apply()
-        if self._obstacles.active:
+        if self.obstacles.active:
             bases = [self.world.pose(stack.handle.base).to_pose2() for stack in self.parts.stacks.values()]
-            self._obstacles.update(bases)
-        self.faults.update()
+            self.obstacles.update(bases)
+        if self.faults is not None:
+            self.faults.update()
 
     def step(self) -> None:
         """4. Physics; a sensor due on the way samples and publishes there."""
@@ -136,6 +176,13 @@ class Run:
         observation = self._observer.observe()
         for check in self.checks:
             check.observe(observation)
+        if self.scenario.early_stop != "never" and self._is_decided():
+            self._end_ns = min(self._end_ns, self.world.time_ns)
+
+    def _is_decided(self) -> bool:
+        """Whether the run may end, by its key `early_stop`."""
+        decided = [check.decided for check in self.checks]
+        return False in decided or (self.scenario.early_stop == "decided" and None not in decided)
 
     def sinks(self) -> None:
         """7. Checks and recording."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from twin.errors import nearest
 from twin.periods import period_of
-from twin.scenario.faults import RobotFault
+from twin.scenario.checks.check import RobotCheckConfig
+from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation, SlamLocalisation
 from twin.scenario.missions import (
     Behaviors,
@@ -100,7 +101,7 @@ def _arena(scenario: Scenario) -> Iterator[Fault]:
         if entry.kind == "delivered":
             yield Fault(("checks", i), f"delivered {message}")
     for i, fault in enumerate(scenario.faults):
-        if fault.displacement is not None:
+        if fault.kind == "displacement":
             yield Fault(("faults", i), f"displacement {message}")
 
 
@@ -166,13 +167,26 @@ def _behaviors(mission: Behaviors, robot: RobotConfig, loc: Loc) -> Iterator[Fau
 
 def _faults(scenario: Scenario) -> Iterator[Fault]:
     robots = [robot.id for robot in scenario.robots]
+    names, labels = titles(scenario.faults), [entry.given.get("label") for entry in scenario.faults]
     for i, entry in enumerate(scenario.faults):
-        config, loc = entry.config, ("faults", i, entry.kind)
-        if not isinstance(config, RobotFault):
-            continue
-        yield from _robot(config.robot, robots, loc, entry.kind)
-        if config.at >= scenario.duration:
-            yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {config.at:g} s")
+        given, loc = entry.given, ("faults", i, entry.kind)
+        if given.get("robot") is not None or entry.needs_robot:
+            yield from _robot(given.get("robot"), robots, loc, entry.kind)
+        label = labels[i]
+        if label is not None and label in labels[:i]:
+            yield Fault((*loc, "label"), f"another fault is called '{label}'; labels must differ")
+        at, when = given.get("at"), given.get("when")
+        if at is not None and when is not None:
+            yield Fault((*loc, "when"), "a fault begins either at a time or when something happens, not both")
+        elif given.get("after") and when is None:
+            yield Fault((*loc, "after"), "'after' needs a 'when'; without it, 'at' says the time")
+        if isinstance(at, float) and at >= scenario.duration:
+            yield Fault((*loc, "at"), f"the run ends after {scenario.duration:g} s, before {at:g} s")
+        other = getattr(when, "fault", None)
+        others = [*names[:i], *names[i + 1 :], *(e.kind for e in scenario.faults if e is not entry)]
+        if other is not None and other not in others:
+            valid = nearest(other, others) if others else "there is no other"
+            yield Fault((*loc, "when", "fault"), f"there is no other fault '{other}'; {valid}")
 
 
 def _checks(scenario: Scenario) -> Iterator[Fault]:
@@ -184,7 +198,7 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()
         robot = subjects.get("robot")
-        if robot is not None or ("robot" in subjects and entry.kind != "no_collision"):
+        if robot is not None or isinstance(entry.config, RobotCheckConfig):
             yield from _robot(robot, robots, loc, entry.kind)
         subject = by_name.get(robots[0] if robot is None and len(robots) == 1 else robot or "")
         if subject is not None and "robot" in subjects:

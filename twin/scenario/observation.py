@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
@@ -29,10 +30,18 @@ class RobotObservation:
     """True planar speed of the base [m/s]."""
     work_J: float = 0.0
     """Mechanical work that its actuators have done so far; known only if a check asks for it [J]."""
+    clearance: float | None = None
+    """Smallest distance of its shapes from everything but itself and the floor; likewise [m]."""
+    slip: float | None = None
+    """Largest speed at which a driven wheel slides over the floor; likewise [m/s]."""
     goals: int = 0
     """Goals that its navigator has taken so far."""
     recoveries: int = 0
     """Recovery behaviours that its navigator has started so far."""
+    recovering: bool = False
+    """Whether one of them is under way."""
+    goal: Pose2 | None = None
+    """Where its navigator drives to, or last drove to, in `map`; None before the first goal."""
     map: OccupancyMap | None = None
     """The last map that it made and published; None if it makes none."""
 
@@ -116,6 +125,15 @@ class Zone:
         return self.centre.inverse()
 
 
+def outside_distance(zone: Zone, pose: Pose3) -> float:
+    """Return how far the origin of `pose` is outside of the zone's rectangle [m]; 0 inside."""
+    x, y, _ = pose.xyz.tolist()
+    local = zone.T_zone_world @ Pose2(x, y, 0.0)
+    dx = max(0.0, abs(local.x) - zone.size[0] / 2.0)
+    dy = max(0.0, abs(local.y) - zone.size[1] / 2.0)
+    return math.hypot(dx, dy)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Surroundings:
     """What a robot's lidar can see and where the robot can get to: the truth, for checks of maps."""
@@ -139,6 +157,8 @@ class CheckContext:
     """Distance from each good's origin down to its underside [m]."""
     surroundings: Mapping[str, Surroundings] = field(default_factory=dict)
     """Of each robot that has a lidar."""
+    topics: Callable[[], Mapping[str, str]] = dict
+    """Returns the message types of the topics that the run's nodes publish or hear, by name."""
 
     def robot(self, name: str | None) -> str:
         """Return the robot a check is about, without a name the only one; raises ScenarioError for none."""
@@ -156,6 +176,13 @@ class CheckContext:
     def good_bottom(self, name: str) -> float:
         """Return the distance from a good's origin to its underside [m]; raises ScenarioError likewise."""
         return _named("tote", name, self.good_bottoms)
+
+    def topic_type(self, name: str) -> str:
+        """Return the message type of a topic; raises ScenarioError likewise."""
+        topics = self.topics()
+        if name not in topics:
+            raise ScenarioError(f"no node of the run has the topic '{name}'; {nearest(name, topics)}")
+        return topics[name]
 
 
 def _named(what: str, name: str, valid: Mapping[str, T]) -> T:

@@ -151,6 +151,8 @@ class OneOfKind(OneOf):
         for name, model in _shipped(cls.of).items():
             summary = (model().__doc__ or "").partition("\n\n")[0].replace("\n", " ")
             schema["properties"][name].setdefault("description", summary)
+            if getattr(model(), "takes_text", False):
+                schema["properties"][name]["anyOf"].append({"type": "string"})
         params = {"type": ["object", "null"]}
         for name in cls.of.names():
             schema["properties"].setdefault(name, params)

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
-from twin.errors import ScenarioError
+from twin.errors import Problem, ScenarioError
 from twin.models.sensors import SENSORS
 from twin.parameters import NotNegative, Positive, Seconds
+from twin.savings import uncollected
 from twin.scenario import catalogue, consistency
+from twin.scenario.cases import CasesConfig
 from twin.scenario.checks import Check, CheckEntry
 from twin.scenario.faults import FaultEntry
 from twin.scenario.fields import RosName, faultless
 from twin.scenario.missions import Idle, Mission
 from twin.scenario.observation import CheckContext
+from twin.scenario.pass_rate import PassRate
 from twin.scenario.plugins import reference
 from twin.scenario.robots import RobotConfig
+from twin.scenario.source import NOWHERE, Source
 from twin.scenario.world import PhysicsConfig, RecordingConfig, WorldConfig
-from twin.strict_yaml import StrictModel
-from twin.strict_yaml import load as load_yaml
+from twin.strict_yaml import Document, StrictModel, checked, read
 
 
 class Scenario(StrictModel):
@@ -52,10 +56,23 @@ class Scenario(StrictModel):
     """Types of sensors of your own, beside those that ship: `FILE.py:Class` or `module:Class`."""
     checks: Annotated[tuple[CheckEntry, ...], Field(min_length=1)]
     """What must hold for the run to pass."""
+    pass_rate: PassRate | None = None
+    """What share of the runs of `twin sweep` is to pass; absent: all."""
+    early_stop: Literal["never", "failed", "decided"] = "never"
+    """When checks end the run: `failed`, as soon as one has failed whatever comes; `decided`, also when
+    nothing that comes could change any of them."""
     recording: RecordingConfig = RecordingConfig()
     """What goes into the Rerun recording."""
+    test: CasesConfig = CasesConfig()
+    """With which seeds and values it is a test; `twin run` does not look at it."""
 
+    _source: Source = PrivateAttr(NOWHERE)
     _parts_fit = faultless(consistency.faults)
+
+    @property
+    def source(self) -> Source:
+        """What the file says, from which the scenario can be read again."""
+        return self._source
 
     @property
     def tasks(self) -> tuple[Mission, ...]:
@@ -78,11 +95,29 @@ class Scenario(StrictModel):
         )
         if all(robot.navigation is None for robot in robots):
             raise ScenarioError(f"a parameter file is for navigation, and no robot of '{self.name}' has it")
-        return self.model_copy(update={"robots": robots})
+        changed = self.model_copy(update={"robots": robots})
+        navigates = [robot.navigation is not None for robot in robots]
+        changed._source = self._source.with_params_file(str(path), navigates)
+        return changed
 
     def build_checks(self, context: CheckContext) -> tuple[Check, ...]:
-        """Return a fresh fold for each check; raises ScenarioError if the arena lacks a name."""
-        return tuple(entry.build(context) for entry in self.checks)
+        """Return a fresh fold for each check.
+
+        Raises:
+            ScenarioError: The run lacks what some name, such as a zone or a topic.
+        """
+        checks, problems = [], list[Problem]()
+        for i, entry in enumerate(self.checks):
+            try:
+                checks.append(entry.build(context))
+            except ScenarioError as wrong:
+                problems += [
+                    problem if problem.file else self.source.problem(("checks", i), problem.message)
+                    for problem in wrong.problems
+                ]
+        if problems:
+            raise ScenarioError(problems)
+        return tuple(checks)
 
 
 def load(
@@ -100,8 +135,23 @@ def load(
         ScenarioError: With every problem of the file and of the overrides.
         PluginError: A plugin that was executed is wrong.
     """
-    file = catalogue.resolve(name_or_path)
-    return load_yaml(file, Scenario, error=ScenarioError, overrides=overrides, context={"execute": execute})
+    with uncollected():
+        return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
+
+
+def load_again(
+    source: Source, overrides: Mapping[str, str] = MappingProxyType({}), *, execute: bool = False
+) -> Scenario:
+    """Return the scenario of what was read earlier; see `load`."""
+    document = Document(source.file, deepcopy(source.data))
+    return _checked(document, overrides, execute)
+
+
+def _checked(document: Document, overrides: Mapping[str, str], execute: bool) -> Scenario:
+    context = {"execute": execute}
+    scenario = checked(document, Scenario, error=ScenarioError, overrides=overrides, context=context)
+    scenario._source = Source(document.file.absolute(), document.data, document)
+    return scenario
 
 
 def json_schema() -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from twin.files.writing import write_whole
 from twin.scenario.checks import CheckResult
+from twin.scenario.faults import FaultReport
 
 VERDICT = "verdict.json"
 """The file of a run's folder that says how it ended; the last that is written."""
@@ -23,6 +24,8 @@ class Verdict:
     scenario: str
     seed: int
     checks: tuple[CheckResult, ...] = ()
+    faults: tuple[FaultReport, ...] = ()
+    """What became of each fault, in the order of the scenario."""
     metrics: Mapping[str, float] = field(default_factory=dict)
     """`sim_time_s`, `wall_time_s`, `cpu_time_s`, `real_time_factor`, `recoveries`; of some runs more."""
     digest: str | None = None
@@ -36,6 +39,10 @@ class Verdict:
     """What users brought, by name: a package and its version, or the hash of a file."""
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
+    test: str = ""
+    """Name of the test that the run was, such as `warehouse[seed=3]`; empty if it was none."""
+    command: str = ""
+    """What makes the same run again, in the folder where it was made; empty if a program did."""
     error: str | None = None
     """Why the run could not be made or finished."""
 

@@ -62,6 +62,7 @@ class Imu(Sensor):
     types = ("imu",)
     topic, rate_hz = "imu", 100.0
     message = ImuMessage
+    measures = "angular_velocity"
     in_mujoco = "site with framequat, gyro and accelerometer"
     fates: ClassVar = MappingProxyType[str, Fate](
         {

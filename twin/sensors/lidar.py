@@ -64,6 +64,7 @@ class Lidar(Sensor):
     types = ("gpu_lidar", "lidar", "ray", "gpu_ray")
     topic, rate_hz = "scan", 10.0
     message = LaserScan
+    measures = "ranges"
     in_mujoco = "a site and rangefinder per ray"
     fates = FATES
 

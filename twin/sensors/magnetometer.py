@@ -40,6 +40,7 @@ class Magnetometer(Sensor):
     types = ("magnetometer",)
     topic, rate_hz = "magnetic_field", 100.0
     message = MagneticField
+    measures = "magnetic_field"
     in_mujoco = "site with a magnetometer"
     fates: ClassVar = MappingProxyType[str, Fate]({"magnetometer/x/noise/stddev": NOISE})
 

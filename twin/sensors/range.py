@@ -72,6 +72,7 @@ class Range(Sensor):
     types = ("sonar", "ray-cone")
     topic, rate_hz = "range", 10.0
     message = RangeMessage
+    measures = "range"
     in_mujoco = "a site and rangefinder per ray of the cone"
     fates = FATES
 

@@ -28,6 +28,8 @@ class Sensor(ABC):
     """Samples per second, if the file gives none."""
     message: ClassVar[type]
     """The class of its messages."""
+    measures: ClassVar[str] = ""
+    """The field of its message that tells what it measures, if there are several with numbers."""
     at_origin: ClassVar[bool] = True
     """Whether it measures at the origin of its link, wherever its `<pose>` is."""
     in_mujoco: ClassVar[str] = ""

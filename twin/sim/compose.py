@@ -33,8 +33,12 @@ GROUP_COLLISION = 3
 """The robots' collision shapes, set by the converter."""
 
 
-def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics) -> mujoco.MjSpec:
+def build_spec(
+    scene: Scene, robots: Sequence[RobotPlacement], physics: Physics, *, visuals: bool = True
+) -> mujoco.MjSpec:
     """Return the uncompiled world; elements of robot `r` are named `r/<name>`.
+
+    Without the robots' visual geoms it moves in the same way.
 
     Raises:
         ScenarioError: Two things have the same name.
@@ -56,18 +60,9 @@ def build_spec(scene: Scene, robots: Sequence[RobotPlacement], physics: Physics)
     for placed in scene.placed:
         _add_placed(spec, placed, solref)
     for placement in robots:
-        _attach(spec, placement)
+        _attach(spec, placement, visuals)
     _let_lower_friction_act(spec, scene.goods)
     return spec
-
-
-def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Return a copy without the robots' visual geoms; it moves in the same way."""
-    bare = spec.copy()
-    for geom in list(bare.geoms):
-        if geom.group == GROUP_VISUAL:
-            bare.delete(geom)
-    return bare
 
 
 def static_geom(name: str, index: int) -> str:
@@ -214,8 +209,11 @@ def _let_lower_friction_act(spec: mujoco.MjSpec, goods: Sequence[FreeBody]) -> N
         geom.priority = grades.index(geom.friction[0]) + 1
 
 
-def _attach(spec: mujoco.MjSpec, placement: RobotPlacement) -> None:
+def _attach(spec: mujoco.MjSpec, placement: RobotPlacement, visuals: bool) -> None:
     robot = placement.conversion.spec.copy()
+    for geom in () if visuals else list(robot.geoms):
+        if geom.group == GROUP_VISUAL:
+            robot.delete(geom)
     spec.attach(robot, prefix=f"{placement.name}/", frame=spec.worldbody.add_frame())
     _limit_velocities(spec, placement)
     root = spec.body(f"{placement.name}/{placement.conversion.description.root}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from twin.geometry import Array
 from twin.models.description import RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.savings import ALL, Savings
+from twin.sim.factors import Factors
 from twin.sim.indices import Indices, indices
 from twin.sim.noise import NoiseStream
 from twin.sim.servos import EffortServos, PositionServos
@@ -99,6 +101,7 @@ class Hardware:
         scale = 1.0 + self.config.wheel_scale_stddev * scale * [n in wheels for n in self.joint_names]
         self._own_scale: list[float] = scale.tolist()
         self._scale = self._own_scale.copy()
+        self._misread: dict[int, Factors] = {}
         self._miscounted = [0.0] * len(joints)
         self._counts = {i: self._count(i) for i in self._encoders}
         self._step = 0
@@ -118,7 +121,10 @@ class Hardware:
         names = [model.actuator(i).name.removeprefix(prefix) for i in self._actuators]
         self._index = {name: i for i, name in enumerate(names)}
         self._commands: list[float] = data.ctrl[self._actuators].tolist()
-        self._latency_steps = round(command_latency / self._timestep)
+        self._own_latency = round(command_latency / self._timestep)
+        self._latency_steps = self._own_latency
+        self._delays: dict[object, float] = {}
+        """What faults add to the latency of commands [s]."""
         self._under_way: deque[tuple[int, list[float]]] = deque()
         self._last_arrived = self._commands.copy()
         self._wheels = _WheelServos(
@@ -140,6 +146,12 @@ class Hardware:
         self._strongest = np.where(limited, model.actuator_forcerange[self._actuators, 1], math.inf)
         self._limits: dict[str, float] = {}
         """Of effort, by joint, as far as they were set."""
+        self._strength: dict[int, Factors] = {}
+        """Of drives that faults weaken, by index."""
+        self._gears: dict[int, Factors] = {}
+        """Wheels that are not of the size that the controllers reckon with, by index of their drives."""
+        self.filters: list[Callable[[JointReading, int], JointReading | None]] = []
+        """What faults make of a reading at a time [ns]; None: nothing new, the last one again."""
         self._ratios = [drive_ratio(description, name) for name in names]
         self.refused = 0
         """Commands ignored because they were not finite."""
@@ -165,7 +177,11 @@ class Hardware:
             position[i], velocity[i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
             self._counts[i] = count
         effort = data.qfrc_actuator[self._drive_dof] * self._drive_share
-        self._step, self._reading = step, _reading(position, velocity, effort)
+        reading: JointReading | None = _reading(position, velocity, effort)
+        for passed in self.filters:
+            if reading is not None:
+                reading = passed(reading, round(data.time * 1e9))
+        self._step, self._reading = step, self._reading if reading is None else reading
         return self._reading
 
     def command(self, joint: str, value: float) -> None:
@@ -197,10 +213,42 @@ class Hardware:
         """
         index = self._drive(joint)
         self._limits[joint] = effort
-        strongest = min(effort * self._ratios[index], self._strongest[index])
-        actuator = self._actuators[index]
+        self._limit(index, min(effort * self._ratios[index], self._strongest[index]))
+
+    def weaken(self, joint: str, share: float | None, who: object) -> None:
+        """Let the drive of a joint have a share of its largest effort left, as `who` says; None: as before.
+
+        Args:
+            joint: One of `commanded_joints`.
+            share: Of the effort limit that it has otherwise, 0 to 1.
+            who: Several may weaken one drive: the product of their shares holds.
+
+        Raises:
+            SimulationError: No actuator moves this joint.
+        """
+        index = self._drive(joint)
+        self._strength.setdefault(index, Factors()).put(who, share)
+        own = self._limits.get(joint, math.inf) * self._ratios[index]
+        self._limit(index, min(own, self._strongest[index]))
+
+    def strongest(self, joint: str) -> float:
+        """Return what the drive of a joint can do at most [N] or [Nm] at the actuator; inf: no limit."""
+        return _torque_limit(self._model, self._actuators[self._drive(joint)])
+
+    def exerted(self, joint: str) -> float:
+        """Return what the drive of a joint did in the last physics step [N] or [Nm] at the actuator."""
+        return float(self._data.actuator_force[self._actuators[self._drive(joint)]])
+
+    def _limit(self, index: int, own: float) -> None:
+        """Bound what a drive does; `own` is its bound without faults."""
+        actuator, share = self._actuators[index], self._strength.get(index, Factors()).product
+        if share != 1.0:
+            own = min(own, _joint_limit(self._model, actuator))
+        strongest = own * share if share else 0.0
         self._model.actuator_forcelimited[actuator] = math.isfinite(strongest)
         self._model.actuator_forcerange[actuator] = -strongest, strongest
+        self._wheels.limit(index, strongest)
+        self._efforts.limit(index, strongest)
 
     @property
     def orders(self) -> Orders:
@@ -218,6 +266,8 @@ class Hardware:
     def apply(self) -> None:
         """Hand the commands to the physics; called once a tick, before the step."""
         commands = [*(self._arrived() if self._latency_steps else self._commands)]
+        for index, gear in self._gears.items():
+            commands[index] *= gear.product
         self._wheels.apply(commands)
         self._positions.apply(commands)
         self._efforts.apply(commands)
@@ -235,20 +285,66 @@ class Hardware:
         """
         self._miscounted[self._index_of_encoder(joint)] += round(angle / self._tick)
 
-    def misread(self, joint: str, factor: float) -> None:
+    def misread(self, joint: str, factor: float | None, who: object = None) -> None:
         """Let the encoder of a joint count `factor` times what it should: -1 the wrong way, 0 nothing.
 
         Args:
             joint: One of `joint_names` that has an encoder.
-            factor: Of what it counts from now on.
+            factor: Of what it counts from now on; None: as before.
+            who: Several may have their factors: their product holds.
 
         Raises:
             SimulationError: No encoder measures this joint.
         """
         index = self._index_of_encoder(joint)
         before = self._count(index)
-        self._scale[index] = factor * self._own_scale[index]
+        factors = self._misread.setdefault(index, Factors())
+        factors.put(who, factor)
+        self._scale[index] = factors.product * self._own_scale[index]
         self._miscounted[index] += before - self._count(index)
+
+    def resize_wheel(self, joint: str, factor: float | None, who: object) -> None:
+        """Let a wheel be `factor` times as large as all reckon with, but for the height of the robot.
+
+        For a turn that the motor makes and the encoder counts, the robot comes `factor` times as far.
+
+        Args:
+            joint: A driven wheel's, with an encoder.
+            factor: More than 0; None: as before.
+            who: Several may have their factors: their product holds.
+
+        Raises:
+            SimulationError: No actuator or no encoder is at this joint.
+        """
+        index = self._drive(joint)
+        self.misread(joint, None if factor is None else 1.0 / factor, ("resized", who))
+        gear = self._gears.setdefault(index, Factors())
+        gear.put(who, factor)
+        if not gear:
+            del self._gears[index]
+
+    def delay_commands(self, seconds: float | None, who: object) -> None:
+        """Let commands take so much longer [s] from now on, as `who` says; None: no longer than before."""
+        self._delays.pop(who, None)
+        if seconds is not None:
+            self._delays[who] = seconds
+        if not self._latency_steps:
+            self._under_way.clear()
+            self._last_arrived = self._commands.copy()
+        self._latency_steps = self._own_latency + round(sum(self._delays.values()) / self._timestep)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether commands are under way that change something when they arrive."""
+        return any(commands != self._last_arrived for _, commands in self._under_way)
+
+    def angle(self, joint: str) -> float:
+        """Return where a joint truly is [rad] or [m]."""
+        return float(self._data.qpos[self._qpos][self.joint_names.index(joint)])
+
+    def ordered(self, joint: str) -> float:
+        """Return the last command for a joint."""
+        return self._commands[self._drive(joint)]
 
     @property
     def encoders(self) -> tuple[str, ...]:
@@ -310,11 +406,12 @@ class _WheelServos:
         gain: float,
     ) -> None:
         """Bind to those of a robot's actuators that turn wheels; `gain` of the integral [1/s]."""
-        self._data, self._gain = data, gain
+        self._model, self._data, self._gain = model, data, gain
         self._which: list[int] = np.flatnonzero(turning).tolist()
-        actuators = actuators[turning]
+        self._drives = actuators = actuators[turning]
         joints = model.actuator_trnid[actuators, 0]
         self._qpos, self._dof = indices(model.jnt_qposadr[joints]), indices(model.jnt_dofadr[joints])
+        self._damping: list[float] = (-model.actuator_biasprm[actuators, 2]).tolist()
         self._reach, self._fastest = servo_bounds(model, actuators)
         self.reset()
 
@@ -324,6 +421,13 @@ class _WheelServos:
         self._owed = [0.0] * len(self._which)
         self._position: list[float] = self._data.qpos[self._qpos].tolist()
         self._time = float(self._data.time)
+
+    def limit(self, actuator: int, torque: float) -> None:
+        """Take another bound of what a drive does [Nm], if it turns a wheel; `actuator` of the robot's."""
+        if actuator in self._which:
+            i = self._which.index(actuator)
+            limit = min(torque, _joint_limit(self._model, self._drives[i]))
+            self._reach[i] = limit / self._damping[i]
 
     def apply(self, commands: list[float]) -> None:
         """Add the integral to the commands of the wheels."""
@@ -362,7 +466,10 @@ def servo_bounds(model: mujoco.MjModel, actuators: NDArray[np.intp]) -> tuple[li
 
 
 def _torque_limit(model: mujoco.MjModel, actuator: int) -> float:
-    joint = model.actuator_trnid[actuator, 0]
     own = model.actuator_forcerange[actuator, 1] if model.actuator_forcelimited[actuator] else math.inf
-    of_joint = model.jnt_actfrcrange[joint, 1] if model.jnt_actfrclimited[joint] else math.inf
-    return float(min(own, of_joint))
+    return min(float(own), _joint_limit(model, actuator))
+
+
+def _joint_limit(model: mujoco.MjModel, actuator: int) -> float:
+    joint = model.actuator_trnid[actuator, 0]
+    return float(model.jnt_actfrcrange[joint, 1]) if model.jnt_actfrclimited[joint] else math.inf

@@ -1,4 +1,4 @@
-"""A scene as data: everything around the robots that a world is composed of."""
+"""A scene as data that nobody can change: everything around the robots that a world is composed of."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from twin.geometry import Pose3
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 
 Rgba = tuple[float, float, float, float]
+
+
+def _keep(pose: Pose3) -> None:
+    """See that nobody changes a pose: runs of a process share what is equal in their scenes."""
+    pose.xyz.flags.writeable = pose.quat_wxyz.flags.writeable = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +25,9 @@ class Shape:
     solid: bool = True
     """False for paint: seen, but without mass, never touched and not hit by rays."""
 
+    def __post_init__(self) -> None:
+        _keep(self.T_body_geometry)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -30,6 +38,9 @@ class Body:
     shapes: tuple[Shape, ...]
     friction: float = 0.8
     """Coulomb coefficient."""
+
+    def __post_init__(self) -> None:
+        _keep(self.T_world_body)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -150,6 +150,13 @@ class EffortServos:
         given = np.array(bounds, dtype=np.float64).reshape(-1, 2)[made]  # None is NaN, which fmax passes over
         self._least: Array = np.fmax(given[:, 0], -effort)
         self._most: Array = np.fmin(given[:, 1], effort)
+        self._bounds = self._least.copy(), self._most.copy()
+
+    def limit(self, actuator: int, effort: float) -> None:
+        """Bound one more narrowly [N or Nm], or as it was; `actuator` of the robot's."""
+        if actuator in self._which:
+            i = self._which.index(actuator)
+            self._least[i], self._most[i] = (float(np.clip(own[i], -effort, effort)) for own in self._bounds)
 
     def apply(self, commands: list[float]) -> None:
         """Turn efforts, of the robot's commands, into velocities; called once a tick."""

@@ -2,13 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import mujoco
 import numpy as np
 
 _MOST = 256
 """Arrays that are noted before they are added up."""
+
+
+class StepMeter(Protocol):
+    """What sees the state before and after every physics step."""
+
+    def begin(self, steps: int) -> None:
+        """See the state before so many physics steps."""
+
+    def note(self) -> None:
+        """See the state after a physics step."""
+
+    def work(self, robot: str) -> float:
+        """Return the work of a robot's actuators since the start [J]."""
+
+
+class StepWatch:
+    """Calls back after every physics step, for tools that look into a run; wraps the meter that there is."""
+
+    def __init__(self, callback: Callable[[], None], meter: StepMeter | None) -> None:
+        self._callback, self._meter = callback, meter
+
+    def begin(self, steps: int) -> None:
+        """Pass on."""
+        if self._meter is not None:
+            self._meter.begin(steps)
+
+    def note(self) -> None:
+        """Call back."""
+        if self._meter is not None:
+            self._meter.note()
+        self._callback()
+
+    def work(self, robot: str) -> float:
+        """Pass on; 0 if nobody measures."""
+        return 0.0 if self._meter is None else self._meter.work(robot)
 
 
 class WorkMeter:

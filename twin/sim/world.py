@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -14,7 +16,7 @@ from twin.errors import ScenarioError, nearest
 from twin.files.writing import write_whole
 from twin.geometry import Array, Pose3
 from twin.savings import ALL, Savings
-from twin.sim.compose import FLOOR, build_spec, static_geom, without_visuals
+from twin.sim.compose import FLOOR, build_spec, static_geom
 from twin.sim.contacts import Contact, ContactReader, Touch
 from twin.sim.divergence import DivergenceGuard
 from twin.sim.hardware import Hardware
@@ -23,7 +25,10 @@ from twin.sim.robot import RobotHandle, RobotPlacement
 from twin.sim.scene import Scene
 from twin.sim.sensors import Mount, create_sensor
 from twin.sim.shapes import BodyShape, shapes
-from twin.sim.work import WorkMeter
+from twin.sim.work import StepMeter, StepWatch, WorkMeter
+
+if TYPE_CHECKING:
+    from twin.sim.alterations import Alterations
 
 
 class World:
@@ -45,19 +50,18 @@ class World:
         visuals: bool,
         savings: Savings,
     ) -> None:
-        self._spec = build_spec(scene, robots, physics)
         self._placements = tuple(robots)
         self.scene, self.physics, self.seed, self.crash_folder = scene, physics, seed, crash_folder
         self.savings = savings
         """What is not done over again."""
-        self.model = (self._spec if visuals else without_visuals(self._spec)).compile()
+        self.model = build_spec(scene, robots, physics, visuals=visuals).compile()
         self.data = mujoco.MjData(self.model)
         self.timestep_ns = physics.timestep_ns
         self.step_count = 0
         """Physics steps since the start."""
         self._motion_step = self._contact_step = -1
         self._contacts: list[Contact] | None = None
-        self._work_meter: WorkMeter | None = None
+        self._work_meter: StepMeter | None = None
         mujoco.mj_forward(self.model, self.data)
 
         self._guard = DivergenceGuard(self.model, self.data)
@@ -216,9 +220,20 @@ class World:
         """Bring poses to the present positions, as they are after each step."""
         mujoco.mj_kinematics(self.model, self.data)
 
+    @cached_property
+    def alterations(self) -> Alterations:
+        """What changes the physics while a run goes on."""
+        from twin.sim.alterations import Alterations
+
+        return Alterations(self.model, self.data)
+
     def measure_work(self) -> None:
         """Add up the work of actuators from now on; it costs a little of each step."""
         self._work_meter = WorkMeter(self.model, self.data, tuple(self.robots))
+
+    def watch_steps(self, callback: Callable[[], None]) -> None:
+        """Call back after every single physics step from now on."""
+        self._work_meter = StepWatch(callback, self._work_meter)
 
     def work(self, robot: str) -> float:
         """Return the mechanical work of a robot's actuators, as far as it was measured [J].
@@ -232,6 +247,10 @@ class World:
         """Return everything there is to draw except for the floor."""
         return list(shapes(self.scene, self._placements))
 
+    def model_to_see(self) -> mujoco.MjModel:
+        """Return the same world with what is seen only, to draw it at this one's `qpos` and `mocap_pos`."""
+        return build_spec(self.scene, self._placements, self.physics).compile()
+
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
         data, digest = self.data, hashlib.sha256()
@@ -243,7 +262,7 @@ class World:
     def save_model(self, folder: Path) -> Path:
         """Write the world as `world.xml` with its meshes in `assets/`, for any MuJoCo tool."""
         folder.mkdir(parents=True, exist_ok=True)
-        spec = self._spec.copy()
+        spec = build_spec(self.scene, self._placements, self.physics)
         for name, content in spec.assets.items():
             asset = folder / "assets" / name
             asset.parent.mkdir(parents=True, exist_ok=True)

@@ -16,8 +16,10 @@ from pydantic_core import CoreSchema
 
 from twin.errors import TwinError
 from twin.parameters.texts import texts_of
+from twin.strict_yaml.document import Document as Document
 from twin.strict_yaml.document import Loc as Loc
-from twin.strict_yaml.document import apply_override, read
+from twin.strict_yaml.document import apply_override
+from twin.strict_yaml.document import read as read
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults
 from twin.strict_yaml.explain import findings as findings
@@ -69,7 +71,18 @@ def load(
     Raises:
         TwinError: As `error`, with every problem of the file and of the overrides, in file order.
     """
-    document = read(path, error)
+    return checked(read(path, error), schema, error=error, overrides=overrides, context=context)
+
+
+def checked(
+    document: Document,
+    schema: type[M],
+    *,
+    error: type[TwinError],
+    overrides: Mapping[str, str] = MappingProxyType({}),
+    context: Mapping[str, Any] = MappingProxyType({}),
+) -> M:
+    """Return a model of what was read, or is kept as plain data; the overrides go into it. See `load`."""
     for dotted, text in overrides.items():
         apply_override(document, dotted, text)
     model = validate(schema, document, context)

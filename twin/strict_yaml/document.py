@@ -212,6 +212,22 @@ def apply_override(document: Document, dotted: str, text: str) -> None:
             target = target[keys[-1]]
 
 
+def as_text(value: Any) -> str:
+    """Return YAML for an override that is read back as the value: as it stands in a file, if that will do.
+
+    >>> as_text("2 m"), as_text("no: 1"), as_text([0.5, "a"])
+    ('2 m', '"no: 1"', '[0.5,"a"]')
+    """
+    if isinstance(value, str):
+        try:
+            node = _compose(value)
+        except yaml.YAMLError:
+            node = None
+        if isinstance(node, yaml.ScalarNode) and (node.tag, node.value) == ("tag:yaml.org,2002:str", value):
+            return value
+    return to_json(value).decode()
+
+
 def within(loc: Loc) -> str:
     """Return the tail of a message that says where in the file."""
     return f" in {'.'.join(map(str, loc))}" if loc else ""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
 from twin import strict_yaml
 from twin.errors import ScenarioError, nearest
+from twin.files.kept import hash_of
 from twin.geometry import Pose2
 from twin.sim.scene import Scene, StaticBody
 from twin.warehouse.arena_file import ArenaFile, RackEntry, TableEntry, slot_count
@@ -33,13 +34,32 @@ def load(name_or_path: str | Path) -> Arena:
     Raises:
         ScenarioError: With every problem of the file, each with its line.
     """
+    return _read(_file(name_or_path))
+
+
+def shared(name_or_path: str | Path) -> Arena:
+    """Return what `load` does, the same arena for the same content: for runs, which change nothing in it."""
+    path = _file(name_or_path)
+    return _kept(path, hash_of(path))
+
+
+@lru_cache(maxsize=8)
+def _kept(path: Path, _content: str | None) -> Arena:
+    return _read(path)
+
+
+def _read(path: Path) -> Arena:
+    return Arena(strict_yaml.load(path, ArenaFile, error=ScenarioError))
+
+
+def _file(name_or_path: str | Path) -> Path:
     known = catalogue()
     path = known.get(str(name_or_path), Path(name_or_path))
     if not path.is_file():
         raise ScenarioError(
             f"no arena '{name_or_path}': neither a file nor known; {nearest(str(name_or_path), known)}"
         )
-    return Arena(strict_yaml.load(path, ArenaFile, error=ScenarioError))
+    return path
 
 
 class Arena:

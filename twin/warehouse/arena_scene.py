@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
-from functools import partial
+from collections.abc import Iterator
+from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -85,9 +85,10 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
         yield from _zone(zone)
 
 
+@lru_cache(maxsize=8)
 def goods(
-    arena: Arena, free: Collection[str], seed: int, jitter: tuple[float, float]
-) -> tuple[list[StaticBody], tuple[FreeBody, ...]]:
+    arena: Arena, free: frozenset[str], seed: int, jitter: tuple[float, float]
+) -> tuple[tuple[StaticBody, ...], tuple[FreeBody, ...]]:
     """Return stock and named totes that cannot be grasped, and those that can."""
     statics: list[StaticBody] = []
     frees: list[FreeBody] = []
@@ -99,7 +100,7 @@ def goods(
             frees.append(FreeBody(name=tote.name, T_world_body=pose, shapes=shapes, **held))
         else:
             statics.append(StaticBody(name=tote.name, T_world_body=pose, shapes=shapes))
-    return [*statics, *_stock(arena, seed, jitter)], tuple(frees)
+    return (*statics, *_stock(arena, seed, jitter)), tuple(frees)
 
 
 def _stock(arena: Arena, seed: int, jitter: tuple[float, float]) -> Iterator[StaticBody]:

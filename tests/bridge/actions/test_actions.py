@@ -192,3 +192,52 @@ def test_closing_the_bus_lets_the_execution_clean_up(bus: Bus, client: ActionCli
         bus.spin()
     bus.close()
     assert server.log == ["ended 1000"]
+
+
+class Held:
+    """Holds every goal back."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.goals: list[tuple[ActionClient, Any, Any]] = []
+        bus.hold_goal = lambda *goal: not self.goals.append(goal)  # type: ignore[func-returns-value]
+
+
+def test_a_goal_that_is_held_back_is_sent_when_somebody_says_so(bus: Bus, client: ActionClient) -> None:
+    server, held = Server(bus), Held(bus)
+    sent = client.send_goal(Fibonacci.Goal(4))
+    for _ in range(5):
+        bus.spin()
+    assert sent.held
+    assert sent.accepted is None
+    assert server.server.current is None
+    ((who, goal, message),) = held.goals
+    assert (who, goal, message.order) == (client, sent, 4)
+    client.post(sent, Fibonacci.Goal(5))
+    assert not sent.held
+    _spin_until_done(bus, sent)
+    assert sent.result.sequence.tolist() == [0, 1, 1, 2, 3, 5], "with the message that was posted"
+
+
+def test_a_goal_that_is_held_back_can_be_answered_by_somebody_else(bus: Bus, client: ActionClient) -> None:
+    server = Server(bus)
+    Held(bus)
+    sent = client.send_goal(Fibonacci.Goal(4))
+    client.answer(sent, GoalStatus.STATUS_SUCCEEDED, Fibonacci.Result(np.array([7], np.int32)))
+    assert sent.done
+    assert sent.succeeded
+    assert sent.result.sequence.tolist() == [7]
+    for _ in range(5):
+        bus.spin()
+    assert server.log == []
+
+
+def test_a_goal_that_is_held_back_ends_when_it_is_cancelled(bus: Bus, client: ActionClient) -> None:
+    Server(bus)
+    Held(bus)
+    sent = client.send_goal(Fibonacci.Goal(4))
+    answer = sent.cancel()
+    assert sent.done
+    assert sent.status == GoalStatus.STATUS_CANCELED
+    bus.spin()
+    bus.spin()
+    assert answer.result.return_code == CODES.ERROR_UNKNOWN_GOAL_ID

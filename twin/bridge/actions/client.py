@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xxhash
 
 from twin.bridge.actions.goal import ACTIVE, uuid_msg
-from twin.bridge.msgs import GoalInfo, GoalStatus, GoalStatusArray, stamp
+from twin.bridge.msgs import GoalInfo, GoalStatus, GoalStatusArray, new, stamp
 from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.services import Future
 from twin.bridge.srvs import CancelGoal
@@ -42,6 +42,8 @@ class ClientGoal:
         """Why there is no result."""
         self.done = False
         """Whether nothing will change any more: a result, a rejection or an error."""
+        self.held = False
+        """Whether it waits for who holds goals back (`Bus.hold_goal`)."""
         self._client = client
 
     @property
@@ -74,7 +76,8 @@ class ActionClient:
         """Absolute name of the action."""
         self._goals: dict[bytes, tuple[ClientGoal, Callable[[Any], None] | None]] = {}
         self._count = 0
-        self._node = node
+        self.node = node
+        """Whose client it is."""
         self._destroyed = False
         node.action_clients += 1
         # Not the gid: that depends on what other nodes have created before.
@@ -120,12 +123,34 @@ class ActionClient:
         goal_id = xxhash.xxh3_128_digest(self._seed + self._count.to_bytes(8, "little"))
         client_goal = ClientGoal(self, goal_id)
         self._goals[goal_id] = (client_goal, feedback_callback)
-        request = self._type.SendGoal.Request(uuid_msg(goal_id), goal)
-        self._send.call_async(request).add_done_callback(lambda f: self._on_accepted(client_goal, f))
+        hold = self.node.bus.hold_goal
+        client_goal.held = hold is not None and hold(self, client_goal, goal)
+        if not client_goal.held:
+            self.post(client_goal, goal)
         return client_goal
 
+    def post(self, client_goal: ClientGoal, goal: Any) -> None:
+        """Send the message of a goal to the server: of one that was held back, now."""
+        client_goal.held = False
+        request = self._type.SendGoal.Request(uuid_msg(client_goal.goal_id), goal)
+        self._send.call_async(request).add_done_callback(lambda f: self._on_accepted(client_goal, f))
+
+    def answer(self, goal: ClientGoal, status: int, result: Any = None) -> None:
+        """End a goal that was held back instead of the server, which never hears of it.
+
+        Args:
+            goal: The goal.
+            status: A constant of action_msgs/GoalStatus.
+            result: The result message; None: all its defaults.
+        """
+        goal.held, goal.accepted, goal.status = False, True, status
+        goal.result = new(self._type.Result) if result is None else result
+        self._finish(goal, None)
+
     def cancel(self, goal: ClientGoal) -> Future:
-        """Ask the server to end a goal."""
+        """Ask the server to end a goal; one that was held back ends at once."""
+        if goal.held:
+            self.answer(goal, GoalStatus.STATUS_CANCELED)
         return self._ask_to_cancel(goal.goal_id, 0)
 
     def cancel_all(self) -> Future:
@@ -147,9 +172,9 @@ class ActionClient:
         """Be a client no more: goals that are not done end with an error. Harmless when repeated."""
         self._destroyed = True
         for client in (self._send, self._cancel, self._result):
-            self._node.destroy_client(client)
+            self.node.destroy_client(client)
         for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+            self.node.destroy_subscription(subscription)
 
     def _ask_to_cancel(self, goal_id: bytes, until_ns: int) -> Future:
         return self._cancel.call_async(CancelGoal.Request(GoalInfo(uuid_msg(goal_id), stamp(until_ns))))

@@ -19,6 +19,7 @@ from twin.bridge.lockstep.protocol import Entry, Questions, ask, carried, entry
 from twin.bridge.qos import QoS
 from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.topics import ReceivedSample, declare_publisher, declare_subscriber
+from twin.bridge.topics.link import Carried
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import NodeToken, gid, parse_attachment, topic_key
 from twin.bridge.wire.session import direct
@@ -127,11 +128,20 @@ class Mirror:
         mirrored, publisher = self._publishers[number]
         source = parse_attachment(attachment)
         sequence = source.sequence if source else 0
-        if self._bus.taps:
-            sample = ReceivedSample(mirrored, sequence, self._bus.clock.now_ns, payload)
-            for tap in self._bus.taps:
-                tap(sample)
-        publisher.put(payload, attachment=attachment)
+
+        def deliver() -> None:
+            if self._bus.taps:
+                sample = ReceivedSample(mirrored, sequence, self._bus.clock.now_ns, payload)
+                for tap in self._bus.taps:
+                    tap(sample)
+            publisher.put(payload, attachment=attachment)
+
+        if self._bus.link is None:
+            deliver()
+        else:
+            latched = mirrored.qos.durability == "transient_local"
+            sender = mirrored.node.fully_qualified_name
+            self._bus.link.carry(Carried(mirrored.name, sender, sequence, latched, True), deliver)
 
     def _on_answer(self, answer: Any) -> None:
         if answer.kind == Entry.END or self._bus.in_own_thread():

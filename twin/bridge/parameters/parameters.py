@@ -47,6 +47,8 @@ class Parameters(ABC):
         self._post_set: list[PostSet] = []
         self._tell: Callable[[ParameterEvent], None] = lambda event: None
         """Called for every change."""
+        self._together: ParameterEvent | None = None
+        """That of all parameters that are being declared together."""
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
         self._texts: dict[str, Callable[[str], str]] = {}
@@ -81,8 +83,9 @@ class Parameters(ABC):
             raise errors.ParameterAlreadyDeclaredException(self.fully_qualified_name, name)
         descriptor = new(ParameterDescriptor) if descriptor is None else replace(descriptor)
         value, kind = (None, value) if isinstance(value, Type) else (value, None)
+        parameter = Parameter(name, value=value)
         if not descriptor.dynamic_typing:
-            kind = kind or Parameter(name, value=value).kind
+            kind = kind or parameter.kind
             if kind is Type.NOT_SET:
                 raise BridgeError(
                     f"the parameter {name} of {self.fully_qualified_name} is declared without a value; "
@@ -91,7 +94,8 @@ class Parameters(ABC):
             descriptor.type = kind.value
         if not ignore_override and name in self._overrides:
             value = coerced(self._overrides[name], Type(descriptor.type))
-        result = self._change([_of_type(name, value, descriptor)], descriptor)
+            parameter = _of_type(name, value, descriptor)
+        result = self._change([parameter], descriptor)
         self._raise_refusal(result, name, value, Type(descriptor.type))
         return self._parameters[name]
 
@@ -107,15 +111,14 @@ class Parameters(ABC):
         Raises:
             BridgeError: as `declare_parameter`.
         """
-        together = self._event()
-        tell, self._tell = self._tell, lambda event: together.new_parameters.extend(event.new_parameters)
+        self._together = together = self._event()
         try:
             for each in parameters:
                 self.declare_parameter(*each)
                 self._texts[each[0]] = text_of
         finally:
-            self._tell = tell
-        tell(together)
+            self._together = None
+        self._tell(together)
 
     def has_parameter(self, name: str) -> bool:
         """Return whether a parameter is declared."""
@@ -258,10 +261,11 @@ class Parameters(ABC):
                 return SetParametersResult(False, str(error))
             if result is not None and not result.successful:
                 return result
-        event = self._event()
+        event = self._together or self._event()
         for parameter in parameters:
             self._store(parameter, declared_as, event)
-        self._tell(event)
+        if event is not self._together:
+            self._tell(event)
         for notify in self._post_set:
             notify(parameters)
         return SetParametersResult(True, "")
@@ -281,7 +285,7 @@ class Parameters(ABC):
         kept.name = name
         if kept.dynamic_typing:
             kept.type = parameter.kind.value
-        is_new = self.get_parameter_or(name).kind is Type.NOT_SET
+        is_new = name not in self._parameters or self._parameters[name].kind is Type.NOT_SET
         (event.new_parameters if is_new else event.changed_parameters).append(parameter.to_parameter_msg())
         self._parameters[name] = parameter
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from copy import copy
+from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
@@ -13,6 +15,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.topics.link import Carried
 from twin.bridge.topics.sample import ReceivedSample as ReceivedSample
 from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
@@ -65,6 +68,11 @@ class Endpoint:
         self.gid = gid(token)
         self._token = bus.naming.token(bus.session_id, kind, self.interface, qos, token)
         self._declared: list[Any] = []
+
+    @property
+    def is_latched(self) -> bool:
+        """Whether who comes later hears, or it asks for, what was published before."""
+        return self.qos.durability == "transient_local"
 
     def announce(self) -> None:
         """Enter the graph; the last step, as in rmw_zenoh: who reads the token may talk at once."""
@@ -128,9 +136,29 @@ class Publisher(Endpoint, Generic[M]):
         if not self._declared:
             raise BridgeError(f"the publisher of {self.name} is destroyed")
         self._sequence += 1
-        bus, listeners = self._bus, self._listeners
+        bus = self._bus
         frozen = frozen and self._by_reference
         sample = Sample(self, self._sequence, bus.clock.now_ns, message)
+        if bus.link is not None:
+            sample.settle(frozen)
+            heard = Carried(
+                self.name, self.node.fully_qualified_name, self._sequence, self._latched, self.has_subscribers
+            )
+            bus.link.carry(heard, partial(self._arrive, sample, frozen))
+            return
+        self._send(sample, frozen)
+
+    def _arrive(self, sample: Sample[M], frozen: bool) -> None:
+        """Send a copy of what a link held back; the publisher may have changed its message meanwhile."""
+        if self._declared:
+            arrived = copy(sample)
+            arrived.time_ns = self._bus.clock.now_ns
+            if not frozen:
+                arrived.message = sample.shared
+            self._send(arrived, frozen)
+
+    def _send(self, sample: Sample[M], frozen: bool) -> None:
+        bus, listeners = self._bus, self._listeners
         receivers = None
         if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
             receivers = listeners.receivers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -26,17 +26,25 @@ def new(cls: type[M], **fields: Any) -> M:
     >>> new(Quaternion, z=0.5).w
     1.0
     """
-    makers = _makers(cls.__msgtype__)  # type: ignore[attr-defined]
-    values = {name: fields[name] if name in fields else make() for name, make in makers.items()}
-    return cls(**{**values, **fields})
+    constants, makers = _defaults(cls.__msgtype__)  # type: ignore[attr-defined]
+    made = {name: make() for name, make in makers.items() if name not in fields}
+    return cls(**{**constants, **made, **fields})
 
 
 @cache
-def _makers(msgtype: str) -> dict[str, Callable[[], Any]]:
-    """Return what makes each field's default."""
+def _defaults(msgtype: str) -> tuple[dict[str, Value], dict[str, Callable[[], Any]]]:
+    """Return the defaults that nobody can change, and what makes each other field's."""
     values = types.defaults(msgtype)
-    fields = types.store.fielddefs[msgtype][1]
-    return {normalize_fieldname(name): _maker(description, values.get(name)) for name, description in fields}
+    constants: dict[str, Value] = {}
+    makers: dict[str, Callable[[], Any]] = {}
+    for name, description in types.store.fielddefs[msgtype][1]:
+        field, default = normalize_fieldname(name), values.get(name)
+        node, value = cast("tuple[Nodetype, Any]", description)
+        if node == Nodetype.BASE:
+            constants[field] = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
+        else:
+            makers[field] = _maker(description, default)
+    return constants, makers
 
 
 def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
@@ -44,9 +52,6 @@ def _maker(description: Any, default: Value | None) -> Callable[[], Any]:
     if node == Nodetype.NAME:
         cls = types.get(value)
         return lambda: new(cls)
-    if node == Nodetype.BASE:
-        constant = _ZEROS.get(value[0], 0) if default is None else _signed(value[0], default)
-        return lambda: constant
     (inner, element), length = value
     count = length if node == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:

@@ -1,7 +1,4 @@
-"""Many runs: `twin test`, scenarios as tests, and `twin run --repeat`, which compares the digests.
-
-Each run is in a process of its own: a crash or a leftover of one run cannot touch the next.
-"""
+"""Many runs: `twin test`, scenarios as tests, and `twin run --repeat`, which compares the digests."""
 
 from __future__ import annotations
 
@@ -16,6 +13,7 @@ import typer
 
 from twin.cli import completion
 from twin.cli.console import stderr, stdout
+from twin.cli.run.batch_progress import batch_progress
 from twin.cli.run.folders import results_folder
 from twin.cli.run.options import RunOptions
 from twin.errors import ScenarioError
@@ -62,6 +60,18 @@ def run_batch(
             autocompletion=completion.scenarios,
         ),
     ] = None,
+    keyword: Annotated[
+        str, typer.Option("-k", "--keyword", metavar="EXPR", help="Only tests with such names, as pytest -k.")
+    ] = "",
+    tag: Annotated[
+        str, typer.Option("-m", "--tag", metavar="EXPR", help="Only tests with such tags, as pytest -m.")
+    ] = "",
+    jobs: Annotated[
+        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Run N at once; 0: one per core.")
+    ] = 1,
+    shard: Annotated[
+        str, typer.Option(metavar="I/N", help="Only the I-th of N parts, for N machines.")
+    ] = "1/1",
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write one JUnit file over all runs.")
     ] = None,
@@ -71,32 +81,50 @@ def run_batch(
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write Rerun recordings too.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    show: Annotated[bool, typer.Option("--list", help="Only print the names of the tests.")] = False,
 ) -> None:
-    """Run many scenarios, each in a process of its own.
+    """Run scenarios as tests, one for each seed and value that they name.
 
     Exit code 0: all pass; 1: one fails; 2: one could not be run.
     """
+    from twin.cli.interrupted import sigterm_is_ctrl_c
     from twin.cli.run.verdict_table import many_report
+    from twin.experiments.suite.cases import cases_in
+    from twin.experiments.suite.run import run_all
+    from twin.experiments.suite.selection import selected, shard_of
     from twin.files.writing import check_file, write_whole
+    from twin.scenario.junit import junit_xml
 
     files = scenario_files(paths or [own_scenarios()])
+    cases = selected(cases_in(files), keyword=keyword, tags=tag, shard=shard_of(shard))
+    if show:
+        for case in cases:
+            sys.stdout.write(f"{case.name}\n")
+        return
     if junit is not None:
         check_file(junit, "--junit")
+    sigterm_is_ctrl_c()
     verdicts: list[dict[str, Any]] = []
-    with results_folder(out, "test") as folder, stderr().status("") as status:
-        for number, file in enumerate(files, 1):
-            status.update(f"{number} of {len(files)}: {file}")
-            target = folder / f"{number:02d}-{file.stem}"
-            verdicts.append(run_in_child(RunOptions(scenario=file, no_record=not record), target))
-    if junit is not None:
-        from twin.scenario.junit import junit_xml
-
-        write_whole(junit, junit_xml(verdicts))
+    with results_folder(out, "test") as folder, batch_progress(len(cases)) as progress:
+        try:
+            verdicts.extend(
+                run_all(
+                    cases,
+                    folder,
+                    jobs=jobs or len(os.sched_getaffinity(0)),
+                    record=record,
+                    on_begin=progress.begin,
+                    on_end=progress.end,
+                )
+            )
+        finally:  # also of those that ended before a Ctrl-C
+            if junit is not None:
+                write_whole(junit, junit_xml(verdicts))
     if json:
         sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")
     else:
-        stdout().print(many_report(verdicts))
-    raise typer.Exit(max(map(_exit_code, verdicts)))
+        stdout().print(many_report(verdicts, folder))
+    raise typer.Exit(max(map(_exit_code, verdicts), default=0))
 
 
 def own_scenarios() -> Path:

@@ -5,10 +5,12 @@ It shows simulated time, real-time factor and state of the mission.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
@@ -16,9 +18,10 @@ from twin.cli.console import print_error, stderr, stdout
 from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import run_folder
 from twin.cli.run.options import RunOptions
-from twin.errors import TwinError
+from twin.errors import RecordingError, TwinError
 
 if TYPE_CHECKING:
+    from twin.experiments.diff import Side
     from twin.runtime import Progress
 
 
@@ -28,6 +31,7 @@ def run_once(options: RunOptions) -> int:
 
     show_warnings()
     sigterm_is_ctrl_c()
+    golden = None if options.golden is None else _golden(options.golden)
     simulation = Simulation(
         options.scenario,
         overrides=options.overrides,
@@ -58,14 +62,37 @@ def run_once(options: RunOptions) -> int:
             replace(simulation.verdict, error="interrupted").write(simulation.folder)
         raise
     verdict = simulation.verdict
-    if options.json:
+    difference = None
+    if golden is not None and fault is None:
+        from twin.experiments.diff import compare, of_path
+
+        assert simulation.folder is not None
+        with run_progress("compare") as progress:
+            difference = compare(golden, of_path(simulation.folder), progress)
+    if options.json and difference is not None:
+        both = json.loads(verdict.to_json()) | {"golden": difference.to_dict()}
+        sys.stdout.write(json.dumps(both, indent=2, ensure_ascii=False) + "\n")
+    elif options.json:
         sys.stdout.write(verdict.to_json())
     elif fault is None:
         from twin.cli.run.verdict_table import verdict_report
 
         assert simulation.folder is not None
         stdout().print(verdict_report(verdict.to_dict(), simulation.folder))
-    return verdict.exit_code
+        if difference is not None:
+            from twin.cli.experiments.difference_table import difference_report
+
+            stdout().print(difference_report(difference))
+    return max(verdict.exit_code, int(difference is not None and not difference.same))
+
+
+def _golden(path: Path) -> Side:
+    """Return the run that this one is to be; raises RecordingError."""
+    from twin.experiments.diff import of_path
+
+    if path.suffix != ".json" and not path.is_dir():
+        raise RecordingError(f"--golden {path}: must be the folder of a run, or its hashes.json")
+    return of_path(path)
 
 
 @contextmanager

@@ -47,6 +47,13 @@ class RunOptions:
     expect_one_hash: Annotated[
         bool, typer.Option("--expect-one-hash", help="Fail if the repeated runs differ in a single bit.")
     ] = False
+    golden: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="Fail unless this is the same run as an earlier one, named by its folder or hashes.json.",
+        ),
+    ] = None
     pace: Annotated[
         str | None,
         typer.Option(
@@ -104,6 +111,8 @@ class RunOptions:
     def __post_init__(self) -> None:
         if self.include_hidden_topics and not self.bag:
             raise typer.BadParameter("--include-hidden-topics says what is in the bag; it needs --bag")
+        if self.golden is not None and (self.repeat > 1 or self.expect_one_hash):
+            raise typer.BadParameter("--golden compares one run; leave --repeat and --expect-one-hash out")
         _ = self.overrides, self.speed  # raise ScenarioError
 
     @property

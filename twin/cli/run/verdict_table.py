@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from twin.scenario.quantities import quantity
+
 if TYPE_CHECKING:
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
-_STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta"}
+STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta", "inconclusive": "bold yellow"}
 
 
 def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
@@ -22,15 +24,20 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
 
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
-    table.add_column("check", no_wrap=True)
-    for name in ("value", "limit", "at"):
+    table.add_column("check", overflow="fold")
+    for name in ("value", "limit", "margin", "at"):
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        value, limit = (_quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        at = "" if check["at_s"] is None else f"{check['at_s']:.2f} s"
-        table.add_row(mark, Text(check["name"]), value, limit, at)
+        value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
+        margin = (
+            quantity(check["margin"], check["unit"], check["limit"]) if check["margin"] is not None else ""
+        )
+        moment = check["at_s"] if check["worst_s"] is None else check["worst_s"]
+        at = "" if moment is None else f"{moment:.2f} s"
+        table.add_row(mark, Text(check["name"]), value, limit, margin, at)
     lines: list[Table | Text] = [table] if verdict["checks"] else []
+    lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in _reasons(verdict)]
     lines.append(_summary(verdict))
     if losses := verdict["metrics"].get("pace_losses"):
@@ -42,35 +49,61 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
     return Group(*lines)
 
 
-def many_report(verdicts: Sequence[Mapping[str, Any]]) -> Group:
-    """Return one line per run, and the reasons of those that did not pass."""
+_OUTCOME = {"landed": "green", "no_effect": "yellow", "not_reached": "yellow"}
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the table of what became of each fault."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None)
+    for name, justify in (("outcome", "left"), ("fault", "left"), ("from", "right"), ("to", "right")):
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("effect")
+    for fault in faults:
+        outcome = Text(fault["outcome"].replace("_", " "), style=_OUTCOME[fault["outcome"]])
+        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        table.add_row(outcome, Text(fault["name"]), *times, Text(fault["effect"]))
+    return table
+
+
+def many_report(verdicts: Sequence[Mapping[str, Any]], folder: Path | None = None) -> Group:
+    """Return one line per run, why some did not pass and how to make these again, and what was written."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None)
-    for name in ("", "scenario"):
+    for name in ("", "test"):
         table.add_column(name, no_wrap=True)
     for name in ("seed", "simulated", "wall", "digest"):
         table.add_column(name, no_wrap=True, justify="right")
     for verdict in verdicts:
         metrics = verdict["metrics"]
         table.add_row(
-            Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]]),
-            Text(verdict["scenario"]),
+            Text(verdict["verdict"].upper(), style=STYLE[verdict["verdict"]]),
+            Text(_name(verdict)),
             str(verdict["seed"]),
             _seconds(metrics.get("sim_time_s")),
             _seconds(metrics.get("wall_time_s")),
             (verdict["digest"] or "")[:12],
         )
-    reasons = [
-        Text(f"{verdict['scenario']}: {reason}", style="red")
-        for verdict in verdicts
-        for reason in _reasons(verdict)
-    ]
+    reasons = []
+    for verdict in verdicts:
+        reasons += [Text(f"{_name(verdict)}: {reason}", style="red") for reason in _reasons(verdict)]
+        if verdict["verdict"] != "pass" and verdict["command"]:
+            reasons.append(Text(f"  run it again: {verdict['command']}", style="dim"))
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
-    style = _STYLE["pass" if passed == len(verdicts) else "fail"]
-    return Group(table, *reasons, Text(f"{passed} of {len(verdicts)} passed", style=style))
+    style = STYLE["pass" if passed == len(verdicts) else "fail"]
+    lines = [*reasons, Text(f"{passed} of {len(verdicts)} passed", style=style)]
+    if folder is not None:
+        lines.append(Text(f"written to {folder}; `twin report {folder}` makes a page of it", style="dim"))
+    return Group(table, *lines)
+
+
+def _name(verdict: Mapping[str, Any]) -> str:
+    return str(verdict["test"] or verdict["scenario"])
 
 
 def _reasons(verdict: Mapping[str, Any]) -> list[str]:
@@ -88,7 +121,7 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
         parts.append(f"in {metrics['wall_time_s']:.1f} s")
     if "real_time_factor" in metrics:
         parts.append(f"({metrics['real_time_factor']:.1f}x real time)")
-    text = Text(verdict["verdict"].upper(), style=_STYLE[verdict["verdict"]])
+    text = Text(verdict["verdict"].upper(), style=STYLE[verdict["verdict"]])
     text.append("  " + " ".join(parts), style="not bold default")
     if verdict["digest"] is not None:
         text.append(f"  digest {verdict['digest'][:12]}", style="not bold dim default")
@@ -97,17 +130,6 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
     if not verdict["deterministic"]:
         text.append("  not deterministic", style="not bold yellow")
     return text
-
-
-def _quantity(value: float | bool | None, unit: str, limit: float | bool | None) -> str:
-    """Format a value in the unit that suits its limit, so that the two can be compared at a glance."""
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
-        value, unit = value * 1e3, "mm"
-    return f"{round(value, 3):.5g} {unit}".rstrip()
 
 
 def _seconds(value: float | None) -> str:

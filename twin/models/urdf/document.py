@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -227,25 +227,31 @@ def _drop_default_namespace(root: Element) -> None:
 def _check_names(root: Element, report: Report) -> None:
     """Note links and joints whose names have spaces at their ends or what is not seen, and mend them."""
     fault = "has spaces at its ends or line breaks, or characters that are not seen; remove them"
+    for element, attribute, name in list(_names(root)):
+        plain = " ".join(filter(None, _BREAKS.split(name))).strip()
+        if plain == name:
+            continue
+        element.set(attribute, plain)
+        if plain and element.tag in NAMED:
+            report.add(element, f"{describe(element)}: {attribute}= {fault}", code="bad-name")
+
+
+def _names(root: Element) -> Iterator[tuple[Element, str, str]]:
+    """Yield elements, attributes that name a thing, and the names."""
     for element in root.iter():
-        for attribute in NAMES:
-            name = element.get(attribute, "")
-            plain = " ".join(filter(None, _BREAKS.split(name))).strip()
-            if plain == name:
-                continue
-            element.set(attribute, plain)
-            if plain and element.tag in NAMED:
-                report.add(element, f"{describe(element)}: {attribute}= {fault}", code="bad-name")
+        for attribute, name in element.items():
+            if name and attribute in NAMES:
+                yield element, attribute, name
 
 
 def _refuse_unexpanded(root: Element, report: Report) -> None:
     """Note names and elements that xacro would have replaced, had the file declared its prefix."""
     declare = "declare xmlns:xacro='http://www.ros.org/wiki/xacro' in <robot> and use that prefix"
+    named = {element for element, _, name in _names(root) if "${" in name or "$(" in name}
     found = [
         element
         for element in root.iter()
-        if any(mark in element.get(name, "") for name in NAMES for mark in ("${", "$("))
-        or (etree.QName(element).namespace or "").endswith("/xacro")
+        if element in named or element.tag.partition("}")[0].endswith("/xacro")
     ]
     if found:
         first, more = found[0], f" (and {len(found) - 1} more)" if len(found) > 1 else ""

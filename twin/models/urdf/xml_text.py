@@ -125,15 +125,16 @@ class _Scanner:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         self._lines.append(self._parser.CurrentLineNumber)
         self._open.append((tag, self._parser.CurrentLineNumber))
-        shown = f"<{tag[:SHOWN]}>"
+        longest = max(map(len, (tag, *attributes.values())))
         for number, most, what in (
             (len(self._lines), MAX_ELEMENTS, "elements"),
-            (len(self._open), MAX_DEPTH, f"elements inside of each other, down to {shown}"),
-            (len(attributes), MAX_ATTRIBUTES, f"attributes in {shown}"),
-            (max(map(len, (tag, *attributes.values()))), MAX_CHARACTERS, f"characters in a value of {shown}"),
+            (len(self._open), MAX_DEPTH, "elements inside of each other, down to {}"),
+            (len(attributes), MAX_ATTRIBUTES, "attributes in {}"),
+            (longest, MAX_CHARACTERS, "characters in a value of {}"),
         ):
             if number > most:
-                raise self._fault(f"the file has more than {most} {what}", code="too-large")
+                message = f"the file has more than {most} {what}".format(f"<{tag[:SHOWN]}>")
+                raise self._fault(message, code="too-large")
 
     def _end(self, _: str) -> None:
         self._open.pop()

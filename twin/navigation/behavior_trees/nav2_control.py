@@ -96,6 +96,7 @@ class RoundRobin(_IdleIfSkipped):
             if not child.status.is_active:
                 self.context.on_recovery(child.name)
             status = child.execute_tick()
+            self.context.recovering = status is Status.RUNNING
             if status is Status.RUNNING:
                 return status
             self._current += 1
@@ -114,6 +115,7 @@ class RoundRobin(_IdleIfSkipped):
     def halt(self) -> None:
         """Begin with the first child next time."""
         self._current = self._failed = 0
+        self.context.recovering = False
         super().halt()
 
 

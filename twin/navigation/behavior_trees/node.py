@@ -43,6 +43,8 @@ class TreeContext:
         """Told of every change of a node's status."""
         self.on_recovery: Callable[[str], None] = lambda name: None
         """Told when a `RoundRobin`, which holds the recoveries in Nav2's trees, starts one of them."""
+        self.recovering = False
+        """Whether a `RoundRobin` is at one of them."""
         self.woken = False
         """A node that runs had no need to wait: the tree is to be ticked again at once."""
 

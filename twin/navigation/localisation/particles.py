@@ -51,9 +51,6 @@ def clusters(particles: Array) -> NDArray[np.int64]:
     """Return the number, shape (n,), of each particle's cluster: those in bins that touch each other."""
     if _fit_in_a_bin(particles):  # then they are in bins that all touch each other
         return np.zeros(len(particles), dtype=np.int64)
-    from scipy.sparse import coo_matrix  # few robots are ever lost, and it takes long to import
-    from scipy.sparse.csgraph import connected_components
-
     keys, bin_of = np.unique(bin_keys(particles), return_inverse=True)
     turn, cell = keys % YAW_BINS, keys // YAW_BINS
     links = []
@@ -63,11 +60,17 @@ def clusters(particles: Array) -> NDArray[np.int64]:
             at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
             found = np.flatnonzero(keys[at] == wanted)
             links.append(np.column_stack([found, at[found]]))
-    pairs = np.concatenate(links)
-    ones = np.ones(len(pairs), dtype=np.int8)
-    graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(keys), len(keys)))
-    _, cluster_of_bin = connected_components(graph, directed=False)
-    return np.asarray(cluster_of_bin[bin_of], dtype=np.int64)
+    one, other = np.concatenate(links).T
+    first = np.arange(len(keys))  # the first bin that each is known to be connected to
+    while True:
+        nearer = np.minimum(first[one], first[other])
+        lower = first.copy()
+        np.minimum.at(lower, first[one], nearer)
+        np.minimum.at(lower, first[other], nearer)
+        lower = lower[lower]
+        if np.array_equal(lower, first):
+            return np.unique(first, return_inverse=True)[1][bin_of]
+        first = lower
 
 
 @jit

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from twin.geometry import Array, Pose2
+from twin.navigation.maps.clearance import clearance
 from twin.navigation.maps.occupancy_map import OCCUPIED, OccupancyMap
 
 
@@ -73,11 +74,8 @@ def _signed(
     signed = np.full(shape, max_dist)
     if inside.any():
         # The border runs half a cell off the centres on both sides of it.
-        cells = np.where(
-            inside,
-            0.5 - ndimage.distance_transform_edt(inside),
-            ndimage.distance_transform_edt(~inside) - 0.5,
-        )
+        most = math.ceil(max_dist / resolution + 0.5)
+        cells = np.where(inside, 0.5 - clearance(inside, most), clearance(~inside, most) - 0.5)
         signed = np.clip(cells * resolution, -max_dist, max_dist)
     made = signed.astype(np.float32)
     made.flags.writeable = False

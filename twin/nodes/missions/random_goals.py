@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage
 
 from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionClient, ClientGoal
@@ -14,6 +13,8 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import OccupancyGrid, Odometry, new
 from twin.bridge.qos import LATCHED
 from twin.geometry import Array, Pose2
+from twin.navigation.exploration.wavefront import travel_distances
+from twin.navigation.maps.clearance import clearance as clearance_of
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.messages import pose_stamped
 from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
@@ -144,13 +145,14 @@ def open_places(grid: OccupancyMap, robot: Pose2, clearance: float) -> Array:
         clearance: From everything that is not free [m].
     """
     free = np.pad(grid.data == 0, 1)  # beyond the map nothing is known to be free
-    to_centres = ndimage.distance_transform_edt(free)[1:-1, 1:-1]
+    to_centres = clearance_of(free, math.ceil(clearance / grid.resolution + 1.0))[1:-1, 1:-1]
     room = (to_centres - 0.5) * grid.resolution >= clearance
-    label, _ = ndimage.label(room)
     cells = np.argwhere(room)[:, ::-1]
     if not len(cells):
         return np.zeros((0, 2))
     centres = grid.cell_to_world(cells)
     nearest = int(np.argmin(np.hypot(centres[:, 0] - robot.x, centres[:, 1] - robot.y)))
-    mine = label[cells[nearest, 1], cells[nearest, 0]]
-    return centres[label[room] == mine]
+    way = np.full(room.shape, np.inf)
+    way[cells[nearest, 1], cells[nearest, 0]] = 0.0
+    travel_distances(room, way)
+    return centres[np.isfinite(way[room])]

@@ -12,6 +12,7 @@ from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import PoseStamped, new
+from twin.geometry import Pose2
 from twin.navigation.behavior_trees.factory import Registry
 from twin.nodes.navigation.behavior_trees.context import NavigatorContext
 from twin.nodes.navigation.behavior_trees.navigator import Navigator, NavigatorSetup
@@ -77,6 +78,16 @@ class BtNavigatorNode:
     def goals(self) -> int:
         """Goals taken since the beginning of the run."""
         return sum(navigator.goals for navigator in self._navigators)
+
+    @property
+    def goal(self) -> Pose2 | None:
+        """The last goal that was taken, of several poses the last one, in the map frame; None before that."""
+        return self._context.goal
+
+    @property
+    def recovering(self) -> bool:
+        """Whether a recovery behaviour is under way."""
+        return self._context.recovering
 
     @staticmethod
     def _setups(config: BtNavigatorConfig) -> tuple[NavigatorSetup, NavigatorSetup]:

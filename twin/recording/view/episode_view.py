@@ -19,7 +19,7 @@ from twin.recording.columns import TIMELINE, send, sim_time, transforms
 from twin.recording.extents import bounds
 from twin.recording.frames import WORLD
 from twin.recording.player import has_display
-from twin.recording.shapes import Solid, declare_floor, declare_shapes, draw_solids
+from twin.recording.shapes import Drawing, Solid, declare_floor, declare_shapes, draw_solids
 from twin.recording.stream import FLUSH_TIMEOUT_S
 from twin.recording.view.live_viewer import connect, live_viewer
 from twin.sim.shapes import BodyShape
@@ -59,7 +59,7 @@ class EpisodeView:
         declare_episode(self._recording, self._shapes, self._pose_of)
         disc = Cylinder(radius=tolerance, length=0.01)
         solid = Solid(disc, Pose3.from_xyz_rpy((*goal, 0.005)), _GOAL_RGBA)
-        draw_solids(self._recording, "/world/goal", WORLD, [solid])
+        draw_solids(self._recording, [Drawing("/world/goal", WORLD, [solid])])
 
     def show(
         self, time_ns: int, names: Sequence[str], xyz: Array, quat_wxyz: Array, points: ArrayLike

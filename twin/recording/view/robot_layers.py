@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.description import Inertial, RobotDescription
-from twin.recording.shapes import Rgba8, Solid, draw_solids, rgba8
+from twin.recording.shapes import Drawing, Rgba8, Solid, draw_solids, rgba8
 
 COLLISION_COLOUR: Rgba8 = (255, 140, 0, 110)
 """See-through, so that what is meant can be compared with what is touched."""
@@ -43,17 +43,28 @@ class Canvas:
 
 def visual(canvas: Canvas, description: RobotDescription) -> None:
     """Draw what the robot looks like."""
-    for link in description.links.values():
-        solids = [Solid(item.geometry, item.T_link_geometry, rgba8(item.rgba)) for item in link.visuals]
-        draw_solids(canvas.recording, entity("visual", link.name), link.name, solids)
+    drawings = [
+        Drawing(
+            entity("visual", link.name),
+            link.name,
+            [Solid(item.geometry, item.T_link_geometry, rgba8(item.rgba)) for item in link.visuals],
+        )
+        for link in description.links.values()
+    ]
+    draw_solids(canvas.recording, drawings)
 
 
 def collision(canvas: Canvas, description: RobotDescription) -> None:
     """Draw what the robot touches with."""
-    for link in description.links.values():
-        solids = [Solid(item.geometry, item.T_link_geometry, COLLISION_COLOUR) for item in link.collisions]
-        path = entity("collision", link.name)
-        draw_solids(canvas.recording, path, link.name, solids, see_through=True)
+    drawings = [
+        Drawing(
+            entity("collision", link.name),
+            link.name,
+            [Solid(item.geometry, item.T_link_geometry, COLLISION_COLOUR) for item in link.collisions],
+        )
+        for link in description.links.values()
+    ]
+    draw_solids(canvas.recording, drawings, see_through=True)
 
 
 def frames(canvas: Canvas, description: RobotDescription) -> None:

@@ -43,13 +43,10 @@ class RobotsHere:
             for number, sensor in enumerate(stack.sensors)
         }
         self._told: dict[tuple[str, str], Any] = {}
-        self._substeps = run.parts.control_period_ns // run.world.timestep_ns
 
     def tick(self, step_count: int, entries: Sequence[Act]) -> Done:
         """Run the nodes once."""
         run, world = self._run, self._run.world
-        world.step_count = step_count - self._substeps
-        run.faults.update(tell=False)
         self._state.take(world, step_count)
         run.parts.clock.now_ns = world.time_ns
         self._part.receive(entries)

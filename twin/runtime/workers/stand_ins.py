@@ -17,18 +17,22 @@ class Belief(NamedTuple):
 
     in_map: Pose2 | None
     in_odom: Pose2 | None
-    goals: int
-    recoveries: int
+    goals: int = 0
+    recoveries: int = 0
+    recovering: bool = False
+    goal: Pose2 | None = None
 
 
-UNKNOWN = Belief(None, None, 0, 0)
+UNKNOWN = Belief(None, None)
 
 
 def belief_of(stack: RobotStack) -> Belief:
     """Ask the nodes of a robot, where they are."""
     pose, navigator = stack.robot_pose, stack.navigator
-    goals = (0, 0) if navigator is None else (navigator.goals, navigator.recoveries)
-    return Belief(pose.in_map(), pose.in_odom(), *goals)
+    believed = Belief(pose.in_map(), pose.in_odom())
+    if navigator is None:
+        return believed
+    return Belief(*believed[:2], navigator.goals, navigator.recoveries, navigator.recovering, navigator.goal)
 
 
 class Told(RobotPose):
@@ -55,6 +59,16 @@ class Told(RobotPose):
     def recoveries(self) -> int:
         """Recovery behaviours started since the beginning of the run."""
         return self._belief.recoveries
+
+    @property
+    def recovering(self) -> bool:
+        """Whether a recovery behaviour is under way."""
+        return self._belief.recovering
+
+    @property
+    def goal(self) -> Pose2 | None:
+        """The last goal that was taken, in the map frame."""
+        return self._belief.goal
 
     @property
     def _belief(self) -> Belief:

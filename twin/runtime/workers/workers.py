@@ -45,7 +45,9 @@ class Workers:
             raise ScenarioError("--workers needs a system on which a process can be forked, such as Linux")
         self._run = run
         missions = missions_of(run)
-        leaving = [s for s in run.parts.stacks.values() if _can_leave(s, missions.get(s.name))]
+        staying = frozenset[str]() if run.faults is None else run.faults.robots
+        stacks = (stack for stack in run.parts.stacks.values() if stack.name not in staying)
+        leaving = [stack for stack in stacks if _can_leave(stack, missions.get(stack.name))]
         shares = [leaving[i::count] for i in range(min(count, len(leaving)))]
         self._state = state = SharedState(run.world)
         self._pipes: list[Connection] = []
@@ -138,8 +140,8 @@ class Workers:
 def _can_leave(stack: RobotStack, mission: MissionNode | None) -> bool:
     """Whether a worker can run the nodes of a robot: they share nothing with others but the world.
 
-    A map that is made is looked at in this process, and a kinematic base is moved here; a robot that is the
-    only one, in no namespace, is among the user's own nodes.
+    A map that is made is looked at in this process, and a kinematic base is moved here, as hardware fails
+    here; a robot that is the only one, in no namespace, is among the user's own nodes.
     """
     return (
         bool(stack.context.namespace)

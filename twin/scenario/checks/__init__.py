@@ -27,6 +27,8 @@ CHECKS.register("energy", "twin.scenario.checks.totals:Energy")
 CHECKS.register("final_pose", "twin.scenario.checks.path:FinalPose")
 CHECKS.register("path_on_circle", "twin.scenario.checks.path:PathOnCircle")
 CHECKS.register("closed_loop", "twin.scenario.checks.path:ClosedLoop")
+for _kind in ("always", "never", "eventually", "finally", "until", "within", "reaches", "formula"):
+    CHECKS.register(_kind, f"twin.scenario.checks.temporal:{_kind.capitalize()}Check")
 
 
 @with_shipped
@@ -43,7 +45,8 @@ class CheckEntry(OneOfKind):
     def build(self, context: CheckContext) -> Check:
         """Return a fresh fold; runs the file of a user's check."""
         plugin, config = self.resolved()
-        subject = getattr(config, "tote", None) or getattr(config, "robot", None)
+        subject = getattr(config, "subject", None) or getattr(config, "tote", None)
+        subject = subject or getattr(config, "robot", None)
         name = plugin.name if subject is None else f"{plugin.name}({subject})"
         check = plugin.create(name, config, context)
         return check if plugin.ships else GuardedCheck(plugin, check)

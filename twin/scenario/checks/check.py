@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import model_validator
 
@@ -16,6 +18,10 @@ from twin.geometry import Pose2, Pose3, wrap_angle
 from twin.plugins import Plugin
 from twin.scenario.observation import CheckContext, Observation
 from twin.strict_yaml import StrictModel
+
+if TYPE_CHECKING:
+    from twin.scenario.signals.topics import TopicReader
+    from twin.scenario.temporal.formula import Value
 
 NOTHING = "nothing to look at: "
 """Begins the reason of a check that would hold because nothing happened; it fails."""
@@ -39,6 +45,11 @@ class CheckResult:
     """Simulated time at which it was decided [s]; None if there was no observation."""
     reason: str = ""
     """Why it failed; empty when it passed."""
+    margin: float | None = None
+    """How far the worst moment was from making it otherwise, in the unit; negative if it failed. None: it has
+    no measure."""
+    worst_s: float | None = None
+    """Simulated time of the worst moment [s]; None if there was none."""
 
 
 class CheckConfig(StrictModel):
@@ -50,8 +61,10 @@ class Check(ABC):
 
     Config: ClassVar[type | None] = None
     """The class of its parameters: a frozen dataclass, or a `CheckConfig`; None: it has none."""
-    measures_work: bool = False
-    """Whether it looks at `RobotObservation.work_J`, which is summed up in every physics step."""
+    needs: Collection[str] = ()
+    """Fields of `RobotObservation` that cost something, and are only known if a check asks: `work_J`."""
+    topics: Mapping[str, TopicReader] = MappingProxyType({})
+    """Fields of topics that it is given by `take`, by the names that it has for them."""
 
     def __init__(self, name: str, config: Any, context: CheckContext) -> None:
         """Take its name in the verdict, an object of its `Config`, and what is known beforehand."""
@@ -65,6 +78,14 @@ class Check(ABC):
     def result(self) -> CheckResult:
         """Return the outcome so far."""
 
+    def take(self, signal: str, time_ns: int, value: Value) -> None:  # noqa: B027  (most have no topics)
+        """Take a value of one of its `topics`."""
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it passes, whatever is still to come; None: that is open."""
+        return None
+
     def _judged(
         self,
         reason: str,
@@ -72,10 +93,18 @@ class Check(ABC):
         limit: float | None = None,
         unit: str = "",
         at_s: float | None = None,
+        margin: float | None = None,
     ) -> CheckResult:
         """Return the outcome: passed unless there is a reason why not."""
         return CheckResult(
-            name=self.name, passed=not reason, value=value, limit=limit, unit=unit, at_s=at_s, reason=reason
+            name=self.name,
+            passed=not reason,
+            value=value,
+            limit=limit,
+            unit=unit,
+            at_s=at_s,
+            reason=reason,
+            margin=margin,
         )
 
 
@@ -103,19 +132,13 @@ class RobotCheckConfig(CheckConfig):
 
 
 class RobotCheck(Check):
-    """Knows its robot, whether that moved, and when the verdict was decided."""
+    """Knows its robot, and when the verdict was decided."""
 
     _at_s: float | None = None
 
     def __init__(self, name: str, config: RobotCheckConfig, context: CheckContext) -> None:
         super().__init__(name, config, context)
         self._robot = context.robot(config.robot)
-        self._motion = BaseMotion()
-
-    @property
-    def _stood(self) -> str:
-        """Why a check fails whose robot never moved; empty if it did."""
-        return "" if self._motion.seen else f"{NOTHING}{self._robot} did not move"
 
 
 def at_least_one(*keys: str) -> Any:
@@ -136,13 +159,24 @@ class GuardedCheck(Check):
         if not hasattr(check, "name"):
             raise plugin.error("does not call super().__init__(name, config, context)")
         super().__init__(check.name, check.config, check.context)
-        self.measures_work = check.measures_work
+        self.needs, self.topics = check.needs, check.topics
         self._plugin, self._check = plugin, check
 
     def observe(self, observation: Observation) -> None:
         """Take one observation; raises PluginError if the check raises."""
         with self._plugin.guard:
             self._check.observe(observation)
+
+    def take(self, signal: str, time_ns: int, value: Value) -> None:
+        """Take a value of a topic; raises PluginError if the check raises."""
+        with self._plugin.guard:
+            self._check.take(signal, time_ns, value)
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it passes, whatever comes; raises PluginError if the check raises."""
+        with self._plugin.guard:
+            return self._check.decided
 
     def result(self) -> CheckResult:
         """Return the outcome; raises PluginError if it is none."""

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from twin.geometry import Array, Pose2, Pose3, matrix_from_quat_wxyz
+from twin.geometry import Array, Pose3, matrix_from_quat_wxyz
 from twin.parameters import Metres, MetresPerSecond, NotNegative, Positive, Radians
 from twin.scenario.checks.check import Check, CheckConfig, CheckResult
-from twin.scenario.observation import CheckContext, Held, Observation, Zone
+from twin.scenario.observation import CheckContext, Held, Observation, outside_distance
 
 
 class DeliveredConfig(CheckConfig):
@@ -83,16 +83,10 @@ class Delivered(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the distance outside of the zone."""
-        return self._judged(self._reason, self._outside, self.config.tolerance, "m", self._at_s)
-
-
-def outside_distance(zone: Zone, pose: Pose3) -> float:
-    """Return how far the origin of `pose` is outside of the zone's rectangle [m]; 0 inside."""
-    x, y, _ = pose.xyz.tolist()
-    local = zone.T_zone_world @ Pose2(x, y, 0.0)
-    dx = max(0.0, abs(local.x) - zone.size[0] / 2.0)
-    dy = max(0.0, abs(local.y) - zone.size[1] / 2.0)
-    return math.hypot(dx, dy)
+        tolerance, outside = self.config.tolerance, self._outside
+        told = outside is not None and (outside <= tolerance) == (not self._reason)
+        margin = tolerance - outside if outside is not None and told else None
+        return self._judged(self._reason, outside, tolerance, "m", self._at_s, margin)
 
 
 _LONGEST_GAP_NS = 500_000_000
@@ -160,4 +154,10 @@ class ToteSlip(Check):
 
     def result(self) -> CheckResult:
         """Return the outcome so far; the value is the largest slip."""
-        return self._judged(self._reason, self._worst, self.config.max, "m", self._at_s)
+        margin = None if self._worst is None else self.config.max - self._worst
+        return self._judged(self._reason, self._worst, self.config.max, "m", self._at_s, margin)
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it holds, whatever comes."""
+        return False if self._worst is not None and self._worst > self.config.max else None

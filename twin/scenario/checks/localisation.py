@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Collection
 from typing import Annotated
 
-from twin.geometry import Pose2
 from twin.parameters import Metres, NotNegative, Positive, Seconds
-from twin.scenario.checks.check import NOTHING, CheckResult, RobotCheck, RobotCheckConfig, at_least_one
+from twin.scenario.checks.check import NOTHING, RobotCheckConfig, at_least_one
+from twin.scenario.checks.signal_check import RobotSignalCheck
 from twin.scenario.observation import Observation
+from twin.scenario.temporal import Always, And, Finally, Formula, Margin, Predicate, Window
 
 
 class LocalisationErrorConfig(RobotCheckConfig):
@@ -23,51 +24,43 @@ class LocalisationErrorConfig(RobotCheckConfig):
     _has_a_limit = at_least_one("rms", "max")
 
 
-class LocalisationError(RobotCheck):
-    """Sums squares and keeps the worst."""
+class LocalisationError(RobotSignalCheck):
+    """Looks at the error at any time, and at its root mean square at the end."""
 
     Config = LocalisationErrorConfig
     config: LocalisationErrorConfig
-    _squares = _worst = 0.0
-    _count = 0
-    _estimated = False
-    _worst_at: float | None = None
+
+    def formula(self) -> Formula:
+        """Return that neither is too large."""
+        config, parts = self.config, list[Formula]()
+        if config.rms is not None:
+            parts.append(Finally(Predicate(f"localisation_rms({config.after!r})", "<=", config.rms)))
+        if config.max is not None:
+            small = Predicate("localisation_error", "<=", config.max)
+            parts.append(Always(small, Window(round(config.after * 1e9))))
+        return And(tuple(parts))
+
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return which one was too large."""
+        kind = "rms" if "rms" in predicate.signal else "max"
+        return f"{kind} error {margin.value:.3f} m at {margin.at_ns / 1e9:g} s"
+
+    def silence(self, signals: Collection[str]) -> str:
+        """Return why there was no error."""
+        if self._believed:
+            return f"{NOTHING}the run ended before {self.config.after:g} s"
+        return f"{self.robot} published no estimate of its pose"
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        self._at_s = observation.time_s
-        robot = observation.robots[self._robot]
-        if robot.estimate is None:
-            return
-        self._estimated = True
-        if observation.time_s < self.config.after:
-            return
-        error = math.hypot(robot.estimate.x - robot.pose.xyz[0], robot.estimate.y - robot.pose.xyz[1])
-        error = error if math.isfinite(error) else math.inf
-        self._squares += error * error
-        self._count += 1
-        if error >= self._worst:
-            self._worst, self._worst_at = error, observation.time_s
+        super().observe(observation)
+        self._believed = self._believed or observation.robots[self.robot].estimate is not None
 
-    def result(self) -> CheckResult:
-        """Return the outcome so far; the value is the measure that comes off worst against its limit."""
-        rms = math.sqrt(self._squares / self._count) if self._count else math.inf
-        measures = [
-            (value / limit, kind, value, limit, at)
-            for kind, value, limit, at in (
-                ("rms", rms, self.config.rms, self._at_s),
-                ("max", self._worst, self.config.max, self._worst_at),
-            )
-            if limit is not None
-        ]
-        ratio, kind, value, limit, at = max(measures, key=lambda measure: measure[0])
-        if not self._count:
-            reason = f"{self._robot} published no estimate of its pose"
-            if self._estimated:
-                reason = f"{NOTHING}the run ended before {self.config.after:g} s"
-            return self._judged(reason, None, limit, "m", self._at_s)
-        reason = f"{kind} error {value:.3f} m, worst {self._worst:.3f} m at {self._worst_at} s"
-        return self._judged("" if ratio <= 1.0 else reason, value, limit, "m", at)
+    _believed = False
+
+    def nothing(self) -> str:
+        """Return nothing: to know where one stands is something."""
+        return ""
 
 
 class OdometryDriftConfig(RobotCheckConfig):
@@ -77,34 +70,20 @@ class OdometryDriftConfig(RobotCheckConfig):
     """Largest distance of the odometry's end from the true one, seen from the start [m]."""
 
 
-class OdometryDrift(RobotCheck):
-    """Keeps the first and the last pair of true and odometric pose."""
+class OdometryDrift(RobotSignalCheck):
+    """Looks at the drift at the end."""
 
     Config = OdometryDriftConfig
     config: OdometryDriftConfig
-    _start: tuple[Pose2, Pose2] | None = None
-    _end: tuple[Pose2, Pose2] | None = None
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        self._at_s = observation.time_s
-        robot = observation.robots[self._robot]
-        if robot.odometry is None:
-            return
-        self._motion.take(robot.pose)
-        self._end = (robot.pose.to_pose2(), robot.odometry)
-        self._start = self._start or self._end
+    def formula(self) -> Formula:
+        """Return that it is small at the end."""
+        return Finally(Predicate("odometry_drift", "<=", self.config.max))
 
-    def result(self) -> CheckResult:
-        """Return the outcome so far."""
-        drift: float | None = None
-        reason = f"{self._robot} published no odometry"
-        if self._start is not None and self._end is not None:
-            true, odometric = (
-                start.inverse() @ end for start, end in zip(self._start, self._end, strict=True)
-            )
-            drift = true.distance(odometric)
-            reason = self._stood
-            if not drift <= self.config.max:
-                reason = f"odometry ends {drift:.3f} m from the true position"
-        return self._judged(reason, drift, self.config.max, "m", self._at_s)
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return how large it was."""
+        return f"odometry ends {margin.value:.3f} m from the true position"
+
+    def silence(self, signals: Collection[str]) -> str:
+        """Return why there was none."""
+        return f"{self.robot} published no odometry"

@@ -66,6 +66,7 @@ class _MapCheck(RobotCheck):
         """Return the outcome so far; the value is the first measure that fails, else the last one."""
         value: float | None = None
         limit: float | None = None
+        margin: float | None = None
         if self._surroundings is None or not self._surroundings.solids:
             reason = "there is nothing that a lidar could see"
         elif self._map is None:
@@ -74,8 +75,8 @@ class _MapCheck(RobotCheck):
             measures = list(self._measures(self._map, MapTruth(self._surroundings)))
             failed = [measure for measure in measures if not measure[3]]
             text, value, limit, passed = (failed or measures)[0 if failed else -1]
-            reason = "" if passed else text
-        return self._judged(reason, value, limit, self.unit, self._at_s)
+            reason, margin = "" if passed else text, abs(limit - value) * (1 if passed else -1)
+        return self._judged(reason, value, limit, self.unit, self._at_s, margin)
 
 
 class MapAccuracy(_MapCheck):

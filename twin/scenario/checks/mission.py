@@ -27,6 +27,11 @@ class _MissionCheck(Check):
     def _at_s(self) -> float | None:
         return None if self._last is None else self._last.time_s
 
+    @property
+    def decided(self) -> bool | None:
+        """Whether it holds, whatever comes."""
+        return self.result().passed if self._last is not None and self._last.mission_done else None
+
     def _unfinished(self) -> str:
         """Return why nothing is known of the mission's end; empty if it has ended."""
         if self._last is None:
@@ -99,7 +104,9 @@ class TimeLimit(_MissionCheck):
             reason = f"the mission was not done after {time_s:.1f} s"
         elif last.time_s > self.config.limit:
             reason = f"the mission took {time_s:.1f} s"
-        return self._judged(reason, time_s, self.config.limit, "s", time_s)
+        margin = None if time_s is None else self.config.limit - time_s
+        margin = margin if margin is None or (margin < 0.0) == bool(reason) else None
+        return self._judged(reason, time_s, self.config.limit, "s", time_s, margin)
 
 
 class RecoveriesConfig(RobotCheckConfig):
@@ -153,4 +160,5 @@ class Recoveries(RobotCheck):
         if self._at_s is None:
             reason = "the run made no step"
         limit = float(high if too_many and high is not None else low)
-        return self._judged(reason, float(self._count), limit, at_s=self._at_s)
+        margin = min(self._count - low, math.inf if high is None else high - self._count)
+        return self._judged(reason, float(self._count), limit, at_s=self._at_s, margin=float(margin))

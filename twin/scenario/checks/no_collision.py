@@ -94,7 +94,13 @@ class NoCollision(Check):
             if self._hardest != self._first:
                 reason += f"; hardest: {_sentence(*self._hardest)}"
         at_s = self._at_s if self._first is None else self._first[0]
-        return self._judged(reason, self._force, self.config.max_force, "N", at_s)
+        margin = self.config.max_force - self._force
+        return self._judged(reason, self._force, self.config.max_force, "N", at_s, margin)
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it holds, whatever comes."""
+        return None if self._first is None else False
 
 
 def _sentence(time_s: float, contact: ContactObservation) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from twin.geometry import Pose2, wrap_angle
 from twin.parameters import Metres, Positive, Radians
-from twin.scenario.checks.check import CheckResult, RobotCheck, RobotCheckConfig
-from twin.scenario.observation import CheckContext, Observation
+from twin.scenario.checks.check import RobotCheckConfig
+from twin.scenario.checks.signal_check import RobotSignalCheck
+from twin.scenario.temporal import Always, And, Finally, Formula, Margin, Predicate, eventually
 
 
 class FinalPoseConfig(RobotCheckConfig):
@@ -35,49 +35,29 @@ class ClosedLoopConfig(RobotCheckConfig):
     """Largest heading error [rad]; absent: any heading."""
 
 
-class _EndsAt(RobotCheck):
-    """Compares the last true pose with a goal, or with the first pose if `goal` is None."""
+class _EndsAt(RobotSignalCheck):
+    """Compares the last true pose with a goal."""
 
-    _farthest = 0.0
-    _end: Pose2 | None = None
+    config: FinalPoseConfig | ClosedLoopConfig
+    goal: str
 
-    def __init__(
-        self,
-        name: str,
-        config: FinalPoseConfig | ClosedLoopConfig,
-        context: CheckContext,
-        goal: Pose2 | None = None,
-    ) -> None:
-        super().__init__(name, config, context)
-        self._tolerance, self._yaw_tolerance = config.tolerance, config.yaw_tolerance
-        self._goal, self._must_leave = goal, goal is None
+    def _ends_at(self, distance: str, turned: str, yaw_tolerance: float | None) -> Formula:
+        parts = [Predicate(distance, "<=", self.config.tolerance)]
+        if yaw_tolerance is not None:
+            parts.append(Predicate(turned, "<=", yaw_tolerance))
+        return Finally(And(tuple(parts)))
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        self._end = observation.robots[self._robot].pose.to_pose2()
-        self._at_s = observation.time_s
-        if self._goal is None:
-            self._goal = self._end
-        self._farthest = max(self._farthest, self._end.distance(self._goal))
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return how far it was from there."""
+        if predicate.relation == ">":
+            return f"{self.robot} never left its start"
+        if predicate.signal.startswith("turned"):
+            turned, limit = (math.degrees(float(angle)) for angle in (margin.value, predicate.limit))
+            return f"{self.robot} ends turned by {turned:.1f} deg (limit {limit:.1f} deg)"
+        return f"{self.robot} ends {margin.value:.3f} m from {self.goal}"
 
-    def result(self) -> CheckResult:
-        """Return the outcome so far; the value is the distance from the goal."""
-        distance: float | None = None
-        reason = "the run made no step"
-        if self._end is not None and self._goal is not None:
-            distance = self._end.distance(self._goal)
-            reason = self._fault(distance, abs(wrap_angle(self._end.yaw - self._goal.yaw)))
-        return self._judged(reason, distance, self._tolerance, "m", self._at_s)
-
-    def _fault(self, distance: float, turned: float) -> str:
-        where = "its start" if self._must_leave else "the goal"
-        if distance > self._tolerance:
-            return f"{self._robot} ends {distance:.3f} m from {where}"
-        if self._yaw_tolerance is not None and turned > self._yaw_tolerance:
-            limit = math.degrees(self._yaw_tolerance)
-            return f"{self._robot} ends turned by {math.degrees(turned):.1f} deg (limit {limit:.1f} deg)"
-        if self._must_leave and self._farthest <= self._tolerance:
-            return f"{self._robot} never left its start"
+    def nothing(self) -> str:
+        """Return nothing: to stand at the goal is to be there."""
         return ""
 
 
@@ -85,17 +65,28 @@ class FinalPose(_EndsAt):
     """Compares with the goal."""
 
     Config = FinalPoseConfig
+    config: FinalPoseConfig
+    goal = "the goal"
 
-    def __init__(self, name: str, config: FinalPoseConfig, context: CheckContext) -> None:
-        super().__init__(name, config, context, Pose2(config.x, config.y, config.yaw or 0.0))
-        if config.yaw is None:
-            self._yaw_tolerance = None
+    def formula(self) -> Formula:
+        """Return that it ends there."""
+        config, yaw = self.config, self.config.yaw
+        place, turned = f"distance_to({config.x!r}, {config.y!r})", f"turned_from({yaw!r})"
+        return self._ends_at(place, turned, None if yaw is None else config.yaw_tolerance)
 
 
 class ClosedLoop(_EndsAt):
     """Compares with the start."""
 
     Config = ClosedLoopConfig
+    config: ClosedLoopConfig
+    goal = "its start"
+
+    def formula(self) -> Formula:
+        """Return that it ends there, and was elsewhere."""
+        left = eventually(Predicate("distance_to_start", ">", self.config.tolerance))
+        end = self._ends_at("distance_to_start", "turned_from_start", self.config.yaw_tolerance)
+        return And((end, left))
 
 
 class PathOnCircleConfig(RobotCheckConfig):
@@ -109,28 +100,18 @@ class PathOnCircleConfig(RobotCheckConfig):
     """Largest distance from the circle [m]."""
 
 
-class PathOnCircle(RobotCheck):
-    """Keeps the largest distance from the circle."""
+class PathOnCircle(RobotSignalCheck):
+    """Looks at the distance from the circle."""
 
     Config = PathOnCircleConfig
     config: PathOnCircleConfig
-    _worst: float | None = None
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        pose = observation.robots[self._robot].pose
-        self._motion.take(pose)
-        x, y, _ = pose.xyz
-        centre = self.config.centre
-        off = abs(math.hypot(x - centre[0], y - centre[1]) - self.config.radius)
-        if self._worst is None or off > self._worst:
-            self._worst, self._at_s = off, observation.time_s
+    def formula(self) -> Formula:
+        """Return that it never is too large."""
+        x, y = self.config.centre
+        circle = f"distance_to_circle({x!r}, {y!r}, {self.config.radius!r})"
+        return Always(Predicate(circle, "<=", self.config.tolerance))
 
-    def result(self) -> CheckResult:
-        """Return the outcome so far."""
-        reason = "the run made no step"
-        if self._worst is not None:
-            reason = self._stood
-            if self._worst > self.config.tolerance:
-                reason = f"{self._robot} was {self._worst:.3f} m off the circle"
-        return self._judged(reason, self._worst, self.config.tolerance, "m", self._at_s)
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return how large it was."""
+        return f"{self.robot} was {margin.value:.3f} m off the circle"

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 from pydantic import model_validator
 
-from twin.geometry import Array
 from twin.parameters import Joules, Metres, NotNegative, Positive
-from twin.scenario.checks.check import NOTHING, CheckResult, RobotCheck, RobotCheckConfig
+from twin.scenario.checks.check import RobotCheckConfig
+from twin.scenario.checks.signal_check import RobotSignalCheck
 from twin.scenario.observation import Observation
+from twin.scenario.temporal import Always, And, Finally, Formula, Margin, Predicate
 
 
 class DrivenDistanceConfig(RobotCheckConfig):
@@ -30,36 +30,27 @@ class DrivenDistanceConfig(RobotCheckConfig):
         return self
 
 
-class DrivenDistance(RobotCheck):
-    """Adds up the steps of the base on the floor plane."""
+class DrivenDistance(RobotSignalCheck):
+    """Looks at the length at the end."""
 
     Config = DrivenDistanceConfig
     config: DrivenDistanceConfig
-    _distance = 0.0
-    _previous: Array | None = None
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        pose = observation.robots[self._robot].pose
-        self._motion.take(pose)
-        xy = pose.xyz[:2].copy()
-        if self._previous is not None:
-            self._distance += math.dist(xy, self._previous)
-        self._previous, self._at_s = xy, observation.time_s
-
-    def result(self) -> CheckResult:
-        """Return the outcome so far."""
+    def formula(self) -> Formula:
+        """Return both bounds, at the end."""
         low, high = self.config.min, self.config.max
-        too_short = low is not None and self._distance < low
-        too_long = high is not None and self._distance > high
-        reason = self._stood if low is None else ""
-        if self._at_s is None:
-            reason = "the run made no step"
-        elif too_short or too_long:
-            side = "less" if too_short else "more"
-            reason = f"{self._robot} drove {self._distance:.2f} m, {side} than allowed"
-        limit = low if too_short or high is None else high
-        return self._judged(reason, self._distance, limit, "m", self._at_s)
+        parts = [] if low is None else [Predicate("driven_distance", ">=", low)]
+        parts += [] if high is None else [Predicate("driven_distance", "<=", high)]
+        return Finally(And(tuple(parts)))
+
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return which bound was missed."""
+        side = "less" if predicate.relation == ">=" else "more"
+        return f"{self.robot} drove {margin.value:.2f} m, {side} than allowed"
+
+    def nothing(self) -> str:
+        """Return that it stood, unless it may."""
+        return super().nothing() if self.config.min is None else ""
 
 
 class EnergyConfig(RobotCheckConfig):
@@ -73,28 +64,26 @@ class EnergyConfig(RobotCheckConfig):
     """Largest work [J]."""
 
 
-class Energy(RobotCheck):
-    """Keeps the work done so far, and since when it is too much."""
+class Energy(RobotSignalCheck):
+    """Looks at the work done so far."""
 
     Config = EnergyConfig
     config: EnergyConfig
-    measures_work = True
-    _energy = 0.0
-    _moved = _seen = False
+    _moved = False
+
+    def formula(self) -> Formula:
+        """Return that it never is too much."""
+        return Always(Predicate("energy", "<=", self.config.max))
+
+    def sentence(self, predicate: Predicate, margin: Margin) -> str:
+        """Return how much it was."""
+        return f"{self.robot} used {margin.value:.0f} J"
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        self._seen = True
-        self._energy = observation.robots[self._robot].work_J
-        self._moved = self._robot in observation.moved
-        if self._energy <= self.config.max:
-            self._at_s = observation.time_s
+        super().observe(observation)
+        self._moved = self.robot in observation.moved
 
-    def result(self) -> CheckResult:
-        """Return the outcome so far; a failure's time is the last one within the limit."""
-        reason = "" if self._moved else f"{NOTHING}{self._robot} did not move"
-        if not self._seen:
-            reason = "the run made no step"
-        if self._energy > self.config.max:
-            reason = f"{self._robot} used {self._energy:.0f} J"
-        return self._judged(reason, self._energy, self.config.max, "J", self._at_s)
+    def nothing(self) -> str:
+        """Return that nothing of it moved."""
+        return "" if self._moved else f"{self.robot} did not move"

@@ -97,6 +97,8 @@ class NavigatorContext(TreeContext):
         """[m]"""
         self.tree_nodes = tree_nodes
         """What trees may be made of."""
+        self.goal: Pose2 | None = None
+        """The last goal that was taken, of several poses the last one, in the map frame."""
         self._actions: dict[tuple[str, str], ActionClient] = {}
         self._services: dict[tuple[str, str], Client] = {}
         self._topics: dict[str, Latest] = {}

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from twin.bridge.actions import ActionServer, GoalHandle
+from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.node.tasks import Steps
 from twin.bridge.types import ActionType
@@ -181,6 +182,7 @@ class Navigator:
         self._due = self._due if self._active is not None else now
         self._tree, self._name, self._active, self._started = tree, name, handle, now
         self.goals += 1
+        self._context.goal = pose2_from_pose(poses[-1].pose) if poses else None
         return None
 
     def _was_for_an_older_goal(self, status: Status) -> bool:

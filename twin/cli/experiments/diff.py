@@ -1,0 +1,69 @@
+"""`twin diff`: where two runs part."""
+
+from __future__ import annotations
+
+import json as json_module
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from twin.cli import completion
+
+if TYPE_CHECKING:
+    from twin.experiments.diff import Difference
+
+
+def diff(
+    a: Annotated[
+        Path,
+        typer.Argument(
+            metavar="A",
+            help="Folder of a run, its hashes.json, or a scenario, which is run now.",
+            show_default=False,
+            autocompletion=completion.scenarios,
+        ),
+    ],
+    b: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="B",
+            help="As A.",
+            show_default="A made again now",
+            autocompletion=completion.scenarios,
+        ),
+    ] = None,
+    set: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY=VALUE", help="Change one value of B, which is run now; may be repeated."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of all noise of B, instead of the file's.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Name the first tick, topic and field in which two runs differ.
+
+    Exit code 0: they are the same run; 1: they differ; 2: one of them is missing or cannot be made.
+    """
+    from twin.cli.run.once import run_progress
+    from twin.cli.run.options import parse_overrides
+    from twin.experiments.diff import compare, made_again, of_path
+
+    overrides = parse_overrides(set or (), seed)
+    with run_progress("diff") as progress:
+        one = of_path(a, progress=progress)
+        other = of_path(b, overrides, progress) if b is not None else made_again(one, overrides, progress)
+        found = compare(one, other, progress)
+    print_difference(found, as_json=json)
+    raise typer.Exit(0 if found.same else 1)
+
+
+def print_difference(found: Difference, *, as_json: bool = False) -> None:
+    """Print what a comparison found, for people or programs."""
+    if as_json:
+        sys.stdout.write(json_module.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n")
+        return
+    from twin.cli.console import stdout
+    from twin.cli.experiments.difference_table import difference_report
+
+    stdout().print(difference_report(found))

@@ -1,0 +1,1 @@
+"""Scenarios as tests: which ones a file makes, run side by side in processes of their own."""

@@ -1,0 +1,94 @@
+"""Which tests are run: by words of their names, by tags, by shard."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from twin.errors import ScenarioError
+from twin.experiments.suite.cases import Case
+
+_WORD = re.compile(r"\(|\)|[^\s()]+")
+
+
+def selected(
+    cases: Sequence[Case], *, keyword: str = "", tags: str = "", shard: tuple[int, int] = (1, 1)
+) -> list[Case]:
+    """Return some of the tests, in their order.
+
+    Args:
+        cases: All tests.
+        keyword: Words that a test's name contains, with `and`, `or`, `not` and brackets, as `pytest -k`.
+        tags: The same of its tags, whole, as `pytest -m`.
+        shard: Which part of how many: every n-th test, from the i-th on.
+
+    Raises:
+        ScenarioError: An expression is none, or chooses nothing.
+    """
+    found = list(cases)
+    if keyword:
+        chosen = expression(keyword, "-k")
+        found = [case for case in found if chosen(lambda word, case=case: word.lower() in case.name.lower())]  # type: ignore[misc]
+    if tags:
+        chosen = expression(tags, "-m")
+        found = [case for case in found if chosen(lambda word, case=case: word in case.tags)]  # type: ignore[misc]
+    if cases and not found:
+        raise ScenarioError(
+            f"{_told(keyword, tags)}: chooses none of {len(cases)} tests; {_known(cases, bool(tags))}"
+        )
+    part, parts = shard
+    return found[part - 1 :: parts]
+
+
+def shard_of(text: str) -> tuple[int, int]:
+    """Return which part of how many `i/n` means; raises ScenarioError."""
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise ScenarioError(f"--shard {text}: must be i/n, from 1/n to n/n, such as 1/3")
+    return int(match[1]), int(match[2])
+
+
+def expression(text: str, option: str) -> Callable[[Callable[[str], bool]], bool]:
+    """Return what tells whether an expression holds, given which words do; raises ScenarioError."""
+    words = _WORD.findall(text)
+    wrong = ScenarioError(
+        f"{option} {text}: must be words with and, or, not and brackets, such as 'seed=3 and not slow'"
+    )
+
+    def parse(at: int, level: int) -> tuple[int, Callable[[Callable[[str], bool]], bool]]:
+        """Return where the part of a level (0: or, 1: and, 2: not) ends, and what it means."""
+        if level == 2:
+            if at >= len(words) or words[at] in (")", "and", "or"):
+                raise wrong
+            if words[at] == "not":
+                at, inner = parse(at + 1, 2)
+                return at, lambda holds: not inner(holds)
+            if words[at] == "(":
+                at, inner = parse(at + 1, 0)
+                if at >= len(words) or words[at] != ")":
+                    raise wrong
+                return at + 1, inner
+            word = words[at]
+            return at + 1, lambda holds: holds(word)
+        at, first = parse(at, level + 1)
+        parts = [first]
+        while at < len(words) and words[at] == ("or", "and")[level]:
+            at, part = parse(at + 1, level + 1)
+            parts.append(part)
+        some = (any, all)[level]
+        return at, lambda holds: some(part(holds) for part in parts)
+
+    end, whole = parse(0, 0)
+    if end != len(words):
+        raise wrong
+    return whole
+
+
+def _told(keyword: str, tags: str) -> str:
+    return " ".join([*([f"-k {keyword}"] if keyword else []), *([f"-m {tags}"] if tags else [])])
+
+
+def _known(cases: Sequence[Case], tags: bool) -> str:
+    names = sorted({tag for case in cases for tag in case.tags}) if tags else [case.name for case in cases]
+    shown = ", ".join(names[:20]) or "none"
+    return f"{'tags' if tags else 'tests'}: {shown}{', …' if len(names) > 20 else ''}"

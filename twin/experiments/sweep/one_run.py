@@ -1,0 +1,110 @@
+"""One run of a sweep, in whatever process or machine: its folder appears whole, with its verdict, or not."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from twin.errors import RecordingError, TwinError
+from twin.plugins import execution
+from twin.runtime.open_run import run
+from twin.scenario.schema import load
+from twin.scenario.verdict import VERDICT, Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """What a process is given to do."""
+
+    scenario: Path
+    """Absolute."""
+    name: str
+    overrides: Mapping[str, str]
+    """With the seed."""
+    folder: Path
+    """That is to appear."""
+    workshop: Path
+    """On the same disk: where it is made."""
+    record: bool = False
+    """Whether there is to be a recording in it."""
+
+
+def perform(job: Job) -> dict[str, Any]:
+    """Run, put the run's folder in its place, and return its verdict as it stands there.
+
+    Raises:
+        RecordingError: The folder cannot be written; no run is to blame.
+    """
+    made = None
+    try:
+        job.workshop.mkdir(exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix=f"{job.folder.name}-", dir=job.workshop))
+        text = _verdict(job, made).to_json()
+        put(made, text, job.folder)
+    except OSError as fault:
+        raise RecordingError(f"{job.folder.parent}: cannot be written: {fault.strerror}") from None
+    finally:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+    verdict: dict[str, Any] = json.loads(text)
+    return verdict
+
+
+def put(made: Path, verdict: str, folder: Path) -> None:
+    """Write the verdict into a folder that is made, and let that appear; if somebody else was faster, not.
+
+    A recording of a run that is there already is put beside its verdict.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    if folder.is_dir():
+        for recording in made.glob("*.rrd"):
+            recording.replace(folder / recording.name)
+        return
+    (made / VERDICT).write_text(verdict, encoding="utf-8")
+    made.chmod(0o755)
+    try:
+        made.rename(folder)
+    except OSError:
+        if not folder.is_dir():
+            raise
+
+
+def _verdict(job: Job, made: Path) -> Verdict:
+    try:
+        with execution():
+            scenario = load(job.scenario, job.overrides, execute=True)
+            return run(scenario, out=made if job.record else None, record=job.record)
+    except (RecordingError, OSError):
+        raise
+    except TwinError as fault:
+        reason = str(fault)
+    except Exception as fault:  # a bug, ours or of a user's node: the other runs go on
+        reason = f"{type(fault).__name__}: {fault}"
+    return Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason)
+
+
+def lost(job: Job, reason: str) -> dict[str, Any]:
+    """Put the folder of a run that gave no result, and return its verdict."""
+    verdict = Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason).to_json()
+    job.workshop.mkdir(exist_ok=True)
+    made = Path(tempfile.mkdtemp(dir=job.workshop))
+    put(made, verdict, job.folder)
+    result: dict[str, Any] = json.loads(verdict)
+    return result
+
+
+def carried(job: Job) -> dict[str, bytes]:
+    """Run on a machine that need not share a disk with who asked; return the files of the run's folder."""
+    os.chdir(job.scenario.parent)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / job.folder.name
+        perform(Job(**{**vars(job), "folder": folder, "workshop": Path(place) / "workshop"}))
+        return {file.name: file.read_bytes() for file in folder.iterdir()}

@@ -1,0 +1,151 @@
+"""What a sweep says, short: a row for each point, and the command that makes a run again."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import statistics
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from twin.experiments.sweep.judging import Outcome
+from twin.experiments.sweep.plan import Plan, PlannedRun
+from twin.experiments.sweep.result import SweepResult
+from twin.plain_text import escaped
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointSummary:
+    """What came of one combination of values."""
+
+    values: Mapping[str, str]
+    outcome: Outcome
+    runs: int
+    """That count."""
+    passed: int
+    failed: int
+    errors: int
+    least: float
+    most: float
+    """Bounds of the pass rate."""
+    medians: Mapping[str, float]
+    """Of what checks measured."""
+    failures: Mapping[str, int]
+    """How often which check failed; the first line of errors."""
+
+    @property
+    def rate(self) -> float | None:
+        """The share of the runs that passed."""
+        return self.passed / self.runs if self.runs else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSummary:
+    """What came of all."""
+
+    scenario: str
+    outcome: Outcome
+    runs: int
+    """That count."""
+    planned: int
+    """That there would have been without early judgements."""
+    made: int
+    """By this process."""
+    complete: bool
+    claim: Mapping[str, float] | None
+    """`min` and `confidence` of the pass rate that was asked for."""
+    points: tuple[PointSummary, ...]
+    failing: tuple[str, ...]
+    """Commands that make failing runs again, the first of each point."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of `summary.json`."""
+        return asdict(self)
+
+
+def summarise(result: SweepResult) -> SweepSummary:
+    """Return what came of a sweep."""
+    by_point: dict[int, list[Mapping[str, Any]]] = {}
+    failing: dict[int, PlannedRun] = {}
+    for run, verdict in result.runs:
+        by_point.setdefault(run.point, []).append(verdict)
+        if verdict["verdict"] != "pass":
+            failing.setdefault(run.point, run)
+    claim = result.plan.claim
+    points = []
+    for index, (values, judge) in enumerate(zip(result.plan.points, result.judges, strict=True)):
+        least, most = judge.interval
+        verdicts = by_point.get(index, [])
+        points.append(
+            PointSummary(
+                values=values,
+                outcome=judge.outcome,
+                runs=judge.judged,
+                passed=judge.counts["pass"],
+                failed=judge.counts["fail"],
+                errors=judge.counts["error"],
+                least=least,
+                most=most,
+                medians=_medians(verdicts),
+                failures=_failures(verdicts),
+            )
+        )
+    return SweepSummary(
+        scenario=result.plan.name,
+        outcome=result.outcome,
+        runs=len(result.runs),
+        planned=result.plan.size,
+        made=result.made,
+        complete=result.complete,
+        claim=None if claim is None else claim.model_dump(),
+        points=tuple(points),
+        failing=tuple(command(result.plan, failing[point]) for point in sorted(failing)),
+    )
+
+
+def command(plan: Plan, run: PlannedRun) -> str:
+    """Return the command line that makes one run again."""
+    file = os.path.relpath(plan.file)
+    words = ["twin", "run", str(plan.file) if file.startswith("..") else file]
+    for key, value in plan.points[run.point].items():
+        words += ["--set", f"{key}={value}"]
+    return escaped(shlex.join([*words, "--seed", str(run.seed)]))
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Return the shortest ends of dotted keys that differ from each other: `steps.0.linear`, `linear`."""
+    names = {}
+    for key in keys:
+        parts = key.split(".")
+        ends = [".".join(parts[-count:]) for count in range(1, len(parts) + 1)]
+        names[key] = next(
+            end for end in ends if sum(f".{other}".endswith(f".{end}") for other in keys) == 1 or end == key
+        )
+    return names
+
+
+def _medians(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    values: dict[str, list[float]] = {}
+    for verdict in verdicts:
+        for check in verdict["checks"]:
+            if check["value"] is not None and not isinstance(check["value"], bool):
+                values.setdefault(check["name"], []).append(check["value"])
+    return {name: statistics.median(found) for name, found in values.items()}
+
+
+def _failures(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    found: Counter[str] = Counter()
+    for verdict in verdicts:
+        if verdict["error"] is not None:
+            found[str(verdict["error"]).partition("\n")[0]] += 1
+        found.update(check["name"] for check in verdict["checks"] if not check["passed"])
+    return dict(found.most_common())
+
+
+def relative(path: Path) -> str:
+    """Return a path as seen from here, if it lies below."""
+    found = os.path.relpath(path)
+    return str(path) if found.startswith("..") else found

@@ -1,0 +1,18 @@
+"""Values of a verdict as people read them."""
+
+from __future__ import annotations
+
+
+def quantity(value: float | bool | None, unit: str, limit: float | bool | None) -> str:
+    """Format a value in the unit that suits its limit, so that the two can be compared at a glance.
+
+    >>> quantity(0.00123, "m", 0.002), quantity(True, "", True)
+    ('1.23 mm', 'yes')
+    """
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
+        value, unit = value * 1e3, "mm"
+    return f"{round(value, 3):.5g} {unit}".rstrip()

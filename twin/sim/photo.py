@@ -1,0 +1,154 @@
+"""Pictures of solids by MuJoCo's renderer, without a display."""
+
+from __future__ import annotations
+
+import ctypes.util
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import SimulationError
+from twin.geometry import Array, Pose3
+from twin.models.shapes import Box, Capsule, Cylinder, Sphere
+
+BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
+"""Modules of MuJoCo that draw without a display, and the library of each."""
+_SKY, _HORIZON = (0.55, 0.66, 0.78), (0.93, 0.95, 0.97)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solid:
+    """What is drawn, in `world`."""
+
+    geometry: Box | Cylinder | Capsule | Sphere | Array
+    """A primitive, or triangles in its frame, shape (n, 3 corners, 3) [m]."""
+    pose: Pose3
+    rgba: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """Where it is looked from."""
+
+    lookat: tuple[float, float, float]
+    """What is in the middle, in `world` [m]."""
+    distance: float
+    """From there [m]."""
+    azimuth: float = 120.0
+    """Direction of looking about z [deg]."""
+    elevation: float = -35.0
+    """[deg]."""
+
+
+def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int = 400) -> NDArray[np.uint8]:
+    """Return a picture, shape (height, width, 3).
+
+    Raises:
+        SimulationError: There is no OpenGL without a display here.
+    """
+    spec = mujoco.MjSpec()
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
+    spec.visual.headlight.ambient = (0.45, 0.45, 0.45)
+    spec.visual.map.znear = 0.002
+    spec.add_texture(
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=_SKY, rgb2=_HORIZON, width=64, height=384,
+    )  # fmt: skip
+    spec.worldbody.add_light(
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=(0, 0, 10), dir=(0.3, 0.4, -0.9), castshadow=False
+    )
+    for number, solid in enumerate(solids):
+        _add(spec, f"solid_{number}", solid)
+    model = spec.compile()
+    # Between which planes is drawn, and where shadows are fine, are parts of these.
+    model.stat.extent, model.stat.center = camera.distance, camera.lookat
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    view = mujoco.MjvCamera()
+    view.lookat[:] = camera.lookat
+    view.distance, view.azimuth, view.elevation = camera.distance, camera.azimuth, camera.elevation
+    picture = np.empty((height, width, 3), dtype=np.uint8)
+    with _opengl(width, height):
+        scene = mujoco.MjvScene(model, len(solids) + 100)
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+        frame = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(frame, scene, context)
+        mujoco.mjr_readPixels(picture, None, frame, context)
+        context.free()
+    return picture[::-1]
+
+
+@contextmanager
+def _opengl(width: int, height: int) -> Iterator[None]:
+    """Let OpenGL draw in the block; raises SimulationError if there is none."""
+    context = opengl(width, height)
+    try:
+        yield
+    finally:
+        context.free()
+
+
+def opengl(width: int, height: int) -> Any:
+    """Return what OpenGL draws on, of a size [pixels]: made current, to be freed.
+
+    `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
+
+    Raises:
+        SimulationError: There is no OpenGL without a display here.
+    """
+    try:
+        context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
+        context.make_current()
+    except SimulationError:
+        raise
+    except Exception as fault:  # of three libraries, each with its own kinds
+        raise SimulationError(f"MuJoCo finds no OpenGL without a display ({fault})") from fault
+    return context
+
+
+def _backend() -> str:
+    if sys.platform == "darwin":
+        return "cgl"
+    for name, library in BACKENDS.items():
+        if ctypes.util.find_library(library):
+            return name
+    raise SimulationError(
+        "MuJoCo needs EGL or OSMesa to draw without a display (`apt-get install libegl1` or `libosmesa6`)"
+    )
+
+
+def _add(spec: mujoco.MjSpec, name: str, solid: Solid) -> None:
+    geometry, kind = solid.geometry, mujoco.mjtGeom.mjGEOM_BOX
+    size: tuple[float, ...] = (0.0, 0.0, 0.0)
+    mesh = ""
+    if isinstance(geometry, Box):
+        size = tuple(length / 2.0 for length in geometry.size)
+    elif isinstance(geometry, Cylinder | Capsule):
+        is_round = isinstance(geometry, Capsule)
+        kind = mujoco.mjtGeom.mjGEOM_CAPSULE if is_round else mujoco.mjtGeom.mjGEOM_CYLINDER
+        size = (geometry.radius, geometry.length / 2.0, 0.0)
+    elif isinstance(geometry, Sphere):
+        kind, size = mujoco.mjtGeom.mjGEOM_SPHERE, (geometry.radius, 0.0, 0.0)
+    else:
+        kind, mesh = mujoco.mjtGeom.mjGEOM_MESH, name
+        corners = np.vstack((geometry, geometry)).ravel()  # MuJoCo wants four at least
+        spec.add_mesh(
+            name=name,
+            uservert=corners,
+            userface=np.arange(3 * len(geometry)),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+    spec.worldbody.add_geom(
+        type=kind, size=size, meshname=mesh, pos=solid.pose.xyz, quat=solid.pose.quat_wxyz, rgba=solid.rgba,
+        contype=0, conaffinity=0,
+    )  # fmt: skip
