@@ -114,7 +114,7 @@ def test_a_room_must_have_room():
         GymError, match=r"a room of 2 m x 2 m has no start and goal 2 m apart.*valid: a larger"
     ):
         DiffDriveGoalConfig(room=(2.0, 2.0))
-    tight = DiffDriveGoalConfig(room=(3.0, 2.6), boxes=((2.0, 2.0), (0.2, 0.2)))
+    tight = DiffDriveGoalConfig(room=(3.2, 2.6), boxes=((2.0, 2.0), (0.2, 0.2)))
     for seed in range(20):
         layout = Room(tight).layout(Episode(seed, 0))
         assert math.dist(layout.start[:2], layout.goal) >= 2.0
