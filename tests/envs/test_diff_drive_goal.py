@@ -70,6 +70,13 @@ def test_a_collision_ends_an_episode_and_costs(empty):
     assert info["distance"] == pytest.approx(5.0 + 4.0 - 0.2 - 3.0, abs=0.05)  # its nose is at the wall
 
 
+def test_each_scan_has_noise_of_its_own(empty):
+    scans = [empty.reset(seed=0)[0][7:], *(empty.step(np.zeros(2))[0][7:] for _ in range(30))]
+    deviations = np.std(scans[1:], axis=0)
+    assert np.median(deviations) == pytest.approx(0.01, rel=0.25)
+    assert (np.diff(scans, axis=0) != 0.0).mean() > 0.99
+
+
 def test_it_feels_its_speed_and_remembers_what_it_did(empty):
     empty.reset(seed=0, options={"start": (0.0, 0.0, 0.0), "goal": (0.0, 3.0)})
     for _ in range(15):
