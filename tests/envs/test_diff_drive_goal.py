@@ -5,10 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from twin.envs.diff_drive_goal import DiffDriveGoalConfig, DiffDriveGoalEnv, Room
+from twin.envs.diff_drive_goal import (
+    DiffDriveGoalConfig,
+    DiffDriveGoalEnv,
+    DiffDriveGoalVectorEnv,
+    Room,
+)
 from twin.envs.navigation import Reward
 from twin.envs.randomisation import NONE, Episode
-from twin.errors import GymError
+from twin.errors import GymError, SimulationError
 
 EMPTY = DiffDriveGoalConfig(boxes=(), randomisation=NONE, reward=Reward(progress=2.0, step=-0.1))
 
@@ -65,6 +70,13 @@ def test_a_collision_ends_an_episode_and_costs(empty):
     assert info["distance"] == pytest.approx(5.0 + 4.0 - 0.2 - 3.0, abs=0.05)  # its nose is at the wall
 
 
+def test_each_scan_has_noise_of_its_own(empty):
+    scans = [empty.reset(seed=0)[0][7:], *(empty.step(np.zeros(2))[0][7:] for _ in range(30))]
+    deviations = np.std(scans[1:], axis=0)
+    assert np.median(deviations) == pytest.approx(0.01, rel=0.25)
+    assert (np.diff(scans, axis=0) != 0.0).mean() > 0.99
+
+
 def test_it_feels_its_speed_and_remembers_what_it_did(empty):
     empty.reset(seed=0, options={"start": (0.0, 0.0, 0.0), "goal": (0.0, 3.0)})
     for _ in range(15):
@@ -102,3 +114,31 @@ def test_rates_must_fit():
         DiffDriveGoalEnv(config=DiffDriveGoalConfig(beams=7))
     with pytest.raises(GymError, match="robot 'r2d2' has no"):
         DiffDriveGoalEnv(config=DiffDriveGoalConfig(robot="r2d2"))
+
+
+def test_a_room_must_have_room():
+    with pytest.raises(
+        GymError, match=r"a room of 2 m x 2 m has no start and goal 2 m apart.*valid: a larger"
+    ):
+        DiffDriveGoalConfig(room=(2.0, 2.0))
+    tight = DiffDriveGoalConfig(room=(3.2, 2.6), boxes=((2.0, 2.0), (0.2, 0.2)))
+    for seed in range(20):
+        layout = Room(tight).layout(Episode(seed, 0))
+        assert math.dist(layout.start[:2], layout.goal) >= 2.0
+        assert layout.placed[0] is None
+
+
+def test_there_is_one_environment_at_least():
+    with pytest.raises(GymError, match="num_envs is 0; valid: 1 or more"):
+        DiffDriveGoalVectorEnv(0, config=EMPTY)
+    with pytest.raises(GymError, match="threads is -1; valid: 0 or more"):
+        DiffDriveGoalVectorEnv(1, config=EMPTY, threads=-1)
+
+
+def test_physics_that_diverges_is_told(empty):
+    empty.reset(seed=0)
+    empty.navigation.simulations.qvel[0, 0] = np.nan
+    with pytest.raises(SimulationError, match="the physics of environment 0 diverged; reset it"):
+        empty.step(np.zeros(2))
+    empty.reset(seed=0)
+    empty.step(np.zeros(2))

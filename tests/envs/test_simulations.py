@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from twin.controllers.diff_drive import DiffDriveController
+from twin.controllers.limiter import AxisLimits, SpeedLimiter
 from twin.controllers.odometry import Odometry, OdometryConfig
 from twin.convert import convert
+from twin.envs import kernels
 from twin.envs.randomisation import NONE, Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import Simulations
@@ -203,3 +205,20 @@ def test_ranges_have_bounds(spread):
     hits = np.array([[-1.0, lidar.range_max + 0.1, lidar.range_min / 2.0, 1.0]] * 8)
     ranges = spread.scan(hits, np.zeros((8, 4)))
     np.testing.assert_array_equal(ranges, [[lidar.range_max, lidar.range_max, 0.0, 1.0]] * 8)
+
+
+def test_one_wheel_at_a_wall_is_a_collision():
+    sims = simulations("diff_bot", WALLS)
+    beside = 1.8 - 0.16  # of the wall's face, and half of the width over the wheels
+    for x, expected in ((beside - 0.004, False), (beside + 0.002, True)):
+        sims.begin(0, Episode(0, 0), Pose2(x, 0.0, -math.pi / 2.0))
+        assert bool(sims.tick(np.zeros((1, 2)))[0]) == expected
+
+
+def test_speeds_are_limited_as_by_the_controller():
+    limits = AxisLimits(max_velocity=1.0, max_acceleration=2.0, max_deceleration=5.0)
+    limiter, axis = SpeedLimiter(limits), np.array([1.0, 2.0, 5.0])
+    value = 0.0
+    for target in np.random.default_rng(0).uniform(-1.5, 1.5, 300).repeat(3):
+        value = kernels._limit(target, value, axis, PERIOD)
+        assert value == pytest.approx(limiter.limit(target, PERIOD), abs=1e-12)

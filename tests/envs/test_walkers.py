@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from twin.runtime.events.obstacles import Walker
 
 from twin.envs.walkers import WalkerConfig, Walkers
 from twin.envs.warehouse_nav import WALKERS
 from twin.files.shipped import beside
 from twin.geometry import Pose2
+from twin.runtime.obstacles import Walker
 from twin.scenario.schema import load
 from twin.scenario.world import Obstacle
 

@@ -7,6 +7,7 @@ import pytest
 
 from twin.envs.randomisation import NONE, Episode
 from twin.envs.warehouse_nav import Aisles, WarehouseNavConfig, WarehouseNavEnv
+from twin.errors import GymError
 from twin.geometry import Pose2
 from twin.warehouse import arena as arenas
 from twin.warehouse.arena_file import covered
@@ -90,3 +91,12 @@ def test_scenery_that_a_robot_meets_is_in_the_model_and_the_rest_in_pictures_onl
     assert {"walls", "rack_a", "pallet_1", "pillar_west", "charger", "unloading_table"} <= simulated.keys()
     assert not any(name.startswith(("stock", "tote")) for name in simulated)
     assert 20 <= sum(map(len, simulated.values())) <= 40
+
+
+def test_an_arena_without_room_is_told():
+    with pytest.raises(
+        GymError, match=r"robot_radius is 9 m; valid: less, as then no place of arena 'warehouse'"
+    ):
+        Aisles(WarehouseNavConfig(robot_radius=9.0))
+    with pytest.raises(GymError, match=r"least_distance is 40 m; valid: less"):
+        Aisles(WarehouseNavConfig(least_distance=40.0)).layout(Episode(0, 0))

@@ -13,13 +13,14 @@ from twin.envs.gym_envs import NavigationEnv, NavigationVectorEnv
 from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig
 from twin.envs.randomisation import Episode
 from twin.envs.robot import DrivenRobot
-from twin.geometry import Pose2, Pose3
+from twin.errors import GymError
+from twin.geometry import Array, Pose2, Pose3
 from twin.models.shapes import Box
 from twin.sim.scene import PlacedBody, Scene, Shape, StaticBody
 from twin.warehouse.arena_scene import PALETTE
 
 _WALL, _HEIGHT = 0.1, 0.5
-_TRIES = 30
+_TRIES, _LAST_TRY = 30, 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,21 @@ class DiffDriveGoalConfig(NavigationConfig):
     """Between boxes, and from them to walls, start and goal, at least [m]: the robot gets through."""
     least_distance: float = 2.0
     """From start to goal, at least [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        inner = self.inner
+        if inner.min() <= 0.0 or 2.0 * math.hypot(*inner) <= self.least_distance:
+            x, y = self.room
+            raise GymError(
+                f"a room of {x:g} m x {y:g} m has no start and goal {self.least_distance:g} m apart which "
+                f"keep {self.gap:g} m from its walls; valid: a larger room, or less least_distance or gap"
+            )
+
+    @property
+    def inner(self) -> Array:
+        """How far start and goal may be from the middle along x and y, shape (2,) [m]."""
+        return np.array(self.room) / 2.0 - self.gap
 
 
 class Room(Course):
@@ -79,10 +95,11 @@ class Room(Course):
     def layout(self, episode: Episode) -> Layout:
         """Return start, goal and as many boxes as find a place with the gap around them."""
         config = self.config
-        inner = np.array(config.room) / 2.0 - config.gap
-        tries = count()
-        while True:
-            u = 2.0 * episode.uniform(next(tries), 5) - 1.0
+        inner, tries = config.inner, count()
+        for attempt in tries:
+            u = 2.0 * episode.uniform(attempt, 5) - 1.0
+            if attempt == _LAST_TRY:  # where hardly any two places are so far apart
+                u[:4] = -1.0, -1.0, 1.0, 1.0
             start, goal, yaw = u[:2] * inner, u[2:4] * inner, math.pi * float(u[4])
             if math.dist(start, goal) >= config.least_distance:
                 break
@@ -92,9 +109,8 @@ class Room(Course):
             u = 2.0 * episode.uniform(next(tries), 3 * _TRIES).reshape(_TRIES, 3) - 1.0
             tried = u[:, :2] * (inner - radius)
             away = tried[:, None] - middles
-            free = np.flatnonzero(
-                ((away * away).sum(axis=2) >= (radii + (radius + config.gap)) ** 2).all(axis=1)
-            )
+            fits = ((away * away).sum(axis=2) >= (radii + (radius + config.gap)) ** 2).all(axis=1)
+            free = np.flatnonzero(fits & (inner.min() > radius))
             placed.append(None)
             if len(free):
                 x, y = tried[free[0]].tolist()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from twin.envs import kernels
 from twin.envs.agent import DrivingAgent
 from twin.envs.kernels import Floats32
-from twin.envs.picture import Mark, Painter
+from twin.envs.pictures import BLUE, Camera, Mark, Placed
 from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import ALL, Rows, Simulations
@@ -30,6 +30,8 @@ _HIDDEN_M = -20.0
 """Height of what is not there in an episode: no ray and no robot comes so low."""
 _NEAR_M = 8.0
 """Distance of a camera that follows a robot."""
+_POINT_M = 0.1
+"""Radius of the disc where a point to drive to is."""
 _OPTIONS = ("start", "goal")
 
 
@@ -229,17 +231,16 @@ class Navigation:
         """Return a picture of environment `i`: goal in green, other points to drive to in blue.
 
         Raises:
-            GymError: This computer can draw nothing.
+            SimulationError: This computer can draw nothing.
         """
-        row = np.array([i])
+        row, simulations = np.array([i]), self.simulations
         points = self._points(row, self._believed(row, np.zeros((1, self.NOISES))))[0].tolist()
-        marks = [Mark(points[0], self.config.goal_tolerance, (0.15, 0.7, 0.25, 0.9))]
-        marks += [Mark(point, 0.1, (0.1, 0.4, 0.9, 0.9)) for point in points[1:]]
-        simulations = self.simulations
-        state = simulations.qpos[i], simulations.mocap_pos[i], simulations.mocap_quat[i]
-        if (distance := self.course.overview) is None:
-            return self._painter.draw(state, marks, simulations.root[i, :3] * (1.0, 1.0, 0.0), _NEAR_M)
-        return self._painter.draw(state, marks, (0.0, 0.0, 0.0), distance)
+        marks = [Mark(points[0][0], points[0][1], self.config.goal_tolerance)]
+        marks += [Mark(x, y, _POINT_M, BLUE) for x, y in points[1:]]
+        placed = Placed(simulations.qpos[i], simulations.mocap_pos[i], simulations.mocap_quat[i])
+        overview = self.course.overview
+        at = (0.0, 0.0, 0.0) if overview else simulations.root[i, :3] * (1.0, 1.0, 0.0)
+        return self._camera.take(placed, at, distance=overview or _NEAR_M, marks=marks)
 
     def begin_showing(self) -> None:
         """Show that the first environment begins an episode in Rerun's viewer, which starts if need be.
@@ -269,12 +270,13 @@ class Navigation:
         return LiveWindow(self.simulations, self.course.looks)
 
     @cached_property
-    def _painter(self) -> Painter:
-        return Painter(self.simulations.robot.compile(self.course.looks, visuals=True))
+    def _camera(self) -> Camera:
+        model = self.simulations.robot.compile(self.course.looks, visuals=True)
+        return Camera(model, azimuth=90.0)
 
     def close(self) -> None:
         """Free what drawing took, and end the viewer."""
-        for name in ("_painter", "_window"):
+        for name in ("_camera", "_window"):
             if name in self.__dict__:
                 self.__dict__.pop(name).close()
 

@@ -16,7 +16,7 @@ from twin.envs import kernels
 from twin.envs.kernels import DriveNumbers, DriveStates
 from twin.envs.randomisation import Episode, Randomisation, RobotDraw
 from twin.envs.robot import ROBOT, DrivenRobot
-from twin.errors import SimulationError
+from twin.errors import GymError, SimulationError
 from twin.geometry import Array, Pose2, quat_wxyz_from_yaw
 from twin.sim.hardware import HardwareConfig, servo_bounds
 from twin.sim.scene import Scene
@@ -53,7 +53,13 @@ class Simulations:
             beams: How many of the lidar's rays are cast.
             randomisation: How far robots may differ.
             threads: That share the work; 0: one for each CPU.
+
+        Raises:
+            GymError: No simulation, or less than no thread.
         """
+        if count < 1 or threads < 0:
+            wrong = f"num_envs is {count}; valid: 1" if count < 1 else f"threads is {threads}; valid: 0"
+            raise GymError(f"{wrong} or more")
         self.robot, self.count, self.randomisation = robot, count, randomisation
         self.model = robot.compile(scene)
         self._own = _Randomiser(robot, self.model)
@@ -98,10 +104,13 @@ class Simulations:
             Which robots touch anything but the floor at the end, shape (n,).
 
         Raises:
-            SimulationError: The physics of one diverged.
+            SimulationError: MuJoCo cannot go on with one.
         """
         kernels.actuate(wanted, self.drive, self.states, self.qpos, self.qvel, self.ctrl)
-        self.batch.step(nstep=self._substeps)
+        try:
+            self.batch.step(nstep=self._substeps)
+        except mujoco.batch.SimulationError as fault:
+            raise SimulationError(f"the physics of environment {fault.ids[0]} gave up: {fault}") from fault
         kernels.dead_reckon(self.drive, self.states, self.qpos)
         anything, floor, itself = self._touches.T
         return np.asarray(anything > floor + itself)

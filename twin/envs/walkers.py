@@ -110,7 +110,7 @@ class Walkers:
 
 @jit
 def _walk(elapsed: float, robots: Array, routes: Routes, walks: Walks, positions: Array) -> None:
-    """As `twin.runtime.events.obstacles.Walker.walk` does for one walker and robots without an outline."""
+    """As `twin.runtime.obstacles.Walker.walk` does for one walker and robots without an outline."""
     last = routes.knots.shape[1] - 1
     for i in range(walks.along.shape[0]):
         for k in range(walks.along.shape[1]):

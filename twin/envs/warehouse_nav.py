@@ -20,6 +20,7 @@ from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import Rows
 from twin.envs.walkers import WalkerConfig, Walkers
 from twin.envs.ways import Ways
+from twin.errors import GymError
 from twin.geometry import Array, Pose2, Pose3
 from twin.models.shapes import Box
 from twin.sim.scene import PlacedBody, Shape, StaticBody
@@ -29,7 +30,7 @@ from twin.warehouse.map_files import map_of_arena
 
 _LOW = 0.3
 """What begins higher stands on what a robot touches, and its lidar sees, first [m]."""
-_TRIES = 50
+_TRIES, _LAST_TRY = 50, 1000
 _BOX_HEIGHT = 0.5
 _GOALS = 1.0
 """Goals are on a lattice of this spacing [m]: the ways to each are worked out once."""
@@ -91,6 +92,11 @@ class Aisles(Course):
         nodes = self.ways.nodes
         self._places = self.ways.passable
         self._goals = self.ways.lattice(_GOALS)
+        if not len(self._goals):
+            raise GymError(
+                f"robot_radius is {config.robot_radius:g} m; valid: less, as then no place of arena "
+                f"'{config.arena}' is far enough from what stands there"
+            )
         away = np.array([_distance_to(walker.route, nodes[self._places]) for walker in config.walkers])
         off_routes = (away >= config.gap).all(axis=0) if len(away) else np.ones(len(self._places), np.bool_)
         self._for_boxes = self._places[off_routes & (self.ways.clearance[self._places] >= config.gap)]
@@ -111,12 +117,17 @@ class Aisles(Course):
         """Return start and goal anywhere on the ways, and as many boxes as find a place; no walkers."""
         config, nodes = self.config, self.ways.nodes
         tries = count()
-        while True:
-            u = episode.uniform(next(tries), 3)
+        for attempt in tries:
+            u = episode.uniform(attempt, 3)
             start = nodes[self._places[int(u[0] * len(self._places))]]
             goal = nodes[self._goals[int(u[1] * len(self._goals))]]
             if math.dist(start, goal) >= config.least_distance:
                 break
+            if attempt == _LAST_TRY:
+                raise GymError(
+                    f"least_distance is {config.least_distance:g} m; valid: less, as hardly any two places "
+                    f"of arena '{config.arena}' are so far apart"
+                )
         yaw = 2.0 * math.pi * float(u[2]) - math.pi
         taken = np.array([start, goal])
         placed: list[Pose2 | None] = []

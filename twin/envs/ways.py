@@ -35,8 +35,8 @@ class Ways:
         """To what is on the map, shape (nodes,) [m]."""
         passable = (self.clearance >= radius).reshape(self.shape)
         labels, _ = ndimage.label(passable, structure=np.ones((3, 3)))
-        largest = np.argmax(np.bincount(labels[passable]))
-        self._passable = labels == largest
+        largest = np.argmax(np.bincount(labels[passable], minlength=2))
+        self._passable = passable & (labels == largest)
         self.passable: NDArray[np.intp] = np.flatnonzero(self._passable)
         """Nodes that can be driven to from each other."""
         self._graph = self._joined()

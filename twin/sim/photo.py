@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -89,9 +90,21 @@ def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int 
 
 @contextmanager
 def _opengl(width: int, height: int) -> Iterator[None]:
-    """Let OpenGL draw in the block; raises SimulationError if there is none.
+    """Let OpenGL draw in the block; raises SimulationError if there is none."""
+    context = opengl(width, height)
+    try:
+        yield
+    finally:
+        context.free()
+
+
+def opengl(width: int, height: int) -> Any:
+    """Return what OpenGL draws on, of a size [pixels]: made current, to be freed.
 
     `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
+
+    Raises:
+        SimulationError: There is no OpenGL without a display here.
     """
     try:
         context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
@@ -100,10 +113,7 @@ def _opengl(width: int, height: int) -> Iterator[None]:
         raise
     except Exception as fault:  # of three libraries, each with its own kinds
         raise SimulationError(f"MuJoCo finds no OpenGL without a display ({fault})") from fault
-    try:
-        yield
-    finally:
-        context.free()
+    return context
 
 
 def _backend() -> str:
