@@ -217,6 +217,7 @@ OTHERS = {
     "odom_frame": "of slam_toolbox, whose frames are the robot's",
     "base_frame": "of slam_toolbox, whose frames are the robot's",
     "closed_loop": "a check",
+    "wheel_radius": "a fault",
     "use_imu": "a key of a scenario's localisation",
 }
 """Names that are something else, too."""
