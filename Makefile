@@ -29,18 +29,20 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn; memory
+bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, environments of gymnasium to theirs, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn; memory
 	$(BIN)/python -m benchmarks.measures.start_cost
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
+	$(BIN)/python -m benchmarks.measures.env_cost
 	$(BIN)/python -m benchmarks.measures.memory
 	$(BIN)/python -m benchmarks.measures.cdr_cost
 	$(BIN)/python -m benchmarks.measures.lockstep_cost
 	$(BIN)/python -m benchmarks.measures.tracking
 	$(BIN)/python -m benchmarks.measures.sweep_cost
 
-soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory
+soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory; a million steps of environments
 	$(BIN)/python -m benchmarks.measures.soak
+	$(BIN)/python -m benchmarks.measures.env_memory
 
 fuzz: $(VENV)/.ready  ## 10 000 broken and hostile mesh files, checked and converted: none takes 5 s of CPU or 500 MB
 	$(BIN)/python -m tests.oracles.mesh_fuzz

@@ -1,6 +1,6 @@
-"""Makes the pictures: of the robots by `python docs/pictures.py`, README's with a recording as argument.
+"""Makes the pictures: of robots and an environment without arguments, README's of a recording as argument.
 
-MuJoCo draws the robots without a display (EGL), the Rerun viewer the recording without a window (Vulkan).
+MuJoCo draws them without a display (EGL), the Rerun viewer the recording without a window (Vulkan).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 
+import gymnasium as gym
 import mujoco
 import numpy as np
 from PIL import Image
@@ -89,6 +90,15 @@ def draw(name: str, shot: Shot) -> Image.Image:
     return Image.fromarray(pixels).resize(SIZE, Image.Resampling.LANCZOS)
 
 
+def environment() -> Image.Image:
+    """Return a picture of an environment of gymnasium."""
+    env = gym.make("twin.envs:twin/DiffDriveGoal-v0", render_mode="rgb_array")
+    env.reset(seed=3)
+    pixels = env.render()
+    env.close()
+    return Image.fromarray(np.asarray(pixels))
+
+
 def save(picture: Image.Image, file: Path, colours: int = 256) -> None:
     """Write a small PNG."""
     picture.convert("RGB").quantize(colours, kmeans=1, dither=Image.Dither.NONE).save(file, optimize=True)
@@ -110,3 +120,4 @@ if __name__ == "__main__":
     else:
         for robot, shot in SHOTS.items():
             save(draw(robot, shot), DOCS / "robots" / f"{robot}.png")
+        save(environment(), DOCS / "gymnasium.png")

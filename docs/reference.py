@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ (scenarios, checks, arenas, navigation, api): `python docs/reference.py`.
+"""Writes the tables of scenarios, checks, arenas, navigation, gymnasium, api: `python docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
 the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
@@ -7,6 +7,7 @@ is 1 if something is not up to date.
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import json
 import re
@@ -27,6 +28,10 @@ from twin.bridge.topics import Publisher, Subscription
 from twin.bridge.types.jazzy import TABLE as JAZZY
 from twin.bridge.types.type_hash import TABLE as HASHES
 from twin.bridge.types.type_hash import rihs01_of
+from twin.envs.diff_drive_goal import DiffDriveGoalConfig
+from twin.envs.navigation import NavigationConfig, Reward
+from twin.envs.randomisation import Randomisation
+from twin.envs.warehouse_nav import WarehouseNavConfig
 from twin.navigation.control.goal_checker import GoalCheckerConfig
 from twin.navigation.control.progress_checker import ProgressCheckerConfig
 from twin.navigation.control.regulated_pure_pursuit.config import RegulatedPurePursuitConfig
@@ -41,6 +46,7 @@ from twin.nodes.navigation.docking.config import DockingServerConfig
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerConfig
 from twin.parameters import units
 from twin.parameters.declaration import fields_of
+from twin.parameters.texts import texts_of
 from twin.runtime.build import build
 from twin.scenario.faults import LastingRobotFault
 from twin.scenario.schema import json_schema, load
@@ -345,6 +351,34 @@ def _table(shown: Parameters, config: Any, node: Node) -> list[str]:
     return [*lines, ""]
 
 
+def environments() -> str:
+    """Return the tables of what can be set of environments, without what another table has."""
+    lines: list[str] = []
+    inherited = {field.name for field in dataclasses.fields(NavigationConfig)}
+    for config, left_out in (
+        (Randomisation, set()),
+        (NavigationConfig, {"randomisation", "reward", "robot"}),
+        (Reward, set()),
+        (DiffDriveGoalConfig, inherited - {"robot"}),
+        (WarehouseNavConfig, inherited - {"robot", "goal_range"}),
+    ):
+        texts = texts_of(config)
+        lines += [f"`{config.__name__}`:", "", "| Field | Default | Meaning |", "|---|---|---|"]
+        for field in dataclasses.fields(config):
+            if field.name not in left_out:
+                default = "as the patrol's" if field.name == "walkers" else _plain_python(field.default)
+                lines.append(f"| `{field.name}` | {default} | {_flow(texts[field.name])} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _plain_python(default: object) -> str:
+    if not isinstance(default, tuple):
+        return str(default)
+    nested = isinstance(default[0], tuple)
+    return (", " if nested else " x ").join(map(_plain_python, default))
+
+
 def updated(page: str, name: str, content: str) -> str:
     """Return a page with the part between the two marks of `name` replaced."""
     begin, end = BEGIN.format(name=name), END.format(name=name)
@@ -362,6 +396,9 @@ def pages() -> dict[Path, str]:
     text = updated(navigation.read_text("utf-8"), "nodes", nodes)
     return {
         navigation: updated(text, "parameters", parameters),
+        DOCS / "gymnasium.md": updated(
+            (DOCS / "gymnasium.md").read_text("utf-8"), "environments", environments()
+        ),
         DOCS / "api.md": updated((DOCS / "api.md").read_text("utf-8"), "names", api()),
         scenarios: updated(scenarios.read_text("utf-8"), "scenario keys", tables(json_schema(), {})),
         DOCS / "checks.md": updated((DOCS / "checks.md").read_text("utf-8"), "signals", signals()),

@@ -23,7 +23,7 @@ from twin.experiments.suite.selection import selected
 
 RUNS = 100
 """In each of the two conditions."""
-NAVIGATING = 10
+NAVIGATING = 5
 """Of them with navigation."""
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -62,7 +62,7 @@ def main() -> int:
     """Run, print, and return the exit code."""
     cores = len(os.sched_getaffinity(0))
     seen: dict[str, set[tuple[str, str | None]]] = defaultdict(set)
-    for name, count in (("alone", 0), (f"beside {2 * cores} hogs", 2 * cores)):
+    for name, count in (("alone", 0), (f"beside {cores} hogs", cores)):
         with hogs(count), tempfile.TemporaryDirectory() as folder:
             passed = 0
             tests = cases()
