@@ -35,7 +35,7 @@ class Runner:
         self._processes: Processes[Job] = Processes(
             perform,
             jobs,
-            preload=perform.__module__,
+            preload=(perform.__module__,),
             time_limit_s=time_limit_s,
             is_last=_has_executed,
         )
