@@ -1,4 +1,4 @@
-"""Writes the tables of scenarios.md, arenas.md, navigation.md, gymnasium.md, api.md: `docs/reference.py`.
+"""Writes the tables of scenarios, checks, arenas, navigation, gymnasium, api: `python docs/reference.py`.
 
 Keys come from the schemas; nodes and parameters from what scenarios/warehouse.yaml builds. The tables of
 the hashes and definitions of message types are written, too. With `--check` nothing is written; the exit code
@@ -50,6 +50,7 @@ from twin.parameters.texts import texts_of
 from twin.runtime.build import build
 from twin.scenario.faults import LastingRobotFault
 from twin.scenario.schema import json_schema, load
+from twin.scenario.signals import SIGNALS
 from twin.warehouse.arena_file import ArenaFile
 
 DOCS = Path(__file__).parent
@@ -192,7 +193,7 @@ def _value(schema: Mapping[str, Any], item: Mapping[str, Any]) -> str:
     if len(choices) > 1 and "$ref" in choices[0] and "$ref" not in choices[1]:  # one number can stand for all
         return f"mapping, or {_value(schema, {'anyOf': choices[1:]})}"
     brings = any(choice.get("pattern") == ":" for choice in choices)  # a plugin's name
-    units = next((_unit(choice["pattern"]) for choice in choices if "pattern" in choice and not brings), None)
+    units = next((unit for choice in choices if (unit := _unit(choice.get("pattern", "")))), None)
     if units is not None:
         number = next(choice for choice in choices if "pattern" not in choice)
         return QUANTITIES[units] + _bounds(number)
@@ -228,10 +229,9 @@ def _bounds(choice: Mapping[str, Any]) -> str:
 
 
 def _unit(pattern: str) -> str:
-    """Return the first unit of a pattern: SI."""
+    """Return the first unit of a pattern, SI; nothing if it has none."""
     match = re.search(r"\\s\*\(([^|)]+)", pattern)
-    assert match is not None, pattern
-    return match[1].replace("\\", "")
+    return match[1].replace("\\", "") if match else ""
 
 
 def _default(item: Mapping[str, Any]) -> str:
@@ -401,12 +401,26 @@ def pages() -> dict[Path, str]:
         ),
         DOCS / "api.md": updated((DOCS / "api.md").read_text("utf-8"), "names", api()),
         scenarios: updated(scenarios.read_text("utf-8"), "scenario keys", tables(json_schema(), {})),
+        DOCS / "checks.md": updated((DOCS / "checks.md").read_text("utf-8"), "signals", signals()),
         arenas: updated(
             arenas.read_text("utf-8"), "arena keys", tables(ArenaFile.model_json_schema(), ARENA_MEANING)
         ),
         JAZZY: "{\n" + ",\n".join(f'"{name}": {json.dumps(of)}' for name, of in FIELDDEFS.items()) + "\n}\n",
         HASHES: json.dumps({"note": "written by docs/reference.py", "hashes": hashes()}, indent=0) + "\n",
     }
+
+
+def signals() -> str:
+    """Return the table of the simulator's signals."""
+    rows = ["| Signal | Unit | Meaning |", "|---|---|---|"]
+    units_of = {bool: "true or false", str: "text"}
+    for name in SIGNALS.shipped:
+        signal = SIGNALS.find(name).load()
+        arguments = ", ".join(argument for argument, _ in signal.takes)
+        called = f"{name}({arguments})" if arguments else name
+        unit = units_of.get(signal.kind, signal.unit) or "–"
+        rows.append(f"| `{called}` | {unit} | {_flow(signal.__doc__ or '')} |")
+    return "\n".join(rows)
 
 
 def hashes() -> dict[str, str]:

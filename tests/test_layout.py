@@ -35,6 +35,11 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/amcl/tracking.py": {"process_time"},  # what the filter and the run cost
     "twin/runtime/pacing.py": {"perf_counter", "sleep"},  # how a paced run waits
     "twin/runtime/open_run.py": {"perf_counter", "process_time"},  # how long the run took
+    "twin/experiments/processes.py": {"monotonic"},  # the time limit of a job
+    "twin/experiments/sweep/folder.py": {"monotonic", "time"},  # locks that other machines have left
+    "twin/experiments/sweep/making.py": {"sleep"},  # waits for what others make
+    "twin/experiments/sweep/sweep.py": {"monotonic"},  # how often is looked and told
+    "twin/experiments/sweep/ray_cluster.py": {"monotonic"},  # the time limit of a run
     "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
     "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose

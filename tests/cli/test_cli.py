@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -17,6 +18,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from rich.console import Console, RenderableType
 from rich.text import Text
 from typer.main import get_command
 from typer.testing import CliRunner
@@ -27,11 +29,13 @@ from twin.cli.play import find_recording
 from twin.cli.run import batch
 from twin.cli.run.batch import run_in_child
 from twin.cli.run.options import RunOptions, parse_overrides
+from twin.cli.run.verdict_table import many_report, verdict_report
 from twin.errors import RecordingError, ScenarioError, SimulationError
 from twin.experiments.suite.cases import Case
 from twin.files.writing import written_alone
 from twin.models import catalogue
 from twin.scenario.checks import CheckResult
+from twin.scenario.faults import FaultReport
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
@@ -262,6 +266,28 @@ def test_a_pace_that_was_lost_is_told(
     runtime.metrics |= {"pace_losses": losses, "pace_lost_s": lost_s}
     _, out, _ = invoke("run", str(demo), "--pace", "1", "--no-record")
     assert re.findall(r"the pace was (.*\S)", out) == ([told] if told else [])
+
+
+def test_what_became_of_faults_is_told() -> None:
+    faults = (
+        FaultReport(name="loss", kind="loss", outcome="landed", at_s=1.0, end_s=2.5, effect="3 of 9 lost"),
+        FaultReport(name="ice", kind="friction", outcome="no_effect", at_s=0.0, effect="0 of 9 ticks"),
+        FaultReport(name="late", kind="link_delay", outcome="not_reached"),
+    )
+    verdict = Verdict(scenario="demo", seed=1, faults=faults).to_dict()
+
+    def printed(report: RenderableType) -> str:
+        console = Console(width=120, file=io.StringIO())
+        console.print(report)
+        return console.file.getvalue()  # type: ignore[attr-defined, no-any-return]
+
+    one, many = printed(verdict_report(verdict, None)), printed(many_report([verdict]))
+    assert re.search(r"landed +loss +1.00 s +2.50 s +3 of 9 lost *\n", one)
+    assert re.search(r"no effect +ice +0.00 s +0 of 9 ticks *\n", one)
+    assert re.search(r"not reached +late *\n", one)
+    assert "demo: the fault ice had no effect: 0 of 9 ticks" in many
+    assert "demo: the fault late did not happen" in many
+    assert "the fault loss" not in many
 
 
 def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:

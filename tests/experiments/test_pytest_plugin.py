@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -36,10 +37,11 @@ def project(tmp_path: Path) -> Path:
 
 
 def pytest_in(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    # the plugin of this checkout, whatever is installed
-    plugin = ("-p", "no:twin", "-p", "twin.experiments.pytest_plugin", "-p", "no:cacheprovider")
-    command = [sys.executable, "-m", "pytest", *plugin, *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # the plugin of this checkout, whatever is installed, and no others: they take their time
+    plugins = ("-p", "twin.experiments.pytest_plugin", "-p", "no:cacheprovider")
+    command = [sys.executable, "-m", "pytest", *plugins, *words]
+    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 def collected(done: subprocess.CompletedProcess[str]) -> list[str]:
@@ -66,7 +68,7 @@ def test_nothing_of_twin_is_loaded_without_a_scenario(project: Path) -> None:
         "import sys\ndef test_other():\n    assert not {'twin.errors', 'numpy', 'yaml'} & set(sys.modules)\n"
     )
     (project / "test_other.py").write_text(text, encoding="utf-8")
-    done = pytest_in(project, "-q", "-p", "no:hypothesispytest", "-p", "no:benchmark")
+    done = pytest_in(project, "-q")
     assert "1 passed" in done.stdout, done.stdout
 
 
@@ -83,7 +85,7 @@ def test_what_is_wrong_with_the_tests_of_a_file_is_an_error_of_collection(projec
 def test_passed_failed_and_error_side_by_side(project: Path) -> None:
     (project / "scenarios" / "spin.yaml").write_text(SPIN.replace("[1, 2]", "[1]"), encoding="utf-8")
     out = ("--twin", "--twin-out", "runs/ci", "--junitxml", "junit.xml")
-    done = pytest_in(project, "-n", "2", *out, "scenarios")
+    done = pytest_in(project, "-p", "xdist.plugin", "-n", "2", *out, "scenarios")
     assert done.returncode == 1
     assert re.search(r"1 failed, 1 passed, 1 error in", done.stdout), done.stdout
     told = done.stdout.partition("= FAILURES =")[2]

@@ -113,6 +113,10 @@ def test_latency_delays_the_start_by_as_much(drive: Drive) -> None:
     assert starts("[latency: 120 ms]") - starts("") == 120_000_000
     both = "[{latency: 60 ms}, {latency: {time: 40 ms, label: more}}]"
     assert starts(both) - starts("") == 100_000_000
+    assert starts("[latency: {time: 100 ms, duration: 60 ms}]") == starts(""), "over before it starts"
+    midway = drive("[latency: {time: 200 ms, at: 0.9 s}]", AHEAD)
+    speeds = [t.message.twist.twist.linear.x for t in midway.said["/odom"] if t.time_ns > 800_000_000]
+    assert min(speeds[:25]) > 0.28, "the motors go on with what they do"
     over = drive("[latency: {time: 100 ms, duration: 0.2 s}]", AHEAD)
     assert over.reports["latency"].effect == "motors late in 5 of 11 ticks"
 

@@ -32,9 +32,15 @@ def test_noise_comes_on_top_of_one_sensor_and_changes_no_other(drive: Drive) -> 
     assert abs(off.mean()) < 0.005
     assert payloads(plain, "/scan", "/rosout") == payloads(noisy, "/scan", "/rosout"), "not another bit"
     assert noisy.reports["noise"].effect == "15 of 15 readings of scan altered"
+    assert not noisy.said["/scan"][0].message.ranges.flags.writeable, "as those of others: many hear it"
     other = drive("[{loss: {share: 1, topic: /imu}}, {noise: {sensor: scan, stddev: 0.05}}]")
     assert np.array_equal(scans(other), scans(noisy)), "another fault changes nothing of its numbers"
+    other = drive("[{noise: {sensor: imu, stddev: 1}}, {noise: {sensor: scan, stddev: 0.05}}]")
+    assert np.array_equal(scans(other), scans(noisy)), "nor one of its kind"
     assert not np.array_equal(scans(drive("[noise: {sensor: scan, stddev: 0.05}]", seed="2")), scans(noisy))
+    twice = drive("[{noise: {sensor: scan, stddev: 0.05}}, {noise: {sensor: scan, stddev: 0.05}}]")
+    off = (scans(twice) - np.where(seen, scans(plain), 0.0))[seen]
+    assert off.std() == pytest.approx(0.05 * 2**0.5, rel=0.05), "two of them have each their own"
 
 
 def test_noise_is_new_at_each_moment_and_there_from_its_begin_to_its_end_only(drive: Drive) -> None:

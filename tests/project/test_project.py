@@ -30,7 +30,6 @@ def test_a_project_has_everything_under_its_own_name(tmp_path: Path) -> None:
         "rover/rover.urdf.xacro",
         "rover/rover_hall.yaml",
         "scenarios/rover.yaml",
-        "tests/test_scenarios.py",
     }
     texts = [file.read_text("utf-8") for file in (tmp_path / "rover").rglob("*") if file.is_file()]
     assert not any("my_robot" in text for text in texts)
@@ -55,7 +54,7 @@ def test_a_name_that_is_none_of_a_ros_package_is_refused(tmp_path: Path, name: s
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["twin", "json", "class", "tests", "scenarios"])
+@pytest.mark.parametrize("name", ["twin", "json", "class", "scenarios"])
 def test_a_name_that_hides_a_module_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(TwinError, match=f"such as {name}_robot is free"):
         create(tmp_path / name)

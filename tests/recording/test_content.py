@@ -246,7 +246,7 @@ def test_shapes_hang_on_their_bodies(content: Recording) -> None:
 def test_verdict(content: Recording, verdict: dict[str, Any]) -> None:
     text = content.column("/verdict", "TextDocument:text").values[0][0]
     assert text.startswith("**PASS: demo**, seed 7\n")
-    assert "localisation_error | **FAIL** | 0.31 m | 0.25 m | 2.4 s" in text
+    assert "localisation_error | **FAIL** | 0.31 m | 0.25 m |  | 2.4 s" in text
     assert "wall_time_s" not in text
     stored = content.column("/__properties/verdict", "json").values[0][0]
     assert json.loads(stored) == verdict

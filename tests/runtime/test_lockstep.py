@@ -116,6 +116,21 @@ def test_a_node_gives_the_same_digest_in_another_process(
     assert runtime.run(what, record=False).digest != expected.digest, "the node makes a difference"
 
 
+def test_faults_of_the_network_are_the_same_between_processes(
+    scenario: Callable[[str], Scenario], endpoint: str, start: Start
+) -> None:
+    late = "{link_delay: {time: 50 ms, jitter: 20 ms, topic: /odom, at: 0.5 s}}"
+    what = scenario(
+        f"{DRIVE}faults: [{{loss: 30 %}}, {late}, {{duplication: {{share: 0.5, topic: /cmd_vel}}}}]\n"
+    )
+    expected = in_process(what, "controller")
+    assert [fault.outcome for fault in expected.faults] == ["landed"] * 3
+    start("controller")
+    verdict = stepped(what, endpoint, "/controller")
+    assert verdict.digest == expected.digest
+    assert verdict.faults == expected.faults
+
+
 @pytest.mark.slow
 def test_twenty_of_twenty_runs_with_a_slow_controller_have_one_digest(
     scenario: Callable[[str], Scenario], endpoint: str, start: Start

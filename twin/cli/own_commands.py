@@ -46,6 +46,7 @@ TABLE = {
     "test": Command(_SCENARIOS, "Run scenarios as tests, one for each seed and value that they name.", "run.batch", "run_batch", "twin test scenarios -j 2 --junit results.xml"),
     "diff": Command(_SCENARIOS, "Name the first tick, topic and field in which two runs differ.", "experiments.diff", "diff", "twin diff runs/warehouse/20261121-101500 --set robots.0.pose.x=1.5", needs_arguments=True),
     "shrink": Command(_SCENARIOS, "Reduce a failing scenario to the smallest that fails the same checks, and write it.", "experiments.shrink", "shrink", "twin shrink warehouse --seed 7 -o smallest.yaml", needs_arguments=True),
+    "mutate": Command(_SCENARIOS, "Run a scenario with known-bad stacks, and tell which of them its checks catch.", "experiments.mutate", "mutate", "twin mutate warehouse --min-score 0.9", needs_arguments=True),
     "sweep": Command(_SCENARIOS, "Run a scenario with many values and seeds, and say how sure its pass rate is.", "experiments.sweep", "sweep", "twin sweep diff_bot_figure8 --seeds 0:100 --set mission.steps.0.linear=0.1:0.3:0.1", needs_arguments=True),
     "report": Command(_SCENARIOS, "Write a page of a run, or of many: verdict, path, speeds, worst moments, pictures.", "experiments.report", "report", "twin report runs/warehouse/20261121-101500 -o report.html", needs_arguments=True),
     "play": Command(_SCENARIOS, "Open a recording in the Rerun viewer.", "play", "play", "twin play runs/warehouse/20261121-101500", needs_arguments=True),

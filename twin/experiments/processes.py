@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -50,24 +50,27 @@ class Processes(Generic[Job]):
         work: Callable[[Job], Any],
         count: int,
         *,
-        preload: str,
+        preload: Sequence[str] = (),
         time_limit_s: float | None = None,
         log: Path | None = None,
+        is_last: Callable[[Any], bool] = lambda result: False,
     ) -> None:
         """Start nothing yet.
 
         Args:
             work: A function of a module, which is called in a process with each job.
             count: How many jobs are done at a time, at most.
-            preload: The module that is imported once, before processes are forked.
+            preload: Modules that are imported once, before processes are forked.
             time_limit_s: Of a job [s of wall time].
             log: The file that takes what processes print.
+            is_last: Whether a process is to do no more after a result.
         """
         self._work, self._count = work, count
         self._time_limit_s = time_limit_s
         self._log = log
+        self._is_last = is_last
         self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload([preload])
+        self._context.set_forkserver_preload(list(preload))
         self._processes: list[_Process[Job]] = []
 
     @property
@@ -133,6 +136,8 @@ class Processes(Generic[Job]):
         assert job is not None
         if isinstance(result, BaseException):
             raise result
+        if self._is_last(result):
+            self._end(each)
         return job, result
 
     def _end(self, each: _Process[Job]) -> Any:

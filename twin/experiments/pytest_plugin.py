@@ -6,7 +6,7 @@ It loads nothing of twin until a scenario is collected.
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +15,12 @@ import pytest
 
 if TYPE_CHECKING:
     from twin.experiments.suite.cases import Case
-    from twin.experiments.suite.worker import Worker
+    from twin.experiments.suite.run import Runner
 
 _SCENARIO = re.compile(r"^(robots|checks|mission) *:", re.MULTILINE)
 """What tells a scenario from other YAML files, in a folder."""
 _OUT: pytest.StashKey[Path] = pytest.StashKey()
-_WORKER: pytest.StashKey[Worker] = pytest.StashKey()
+_RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 
 
 class ScenarioFailed(Exception):
@@ -62,9 +62,9 @@ def pytest_configure_node(node: Any) -> None:
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """End the process that made the runs."""
-    worker = config.stash.get(_WORKER, None)
-    if worker is not None:
-        worker.close()
+    runner = config.stash.get(_RUNNER, None)
+    if runner is not None:
+        runner.close()
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
@@ -107,7 +107,7 @@ class ScenarioItem(pytest.Item):
     """One run of a scenario. It is made in the phase of setup, where what goes wrong is an error."""
 
     case: Case
-    verdict: dict[str, Any]
+    verdict: Mapping[str, Any]
 
     @property
     def folder(self) -> Path:
@@ -117,14 +117,14 @@ class ScenarioItem(pytest.Item):
 
     def setup(self) -> None:
         """Make the run; raises ScenarioBroken if that cannot be."""
-        from twin.experiments.suite.worker import OUTPUT, Worker
+        from twin.experiments.suite.one_run import OUTPUT, Job
+        from twin.experiments.suite.run import Runner
 
         stash = self.config.stash
-        if _WORKER not in stash:
-            stash[_WORKER] = Worker()
-        self.verdict = stash[_WORKER].run(
-            self.case, self.folder, record=self.config.getoption("--twin-record")
-        )
+        if _RUNNER not in stash:
+            stash[_RUNNER] = Runner()
+        record = self.config.getoption("--twin-record")
+        self.verdict = stash[_RUNNER].run(Job(number=1, case=self.case, folder=self.folder, record=record))
         self.user_properties += [("digest", self.verdict["digest"]), ("seed", self.verdict["seed"])]
         output = self.folder / OUTPUT
         if output.exists():

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any, Self
 
 from twin.errors import TwinError
 from twin.experiments.processes import Lost, Processes
-from twin.files.kept import keep, kept
+from twin.files.kept import hash_of, keep, kept
 from twin.plugins import execution
 from twin.runtime.open_run import run
 from twin.scenario.provenance import cpu_class, versions
@@ -32,19 +35,23 @@ class Trial:
     @property
     def key(self) -> str:
         """What the outcome depends on."""
-        told = (self.source.data, self.source.files(), versions(), cpu_class(), self.repeat)
+        source = self.source
+        told = (source.data, source.files(), self.repeat, versions(), cpu_class(), _code())
         return json.dumps(told, sort_keys=True)
 
+    def perform(self) -> dict[str, Any]:
+        """Run, and return the content of the verdict."""
+        try:
+            with execution():
+                verdict = run(load_again(self.source, execute=True), record=False)
+        except TwinError as fault:
+            verdict = self.broken(str(fault))
+        values: dict[str, Any] = json.loads(verdict.to_json())
+        return values
 
-def perform(trial: Trial) -> dict[str, Any]:
-    """Run, and return the content of the verdict."""
-    try:
-        with execution():
-            verdict = run(load_again(trial.source, execute=True), record=False)
-    except TwinError as fault:
-        verdict = Verdict(scenario=str(trial.source.data.get("name")), seed=0, error=str(fault))
-    values: dict[str, Any] = json.loads(verdict.to_json())
-    return values
+    def broken(self, error: str) -> Verdict:
+        """Return the verdict of a run that could not be made or finished."""
+        return Verdict(scenario=str(self.source.data.get("name")), seed=0, error=error)
 
 
 @dataclass(kw_only=True)
@@ -61,7 +68,7 @@ class Trials:
 
     def __enter__(self) -> Self:
         self._processes: Processes[tuple[str, Trial]] = Processes(
-            _keyed, self.count, preload="twin.experiments.trials"
+            _perform, self.count, preload="twin.experiments.trials"
         )
         return self
 
@@ -81,8 +88,11 @@ class Trials:
                 pending -= 1
                 self.made += 1
                 self.told(self.made)
-                self._results[key] = _result(trial, result)
-                keep(_KIND, key, self._results[key])
+                if isinstance(result, Lost):
+                    result = trial.broken(result.reason).to_dict()
+                else:
+                    keep(_KIND, key, result)
+                self._results[key] = result
         return [self._results[key] for key in keys]
 
     def first(self, trials: Sequence[Trial], holds: Callable[[Mapping[str, Any]], bool]) -> int | None:
@@ -103,12 +113,15 @@ class Trials:
         return key in self._results
 
 
-def _keyed(job: tuple[str, Trial]) -> dict[str, Any]:
-    return perform(job[1])
+def _perform(job: tuple[str, Trial]) -> dict[str, Any]:
+    return job[1].perform()
 
 
-def _result(trial: Trial, result: Any) -> Mapping[str, Any]:
-    if isinstance(result, Lost):
-        name = str(trial.source.data.get("name"))
-        return Verdict(scenario=name, seed=0, error=result.reason).to_dict()
-    return dict(result)
+@cache
+def _code() -> str:
+    """Return the SHA-256 of all that twin is made of: what changes there may change a verdict."""
+    found, package = hashlib.sha256(), Path(__file__).parents[1]
+    for file in sorted(package.rglob("*")):
+        if "__pycache__" not in file.parts and file.is_file():
+            found.update(f"{file.relative_to(package)} {hash_of(file)}\n".encode())
+    return found.hexdigest()

@@ -81,13 +81,15 @@ class FaultContext:
     mission_state: Callable[[], str]
     control_period_ns: int
     zones: Mapping[str, Zone] = field(default_factory=dict)
+    streams: Mapping[str, str] = field(default_factory=dict)
+    """What the random numbers of each fault depend on, by its name."""
 
 
 class Fault(ABC):
     """A fault of a run: prepared when the run is built, it begins once and may end once.
 
     What the run lacks, the constructor refuses by `refuse`. Random numbers come from `noise`: they depend on
-    the run's seed and the fault's name alone, so a fault changes nobody else's.
+    the run's seed and the fault's label or kind alone, so a fault changes nobody else's.
     """
 
     Config: ClassVar[type[Any]]
@@ -136,7 +138,8 @@ class Fault(ABC):
 
     def noise(self, part: str = "") -> NoiseStream:
         """Return the stream of one random part of it."""
-        return NoiseStream(self.context.world.seed, f"faults/{self.name}/{part}")
+        stream = self.context.streams.get(self.name, self.name)
+        return NoiseStream(self.context.world.seed, f"faults/{stream}/{part}")
 
 
 class FaultOfRobot(Fault):

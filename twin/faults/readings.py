@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from twin.bridge.msgs import new
 from twin.errors import nearest
 from twin.faults.fault import Effect, FaultContext, FaultOfRobot, one_of, refuse
-from twin.faults.messages import Counted, linked
-from twin.faults.quantities import altered, is_same, numbers, values_of, with_field
+from twin.faults.quantities import altered, is_same, numbers
 from twin.geometry import Array
 from twin.models.sensors import plugin_of
-from twin.parameters import Fraction, Positive, Seconds, Share
+from twin.parameters import Positive
 from twin.scenario.faults import LastingRobotFault
-from twin.sensors.lidar import Lidar
 
 if TYPE_CHECKING:
     from twin.nodes.sensor_publishers import SensorPublisher
@@ -51,8 +45,6 @@ class QuantityConfig(ReadingConfig):
 class ReadingFault(FaultOfRobot):
     """Changes the readings of a sensor, before anybody hears of them."""
 
-    remembers = False
-    """Whether it has to know what was measured before it began."""
     device: ClassVar[type] = object
     """Of which class the sensor must be."""
 
@@ -69,30 +61,25 @@ class ReadingFault(FaultOfRobot):
         one_of(what, config.sensor, sensors, "sensor", self.robot.name)
         self.publisher = sensors[config.sensor]
         if self.publisher is None:
-            self._filters: list[Callable[[Any, int], Any]] = self.hardware.filters
+            filters: list[Callable[[Any, int], Any]] = self.hardware.filters
             self.example: Any = self.hardware.read()
             self.measures = "position"
         else:
-            self._filters = self.publisher.filters
+            filters = self.publisher.filters
             kind = plugin_of(self.publisher.sensor.spec).load()
             self.example, self.measures = new(kind.message), kind.measures
         self.text = f"{type(self).__name__.lower()} of {self.robot.name}'s {config.sensor}"
         self.count = self.changed = 0
         self._is_active = False
-        if self.remembers:
-            self._filters.append(self._pass)
+        filters.append(self._pass)  # in the order of the scenario, whichever begins first
 
     def begin(self) -> None:
-        """Stand between the sensor and its topic."""
+        """Alter readings from now on."""
         self._is_active = True
-        if not self.remembers:
-            self._filters.append(self._pass)
 
     def end(self) -> None:
-        """Leave."""
+        """Let them pass."""
         self._is_active = False
-        if not self.remembers:
-            self._filters.remove(self._pass)
 
     @abstractmethod
     def alter(self, reading: Any, time_ns: int) -> Any:
@@ -200,160 +187,3 @@ class Bias(QuantityFault):
     def changed_values(self, values: Array, time_ns: int) -> Array:
         """Return values that are too large."""
         return values + self.config.by
-
-
-class Dropout(ReadingFault):
-    """A sensor has nothing to say now and then, or some of its values are missing."""
-
-    @dataclass(frozen=True, kw_only=True)
-    class Config(ReadingConfig):
-        """Readings, or values, that are missing."""
-
-        share: Annotated[Share, Fraction]
-        """Of the readings, or of the values, that are missing; each on its own."""
-        of: Literal["readings", "values"] = "readings"
-        """`readings`: nothing is said (joints: the last reading again). `values`: single numbers of an array,
-        such as rays of a scan, are NaN."""
-
-    def __init__(self, name: str, config: Config, context: FaultContext) -> None:
-        super().__init__(name, config, context)
-        self._stream = self.noise(config.sensor)
-        if config.of == "values" and not isinstance(values_of(self.example).get(self.measures), np.ndarray):
-            raise refuse("of", f"sensor '{config.sensor}' measures no array of values; valid is readings")
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "dropped" if self.config.of == "readings" else "with missing values"
-
-    def alter(self, reading: Any, time_ns: int) -> Any:
-        """Return the reading, or what is left of it."""
-        tick, share = self.tick(time_ns), self.config.share
-        if self.config.of == "readings":
-            return None if self._stream.uniform(tick, 1)[0] < share else reading
-
-        def without(values: Array) -> Array:
-            return np.where(self._stream.uniform(tick, len(values)) < share, math.nan, values)
-
-        return altered(reading, self.measures, without)
-
-
-class Freeze(ReadingFault):
-    """A sensor says the last reading again and again, with new stamps."""
-
-    remembers = True
-
-    @dataclass(frozen=True, kw_only=True)
-    class Config(ReadingConfig):
-        """A sensor that says the same again and again."""
-
-    _last: Any = None
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "frozen"
-
-    def saw(self, reading: Any) -> None:
-        """Keep a reading."""
-        self._last = reading
-
-    def alter(self, reading: Any, time_ns: int) -> Any:
-        """Return the last one with the stamp of now."""
-        if self._last is None:
-            self._last = reading
-        now = getattr(reading, "header", None)
-        return self._last if now is None else with_field(self._last, "header", now)
-
-
-class Delay(ReadingFault):
-    """What a sensor measures is told late, with the stamp of its time."""
-
-    @dataclass(frozen=True, kw_only=True)
-    class Config(ReadingConfig):
-        """A sensor that is late."""
-
-        time: Annotated[Seconds, Positive]
-        """By how much [s]; nodes hear of it at the first control period after that."""
-
-    def __init__(self, name: str, config: Config, context: FaultContext) -> None:
-        super().__init__(name, config, context)
-        self._delay_ns = round(config.time * 1e9)
-        self._past: deque[tuple[int, Any]] = deque()
-        self._link: Counted | None = None
-        if self.publisher is not None:
-            node = self.publisher.node
-            topic = node.resolve_name(config.sensor)
-            full_name = node.fully_qualified_name
-            self._link = Counted(
-                lambda heard: (self._delay_ns,), lambda h: (h.topic, h.sender) == (topic, full_name)
-            )
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "late"
-
-    @property
-    def effect(self) -> Effect:
-        """How many readings came late."""
-        if self._link is None:
-            return super().effect
-        return Effect(self._link.changed > 0, self._link.told(f"readings of {self.config.sensor}", self.did))
-
-    def begin(self) -> None:
-        """Hold back what is measured from now on."""
-        if self._link is None:
-            super().begin()
-        else:
-            linked(self.context.bus).append(self._link)
-
-    def end(self) -> None:
-        """Hold back no more."""
-        if self._link is None:
-            super().end()
-        else:
-            linked(self.context.bus).remove(self._link)
-
-    def alter(self, reading: Any, time_ns: int) -> Any:
-        """Return what the joints were so long ago."""
-        self._past.append((time_ns, reading))
-        found = None
-        while self._past and self._past[0][0] <= time_ns - self._delay_ns:
-            found = self._past.popleft()[1]
-        return found
-
-
-class LidarFailure(Freeze):
-    """A lidar delivers nothing, or nothing of use."""
-
-    device = Lidar
-
-    @dataclass(frozen=True, kw_only=True)
-    class Config(LastingRobotFault):
-        """A lidar delivers nothing, or nothing of use."""
-
-        sensor: str = "scan"
-        """Topic of the lidar."""
-        kind: Literal["stop", "freeze", "nan", "blind"]
-        """`stop`: no scan comes. `freeze`: the last one comes again and again, with new stamps. `nan`: every
-        reading is NaN. `blind`: every reading is inf, as if nothing were there."""
-
-    def __init__(self, name: str, config: Config, context: FaultContext) -> None:
-        super().__init__(name, config, context)
-        what = f"lidar '{config.sensor}' of {self.robot.name}"
-        self.text, self.end_text = f"{what}: {config.kind}", f"{what} works again"
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return {"stop": "dropped", "freeze": "frozen"}.get(self.config.kind, f"all {self.config.kind}")
-
-    def alter(self, reading: Any, time_ns: int) -> Any:
-        """Return what a lidar that fails says."""
-        if self.config.kind == "stop":
-            return None
-        if self.config.kind == "freeze":
-            return super().alter(reading, time_ns)
-        value = math.nan if self.config.kind == "nan" else math.inf
-        return altered(reading, "ranges", lambda values: np.full_like(values, value))

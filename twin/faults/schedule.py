@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from twin.errors import Problem, ScenarioError
 from twin.faults.fault import Effect, Fault, FaultContext
 from twin.faults.triggers import Waiting, waiting
 from twin.plugins import Plugin
-from twin.scenario.faults import FaultConfig, FaultEntry, FaultReport, titles
+from twin.scenario.faults import FaultConfig, FaultEntry, FaultReport, streams, titles
 from twin.scenario.schema import Scenario
 from twin.strict_yaml import Faults
 
@@ -75,6 +77,7 @@ class FaultSchedule:
             ScenarioError: The run lacks what is to fail; all such faults, each with its line.
         """
         self._world = context.world
+        context = replace(context, streams=streams(scenario.faults))
         self._begun: set[str] = set()
         self._watched: list[_Watched] = []
         problems: list[Problem] = []

@@ -50,7 +50,7 @@ class Encoder(FaultOfRobot):
     def effect(self) -> Effect:
         """How much was counted wrongly."""
         wrong = self._turned.angle * abs(1.0 - self.config.factor)
-        return Effect(wrong > _LEAST_RAD, f"{self.config.joint}: {wrong:.4g} rad counted wrongly")
+        return Effect(wrong > _LEAST_RAD, f"{self.config.joint}: {wrong:.3f} rad counted wrongly")
 
 
 class OdometryJump(FaultOfRobot):
@@ -86,7 +86,7 @@ class OdometryJump(FaultOfRobot):
     def effect(self) -> Effect:
         """What was counted and not driven."""
         most = max(map(abs, self._angles.values()))
-        return Effect(most > _LEAST_RAD, f"wheels counted up to {most:.4g} rad that they did not turn")
+        return Effect(most > _LEAST_RAD, f"wheels counted up to {most:.3f} rad that they did not turn")
 
 
 class WheelRadius(FaultOfRobot):
@@ -130,7 +130,7 @@ class WheelRadius(FaultOfRobot):
     def effect(self) -> Effect:
         """How much of the way odometry misjudges."""
         wrong = self._turned.angle / len(self._joints) * self._radius * abs(1.0 - 1.0 / self.config.factor)
-        return Effect(wrong > _LEAST_M, f"{wrong:.4g} m of each wheel's way misjudged")
+        return Effect(wrong > _LEAST_M, f"{wrong:.4f} m of each wheel's way misjudged")
 
 
 class Track(FaultOfRobot):
@@ -170,7 +170,7 @@ class Track(FaultOfRobot):
     def effect(self) -> Effect:
         """How much of the turning odometry misjudges."""
         wrong = self._angle * abs(self.config.factor - 1.0)
-        return Effect(wrong > _LEAST_RAD, f"{math.degrees(wrong):.4g} deg of turning misjudged")
+        return Effect(wrong > _LEAST_RAD, f"{math.degrees(wrong):.2f} deg of turning misjudged")
 
     def _heading(self) -> float:
         return self.context.world.pose(self.robot.handle.base).to_pose2().yaw

@@ -87,6 +87,7 @@ def build(
     outside: Outside = ALONE,
     crash_folder: Path | None = None,
     savings: Savings = ALL,
+    before_nodes: Callable[[World, Bus], None] | None = None,
 ) -> Parts:
     """Build the world, the bus and all nodes.
 
@@ -97,6 +98,7 @@ def build(
         outside: The user's own nodes, and how the run keeps time with other processes.
         crash_folder: Where the last states go if the physics diverges.
         savings: What is not done over again.
+        before_nodes: Called when the world is there, and the bus without a node.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -142,6 +144,8 @@ def build(
     for tap in taps:
         bus.tap(tap)
     try:
+        if before_nodes is not None:
+            before_nodes(world, bus)
         control_period_ns = round(scenario.physics.control_period * 1e9)
         alone = len(scenario.robots) == 1
         bus.node_options = None if alone else _TREE_EACH

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
+import uuid
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -32,7 +33,9 @@ from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
     from twin.recording.sink import RerunSink
+    from twin.sim.world import World
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
@@ -76,6 +79,7 @@ class OpenRun:
         workers: int = 0,
         savings: Savings = ALL,
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
+        before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
     ) -> None:
         """Build everything, up to the first tick.
@@ -97,6 +101,7 @@ class OpenRun:
             workers: Processes that run the nodes of robots beside this one; it changes nothing but the speed.
             savings: What is not done over again; it changes nothing but the speed.
             taps: Called with every sample that a node publishes, from the first one on.
+            before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
 
         Raises:
@@ -131,6 +136,7 @@ class OpenRun:
                 outside=outside,
                 crash_folder=out,
                 savings=savings,
+                before_nodes=before_nodes,
             )
             ending.callback(parts.bus.close)
             if bag_tap is not None:
@@ -384,6 +390,6 @@ def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> Reru
     if viewer is not None:
         # Each is a recording of its own, which the viewer turns to.
         live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
-        return RerunSink(viewer, config=live, recording_id=f"{name}-{time.monotonic_ns()}")
+        return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
     assert out is not None
     return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)

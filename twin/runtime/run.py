@@ -39,6 +39,7 @@ class Run:
         self.scenario = scenario
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
+        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
         goods = [good.name for good in self.world.scene.goods]
         needs = {field for check in self.checks for field in check.needs}
@@ -53,7 +54,6 @@ class Run:
         )
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = parts.control_period_ns // self.world.timestep_ns
-        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.bus.started()
         self.lockstep: Lockstep | None = None
         if outside.wait_for:

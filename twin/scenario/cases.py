@@ -14,10 +14,11 @@ from twin.strict_yaml import Fault, StrictModel
 
 MOST = 10_000
 """Tests that one file may make."""
+_ANYTHING = ["string", "number", "boolean", "array", "object", "null"]
 _SEEDS_SCHEMA = {
     "anyOf": [
         {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1},
-        {"type": "string", "pattern": r"^\d+\.\.\d+$"},
+        {"type": "string"},
     ]
 }
 
@@ -47,6 +48,11 @@ Seeds = Annotated[
     BeforeValidator(_seeds),
     WithJsonSchema(_SEEDS_SCHEMA),
 ]
+Values = Annotated[
+    tuple[Any, ...],
+    Field(min_length=1),
+    WithJsonSchema({"type": "array", "minItems": 1, "items": {"type": _ANYTHING}}),
+]
 Tag = Annotated[str, BeforeValidator(_tag), WithJsonSchema({"type": "string"})]
 
 
@@ -55,7 +61,7 @@ class CasesConfig(StrictModel):
 
     seeds: Seeds = ()
     """One test for each seed: a list, or a range with both ends, `1..10`; absent: the file's."""
-    grid: Mapping[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = {}
+    grid: Mapping[str, Values] = {}
     """Keys with dots, as `robots.0.pose.x`, each with a list of values: one test for each combination."""
     tags: tuple[Tag, ...] = ()
     """Words to choose tests by: `twin test -m quick`, `pytest -m quick`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -86,10 +86,10 @@ FAULTS: Kind[Any] = Kind("fault", base="twin.faults:Fault", group="twin.faults")
 
 FAULTS.register("noise", "twin.faults.readings:Noise")
 FAULTS.register("bias", "twin.faults.readings:Bias")
-FAULTS.register("dropout", "twin.faults.readings:Dropout")
-FAULTS.register("freeze", "twin.faults.readings:Freeze")
-FAULTS.register("delay", "twin.faults.readings:Delay")
-FAULTS.register("lidar", "twin.faults.readings:LidarFailure")
+FAULTS.register("dropout", "twin.faults.outages:Dropout")
+FAULTS.register("freeze", "twin.faults.outages:Freeze")
+FAULTS.register("delay", "twin.faults.outages:Delay")
+FAULTS.register("lidar", "twin.faults.outages:LidarFailure")
 FAULTS.register("encoder", "twin.faults.wheels:Encoder")
 FAULTS.register("odometry_jump", "twin.faults.wheels:OdometryJump")
 FAULTS.register("wheel_radius", "twin.faults.wheels:WheelRadius")
@@ -152,13 +152,25 @@ class FaultEntry(OneOfKind):
         return self.given.get("label") or self.kind.rpartition(":")[2]
 
 
-def titles(entries: tuple[FaultEntry, ...]) -> list[str]:
+def titles(entries: Sequence[FaultEntry]) -> list[str]:
     """Return what faults are called, each otherwise: of several without a label the second ends with `_2`."""
-    found: list[str] = []
-    for entry in entries:
-        same = sum(other.title == entry.title for other in entries[: len(found)])
-        found.append(entry.title if not same else f"{entry.title}_{same + 1}")
-    return found
+    return _numbered([(entry.title,) for entry in entries])
+
+
+def streams(entries: Sequence[FaultEntry]) -> dict[str, str]:
+    """Return what the random numbers of faults depend on, by title: others have no influence on it.
+
+    It is a fault's label or kind, and a number only if there are several alike of the same sensor or topic.
+    """
+    keys = ("robot", "sensor", "topic")
+    alike = [(entry.title, *(entry.given.get(key) for key in keys)) for entry in entries]
+    return dict(zip(titles(entries), _numbered(alike), strict=True))
+
+
+def _numbered(alike: Sequence[tuple[Any, ...]]) -> list[str]:
+    """Return the first item of each, with a number for those of which there was an equal one before."""
+    counts = [alike[:i].count(one) for i, one in enumerate(alike)]
+    return [str(one[0]) + (f"_{n + 1}" if n else "") for one, n in zip(alike, counts, strict=True)]
 
 
 def _whole(kind: str, value: Any) -> Any:

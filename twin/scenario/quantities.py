@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 
 def quantity(value: float | bool | None, unit: str, limit: float | bool | None) -> str:
     """Format a value in the unit that suits its limit, so that the two can be compared at a glance.
@@ -13,6 +15,8 @@ def quantity(value: float | bool | None, unit: str, limit: float | bool | None) 
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if unit in ("rad", "rad/s"):
+        value, unit = math.degrees(value), unit.replace("rad", "deg")
     if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
         value, unit = value * 1e3, "mm"
     return f"{round(value, 3):.5g} {unit}".rstrip()

@@ -9,6 +9,7 @@ import pytest
 
 from tests.envs.scenario.conftest import MakeEnv
 from twin.errors import GymError, SimulationError
+from twin.recording.player import listens
 
 
 def picture(make: MakeEnv, small: Path, **options: object) -> tuple[np.ndarray, list[float]]:
@@ -47,3 +48,20 @@ def test_a_size_that_is_none(make: MakeEnv, small: Path) -> None:
     env.reset()
     with pytest.raises(GymError, match="a picture of 0 x 480 pixels"):
         env.render()
+
+
+@pytest.mark.slow
+def test_a_viewer_shows_it_while_it_goes_on_and_ends_with_it(make: MakeEnv, small: Path) -> None:
+    scans = []
+    for mode in (None, "human"):
+        env = make(small, render_mode=mode)
+        env.reset(seed=1)
+        scans.append([env.step(np.array([0.5, 0.5]))[0]["scan"].tolist() for _ in range(5)][-1])
+    assert scans[0] == scans[1]
+    assert env.render() is None
+    address = env._screen.address
+    assert address is not None
+    port = int(address.split(":")[2].split("/")[0])
+    assert listens(port)
+    env.close()
+    assert not listens(port)

@@ -151,6 +151,21 @@ def test_without_a_recording_the_rest_is_there(recorded: Path, tmp_path: Path) -
     assert "the recording is damaged" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_it_says_what_became_of_faults(recorded: Path, tmp_path: Path) -> None:
+    verdict = json.loads((recorded / "verdict.json").read_text(encoding="utf-8"))
+    fault = {"name": "loss", "kind": "loss", "at_s": 1.5, "end_s": None}
+    verdict["faults"] = [
+        {**fault, "outcome": "landed", "effect": "3 of 9 messages lost"},
+        {**fault, "name": "late", "at_s": None, "outcome": "not_reached", "effect": ""},
+    ]
+    (tmp_path / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
+    write_report(tmp_path, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    Page(text)
+    words = " ".join(re.sub(r"<[^>]*>", " ", text).split())
+    assert "landed loss 1.50 s 3 of 9 messages lost not reached late" in words
+
+
 def test_without_opengl_pictures_are_left_out_in_a_sentence(
     recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

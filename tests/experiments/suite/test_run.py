@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import threading
+import multiprocessing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from twin.experiments.suite.cases import Case, cases_in
+from twin.experiments.suite.one_run import OUTPUT
 from twin.experiments.suite.run import run_all
-from twin.experiments.suite.worker import OUTPUT, Worker
 from twin.scenario.junit import junit_xml
 
 SPIN = """\
@@ -79,7 +79,9 @@ def test_each_run_has_its_verdict_whatever_becomes_of_the_others(in_turn: list[d
     wrong, test, dies = (str(result["error"]) for result in in_turn if result["error"])
     assert "no robot 'diff_bto'" in wrong
     assert "must be a list of seeds or a range such as 1..10, not '2..1'" in test
-    assert dies.startswith("the run's process ended by SIGKILL (is there too little memory?): it is the end")
+    assert dies.startswith(
+        "the run's process was killed by SIGKILL; the system does so when memory runs out: it"
+    )
 
 
 def test_code_of_a_user_is_run_in_a_process_of_its_own(in_turn: list[dict[str, Any]]) -> None:
@@ -121,28 +123,13 @@ def test_side_by_side_the_results_are_those_of_one_after_the_other(
     assert names == ["01-spin-seed=1", "02-spin-seed=2", "03-spin", "04-c_test", "05-spin-seed=3"]
 
 
-def test_a_run_that_is_interrupted_says_so(tmp_path: Path) -> None:
-    long = tmp_path / "long.yaml"
-    long.write_text(
-        SPIN.partition("test:")[0].replace("3 s", "100 h").replace("0.2 s", "99 h"), encoding="utf-8"
+def test_a_run_that_hangs_is_an_error_and_leaves_no_process(tmp_path: Path) -> None:
+    (tmp_path / "plugin.py").write_text(
+        PLUGIN.replace(": pass", ":\n        while True: pass"), encoding="utf-8"
     )
-    begun, fault = threading.Event(), []
-    worker = Worker()
-
-    def run() -> None:
-        begun.set()
-        try:
-            worker.run(cases_in([long])[0], tmp_path / "out", record=True)
-        except KeyboardInterrupt as interrupt:
-            fault.append(interrupt)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    begun.wait()
-    while not list((tmp_path / "out").glob("*.rrd")):  # it is under way
-        thread.join(0.05)
-    worker.stop()
-    thread.join()
-    assert len(fault) == 1
-    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
-    assert (verdict["verdict"], verdict["error"]) == ("error", "interrupted")
+    hanging = tmp_path / "hanging.yaml"
+    hanging.write_text(SPIN.replace("mission_succeeded", "plugin.py:Who"), encoding="utf-8")
+    cases = cases_in([hanging])[:1]
+    (result,) = run_all(cases, tmp_path / "out", time_limit_s=3.0)
+    assert (result["verdict"], result["error"]) == ("error", "the run took longer than 3 s of wall time")
+    assert multiprocessing.active_children() == []

@@ -153,6 +153,18 @@ def test_round_robin_begins_with_the_first_child_after_a_halt(load: Load) -> Non
     assert bed.ticks == (2, 1, 0)
 
 
+def test_a_recovery_is_under_way_while_it_runs(load: Load) -> None:
+    bed = load(node("RoundRobin", "RS", "RF", "R"))
+    context = bed.tree.root.context
+    seen = []
+    for _ in range(4):
+        bed.tick(1)
+        seen.append(context.recovering)
+    assert seen == [True, False, True, True]
+    bed.tree.halt()
+    assert not context.recovering
+
+
 @pytest.mark.parametrize(
     ("word", "ticks"),
     [

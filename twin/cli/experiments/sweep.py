@@ -64,8 +64,12 @@ def sweep(
         typer.Option(metavar="ADDRESS", help="Run on a Ray cluster: auto, local, or host:port of its head."),
     ] = None,
     time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End runs that take longer, by the wall clock.")
+        float | None,
+        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall."),
     ] = None,
+    retry_errors: Annotated[
+        bool, typer.Option("--retry-errors", help="Make runs again that ended in an error before.")
+    ] = False,
     record: Annotated[
         Literal["none", "few", "failures", "all"],
         typer.Option(help="Which runs get a recording; few: the first failures of some points."),
@@ -111,7 +115,14 @@ def sweep(
     try:
         with _progress(plan.name) as progress:
             result = run_sweep(
-                plan, folder, backend, shard=share, record=record, page=page, progress=progress
+                plan,
+                folder,
+                backend,
+                shard=share,
+                record=record,
+                retry_errors=retry_errors,
+                page=page,
+                progress=progress,
             )
     except KeyboardInterrupt:
         stderr().print(f"interrupted; the runs so far are kept in {folder}, and the same command goes on")

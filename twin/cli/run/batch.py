@@ -6,6 +6,7 @@ import json as json_module
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -72,6 +73,9 @@ def run_batch(
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Only the I-th of N parts, for N machines.")
     ] = "1/1",
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="End runs that take longer, by the wall clock.")
+    ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write one JUnit file over all runs.")
     ] = None,
@@ -104,7 +108,7 @@ def run_batch(
     if junit is not None:
         check_file(junit, "--junit")
     sigterm_is_ctrl_c()
-    verdicts: list[dict[str, Any]] = []
+    verdicts: list[Mapping[str, Any]] = []
     with results_folder(out, "test") as folder, batch_progress(len(cases)) as progress:
         try:
             verdicts.extend(
@@ -113,6 +117,7 @@ def run_batch(
                     folder,
                     jobs=jobs or len(os.sched_getaffinity(0)),
                     record=record,
+                    time_limit_s=time_limit,
                     on_begin=progress.begin,
                     on_end=progress.end,
                 )
@@ -175,7 +180,7 @@ def run_repeatedly(options: RunOptions) -> int:
     return max(*map(_exit_code, verdicts), int(differ))
 
 
-def _exit_code(verdict: dict[str, Any]) -> int:
+def _exit_code(verdict: Mapping[str, Any]) -> int:
     return {"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]]
 
 

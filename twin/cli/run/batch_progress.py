@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from twin.cli.console import stderr
@@ -16,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class BatchProgress:
-    """A bar over all runs, with what runs now; told from any thread."""
+    """A bar over all runs, with what runs now."""
 
     def __init__(self, bar: Progress | None, total: int) -> None:
-        self._bar, self._total, self._lock = bar, total, Lock()
+        self._bar = bar
         self._running: dict[str, None] = {}
         self._bad = 0
         if bar is not None:
@@ -27,20 +26,18 @@ class BatchProgress:
 
     def begin(self, case: Case) -> None:
         """Show that a test runs."""
-        with self._lock:
-            self._running[case.name] = None
-            self._show(0)
+        self._running[case.name] = None
+        self._show(0)
 
     def end(self, case: Case, verdict: Mapping[str, Any]) -> None:
         """Show that a test is over, and keep the name of one that did not pass on the screen."""
-        with self._lock:
-            self._running.pop(case.name, None)
-            if verdict["verdict"] != "pass":
-                self._bad += 1
-                if self._bar is not None:
-                    self._bar.console.print(f"[bold red]{verdict['verdict'].upper()}[/] ", end="")
-                    self._bar.console.print(case.name, markup=False)
-            self._show(1)
+        self._running.pop(case.name, None)
+        if verdict["verdict"] != "pass":
+            self._bad += 1
+            if self._bar is not None:
+                self._bar.console.print(f"[bold red]{verdict['verdict'].upper()}[/] ", end="")
+                self._bar.console.print(case.name, markup=False)
+        self._show(1)
 
     def _show(self, done: int) -> None:
         if self._bar is not None:

@@ -94,12 +94,20 @@ def many_report(verdicts: Sequence[Mapping[str, Any]], folder: Path | None = Non
         reasons += [Text(f"{_name(verdict)}: {reason}", style="red") for reason in _reasons(verdict)]
         if verdict["verdict"] != "pass" and verdict["command"]:
             reasons.append(Text(f"  run it again: {verdict['command']}", style="dim"))
+        for fault in verdict["faults"]:
+            if fault["outcome"] != "landed":
+                what = f"{_name(verdict)}: the fault {fault['name']} {_told(fault)}"
+                reasons.append(Text(what, style=_OUTCOME[fault["outcome"]]))
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
     style = STYLE["pass" if passed == len(verdicts) else "fail"]
     lines = [*reasons, Text(f"{passed} of {len(verdicts)} passed", style=style)]
     if folder is not None:
         lines.append(Text(f"written to {folder}; `twin report {folder}` makes a page of it", style="dim"))
     return Group(table, *lines)
+
+
+def _told(fault: Mapping[str, Any]) -> str:
+    return "did not happen" if fault["outcome"] == "not_reached" else f"had no effect: {fault['effect']}"
 
 
 def _name(verdict: Mapping[str, Any]) -> str:

@@ -77,7 +77,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         self._read = read_scenario(scenario, self._overrides)
         self._episode: Episode | None = None
         self._over = False
-        self._begin(self._read)  # to see what there is
+        self._begin(self._read, None)  # to see what there is
         assert self._episode is not None
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self._episode.step_s))}
         self.observation_space, self.action_space = self._observer.space, self._agent.action_space
@@ -105,7 +105,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         scenario = self._read
         if options:
             scenario = read_scenario(self._file, {**self._overrides, **options})
-        self._begin(scenario.model_copy(update={"seed": seed}))
+        self._begin(scenario.model_copy(update={"seed": seed}), self._screen.address)
         spaces: list[gym.Space[Any]] = [self._observer.space, self._agent.action_space]
         if spaces != [self.observation_space, self.action_space]:
             self._end()
@@ -164,6 +164,11 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
     # -- inside ----------------------------------------------------------------------------------------------
 
     @property
+    def page_url(self) -> str | None:
+        """Address of the viewer in a browser; None without one, or if it has a window of its own."""
+        return self._screen.page_url
+
+    @property
     def agent(self) -> Agent:
         """The agent of the run under way."""
         return self._agent
@@ -184,14 +189,12 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             self._episode.close()
             self._episode = None
 
-    def _begin(self, scenario: Scenario) -> None:
+    def _begin(self, scenario: Scenario, viewer: str | None) -> None:
         self._end()
         self._over = False
         with uncollected():
             prepared = self._kind.prepared(scenario, self._config)
-            self._episode = episode = Episode(
-                prepared, self._robot, ticks=self._ticks, viewer=self._screen.address
-            )
+            self._episode = episode = Episode(prepared, self._robot, ticks=self._ticks, viewer=viewer)
             try:
                 self._agent = self._kind(episode, self._config)
                 self._observer = Observer(episode, self._agent, self._wanted)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from twin.bridge.msgs import ns
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Publisher
 from twin.envs.scenario.task import Task
-from twin.errors import GymError, nearest
+from twin.errors import GymError, RecordingError, nearest
 from twin.geometry import Pose2
 from twin.runtime import OpenRun
 from twin.runtime.stacks.robot import RobotStack
@@ -105,7 +106,8 @@ class Episode:
 
     def close(self) -> None:
         """End the run as it stands. Harmless when repeated."""
-        self._opened.close()
+        with suppress(RecordingError):  # the viewer was closed before
+            self._opened.close()
 
     # -- what there is to know -------------------------------------------------------------------------------
 

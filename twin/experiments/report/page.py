@@ -20,7 +20,7 @@ _WORDS = {"pass": "PASS", "fail": "FAIL", "error": "ERROR"}
 _MOST_PHOTOS, _MOST_LINES = 6, 200
 _MOST_SHOWN = 8
 """Of many runs, those that are shown with pictures."""
-_NUMBERS = frozenset({"value", "limit", "margin", "at", "seed", "simulated", "took", "from", "lasts"})
+_NUMBERS = frozenset({"value", "limit", "margin", "at", "seed", "simulated", "took", "from", "to", "lasts"})
 """Columns that stand right."""
 _APART_S = 1.0
 """Moments that are nearer to each other are shown in one picture [s]."""
@@ -103,6 +103,8 @@ def run_section(told: Told, *, whole: bool) -> str:
         )
     if verdict["checks"]:
         parts += [f"<{below}>Verdict</{below}>", _checks(verdict["checks"])]
+    if verdict.get("faults"):
+        parts += [f"<{below}>Faults</{below}>", _faults(verdict["faults"])]
     parts.append(_again(verdict))
     if told.recording is None:
         parts.append(
@@ -197,6 +199,22 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
         rows.append(["" if check["passed"] else "bad", *cells])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
     return _table("Every check must hold for the run to pass", heads, rows)
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for fault in faults:
+        landed = fault["outcome"] == "landed"
+        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        cells = [
+            f'<td class="mark {"pass" if landed else "fail"}">{fault["outcome"].replace("_", " ")}</td>',
+            f'<th scope="row">{escape(fault["name"])}</th>',
+            *(f"<td class=number>{time}</td>" for time in times),
+            _cell(fault["effect"]),
+        ]
+        rows.append(["", *cells])
+    heads = ["", "fault", "from", "to", "effect"]
+    return _table("What was let go wrong, and what came of it where it acted", heads, rows)
 
 
 def _again(verdict: Mapping[str, Any]) -> str:

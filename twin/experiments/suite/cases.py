@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from twin.errors import Problem, ScenarioError, TwinError
@@ -26,11 +25,21 @@ class Case:
     file: Path
     name: str
     """The scenario's, with what is not the file's: `warehouse[seed=3,speed=0.2]`."""
-    overrides: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    overrides: Mapping[str, str] = field(default_factory=dict)
     """Dotted keys -> YAML text."""
     tags: tuple[str, ...] = ()
     error: str = ""
     """Why it cannot be run: what is wrong with the key `test` of the file."""
+
+    @property
+    def scenario(self) -> str:
+        """The name without what is not the file's."""
+        return self.name.partition("[")[0]
+
+    @property
+    def seed(self) -> int:
+        """The seed that is not the file's; 0 if it is."""
+        return int(self.overrides.get("seed", "0"))
 
     @property
     def command(self) -> str:
@@ -92,7 +101,7 @@ def _case(
     return Case(
         file=file,
         name=f"{name}[{','.join(own)}]" if own else name,
-        overrides=MappingProxyType(overrides),
+        overrides=overrides,
         tags=tags,
     )
 

@@ -2,18 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from queue import SimpleQueue
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
+from twin.experiments.processes import Lost, Processes
 from twin.experiments.suite.cases import Case
-from twin.experiments.suite.worker import Worker
+from twin.experiments.suite.one_run import OUTPUT, Job, broken, perform
+from twin.files.writing import make_folder
 
-Result = dict[str, Any]
+Result = Mapping[str, Any]
 """The content of a run's `verdict.json`."""
+_WAIT_S = 60.0
+
+
+class Runner:
+    """Makes runs in processes beside this one, which start with the first runs and end with the block.
+
+    What could carry over from one run to the next does not: a process that has executed code of a user makes
+    no other run, and one that died takes nothing along but its own run, which is an error with the cause.
+    """
+
+    def __init__(self, jobs: int = 1, *, time_limit_s: float | None = None) -> None:
+        """Start nothing yet.
+
+        Args:
+            jobs: How many run at once.
+            time_limit_s: Of a run [s of wall time].
+        """
+        self._processes: Processes[Job] = Processes(
+            perform,
+            jobs,
+            preload=perform.__module__,
+            time_limit_s=time_limit_s,
+            is_last=_has_executed,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes; a run that is under way has no verdict."""
+        self._processes.close()
+
+    @property
+    def is_full(self) -> bool:
+        """Whether a run that is started now would have to wait."""
+        return self._processes.free == 0
+
+    def start(self, job: Job) -> None:
+        """Start a run; raises RecordingError if its folder cannot be made."""
+        make_folder(job.folder)
+        self._processes.start(job)
+
+    def wait(self) -> list[tuple[Job, Result]]:
+        """Return runs that have ended, with their results; waits for the first of them."""
+        while True:
+            ended = self._processes.wait(_WAIT_S)
+            if ended:
+                return [(job, _told(job, result)) for job, result in ended]
+
+    def run(self, job: Job) -> Result:
+        """Make one run alone; raises RecordingError if its folder cannot be made."""
+        if job.case.error:
+            return broken(job, job.case.error)
+        self.start(job)
+        ((_, result),) = self.wait()
+        return result
 
 
 def run_all(
@@ -22,6 +84,7 @@ def run_all(
     *,
     jobs: int = 1,
     record: bool = False,
+    time_limit_s: float | None = None,
     on_begin: Callable[[Case], None] = lambda case: None,
     on_end: Callable[[Case, Result], None] = lambda case, result: None,
 ) -> Iterator[Result]:
@@ -32,32 +95,48 @@ def run_all(
         folder: In which each gets a folder, `01-<name>`.
         jobs: How many run at once.
         record: Whether to write recordings.
-        on_begin: Called when a test begins, from any thread.
-        on_end: Called when one has ended, from any thread.
+        time_limit_s: Of a run [s of wall time]; one that takes longer is an error.
+        on_begin: Called when a test begins.
+        on_end: Called when one has ended.
+
+    Raises:
+        RecordingError: A folder or verdict cannot be written.
     """
-    digits = len(str(len(cases)))
-    idle: SimpleQueue[Worker] = SimpleQueue()
+    digits = max(2, len(str(len(cases))))
+    waiting = deque(
+        Job(number=i, case=case, folder=folder / f"{i:0{digits}d}-{case.folder}", record=record)
+        for i, case in enumerate(cases, 1)
+    )
+    done: dict[int, Result] = {}
+    told = 0
+    with Runner(jobs, time_limit_s=time_limit_s) as runner:
+        while told < len(cases):
+            ended: list[tuple[Job, Result]] = []
+            while waiting and not runner.is_full:
+                job = waiting.popleft()
+                on_begin(job.case)
+                if job.case.error:
+                    ended.append((job, broken(job, job.case.error)))
+                else:
+                    runner.start(job)
+            for job, result in ended or runner.wait():
+                on_end(job.case, result)
+                done[job.number] = result
+            while told + 1 in done:
+                told += 1
+                yield done.pop(told)
 
-    def run(numbered: tuple[int, Case]) -> Result:
-        number, case = numbered
-        worker = idle.get()
-        try:
-            on_begin(case)
-            result = worker.run(case, folder / f"{number:0{max(2, digits)}d}-{case.folder}", record=record)
-            on_end(case, result)
-        finally:
-            idle.put(worker)
+
+def _has_executed(result: Any) -> bool:
+    """Whether a run has executed code of a user."""
+    return not isinstance(result, BaseException) and bool(result["plugins"])
+
+
+def _told(job: Job, result: Any) -> Result:
+    """Return the verdict of a run, also of one whose process did not come back."""
+    if not isinstance(result, Lost):
         return result
-
-    with ExitStack() as ending:
-        workers = [ending.enter_context(Worker()) for _ in range(min(jobs, len(cases)) or 1)]
-        for worker in workers:
-            idle.put(worker)
-        threads = ending.enter_context(ThreadPoolExecutor(len(workers), "twin-test"))
-        try:
-            yield from threads.map(run, enumerate(cases, 1))
-        except BaseException:
-            for worker in workers:
-                worker.stop()
-            threads.shutdown(cancel_futures=True)
-            raise
+    output = job.folder / OUTPUT
+    printed = output.read_text(encoding="utf-8", errors="replace").strip() if output.exists() else ""
+    last = f": {printed.splitlines()[-1]} (all of it: {output})" if printed else ""
+    return broken(job, f"{result.reason}{last}")

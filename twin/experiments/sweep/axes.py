@@ -154,7 +154,7 @@ def _hypercube(axes: Sequence[Axis], samples: int) -> Iterator[dict[str, str]]:
     import numpy as np
     from scipy.stats import qmc
 
-    unit = qmc.LatinHypercube(len(axes), rng=np.random.default_rng(0)).random(samples)
+    unit = qmc.LatinHypercube(len(axes), rng=np.random.Generator(np.random.Philox(0))).random(samples)
     for row in qmc.scale(unit, [axis.low for axis in axes], [axis.high for axis in axes]):
         yield {
             axis.key: f"{value:.{_DIGITS}g}{f' {axis.unit}' if axis.unit else ''}"

@@ -1,10 +1,10 @@
 """The folder of a sweep's results: it is the checkpoint, and where several processes or machines meet.
 
-sweep.json         which sweep this is
-runs/KEY/          a run that is over: its verdict, of some its recording; appears whole
-locks/KEY          who is at a run now
-results.jsonl      a line per run, as they end
-results.parquet, costs.parquet, summary.json, report.html   when all runs are there
+- `sweep.json`: which sweep this is.
+- `runs/KEY/`: a run that is over, its verdict, of some its recording; it appears whole.
+- `locks/KEY`: who is at a run now.
+- `results.jsonl`: a line per run, as they end. `output.log`: what they print.
+- `results.parquet`, `costs.parquet`, `summary.json`, `report.html`: written when all runs are there.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from twin.files.writing import make_folder, write_whole
 from twin.scenario.verdict import VERDICT
 
 SWEEP = "sweep.json"
+OUTPUT = "output.log"
 _TOUCHED_S = 20.0
 """Locks are touched so often [s] ..."""
 _STALE_S = 300.0
@@ -43,14 +44,14 @@ class ResultFolder:
         """
         self.path, self._plan = make_folder(path), plan
         self._runs, self._locks = path / "runs", path / "locks"
+        self._workshop = path.resolve() / "workshop" / f"{socket.gethostname()}-{os.getpid()}"
         self._held: set[str] = set()
         self._touched = time.monotonic()
         told = {
             "sweep": plan.identity,
             "scenario": plan.name,
-            "set": {axis.key: axis.values or (axis.low, axis.high) for axis in plan.axes},
+            "set": {axis.key: [*(axis.values or (axis.low, axis.high))] for axis in plan.axes},
             "points": len(plan.points),
-            "seeds": len(plan.seeds),
             "twin": version("twin"),
         }
         there = self._there()
@@ -82,7 +83,7 @@ class ResultFolder:
             name=self._plan.name,
             overrides=self._plan.overrides(run),
             folder=self._runs.resolve() / run.key,
-            workshop=self.path.resolve() / "workshop",
+            workshop=self._workshop,
             record=record,
         )
 
@@ -93,6 +94,14 @@ class ResultFolder:
         except (OSError, ValueError):
             return None
         return found if isinstance(found, dict) and found.get("seed") == run.seed else None
+
+    def forget(self, run: PlannedRun) -> None:
+        """Remove what has become of a run.
+
+        Raises:
+            OSError: It cannot be removed.
+        """
+        shutil.rmtree(self._runs / run.key)
 
     def known(self) -> set[str]:
         """Return the keys of all runs that seem to be over."""
@@ -109,16 +118,19 @@ class ResultFolder:
             OSError: The folder cannot be written.
         """
         lock = self._locks / run.key
-        for _ in range(2):
+        for _ in range(3):
             try:
                 descriptor = os.open(lock, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+            except FileNotFoundError:  # tidied by a process that needs nothing any more
+                self._locks.mkdir(exist_ok=True)
+                continue
             except FileExistsError:
                 if not _is_stale(lock):
                     return False
                 lock.unlink(missing_ok=True)
                 continue
             with os.fdopen(descriptor, "w") as stream:
-                stream.write(f"{os.getpid()} {socket.gethostname()}")
+                stream.write(f"{socket.gethostname()}-{os.getpid()}")
             self._held.add(run.key)
             return True
         return False
@@ -138,15 +150,24 @@ class ResultFolder:
 
     def close(self) -> None:
         """Let go of all runs."""
+        shutil.rmtree(self._workshop, ignore_errors=True)
         for key in self._held:
             (self._locks / key).unlink(missing_ok=True)
         self._held.clear()
 
     def tidy(self) -> None:
-        """Remove what killed processes have left, when nobody is at a run any more."""
-        shutil.rmtree(self.path / "workshop", ignore_errors=True)
+        """Remove what killed processes of this machine have left, and folders that are empty now."""
+        for left in [*self._workshop.parent.glob("*"), *self._locks.glob("*")]:
+            if left.is_dir() and not _lives(*left.name.rsplit("-", 1)):
+                shutil.rmtree(left, ignore_errors=True)
+            elif left.is_file() and _is_stale(left):
+                left.unlink(missing_ok=True)
         with suppress(OSError):
-            self._locks.rmdir()
+            if not (self.path / OUTPUT).stat().st_size:
+                (self.path / OUTPUT).unlink()
+        for folder in (self._workshop, self._workshop.parent, self._locks):
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def _is_stale(lock: Path) -> bool:
@@ -154,16 +175,18 @@ def _is_stale(lock: Path) -> bool:
         age, text = time.time() - lock.stat().st_mtime, lock.read_text()
     except OSError:
         return False  # released meanwhile; it is asked for again
-    pid, _, host = text.partition(" ")
-    if host != socket.gethostname() or not pid.isdecimal():  # or just being written
+    host, _, pid = text.rpartition("-")
+    if host != socket.gethostname():  # or just being written
         return age > _STALE_S
-    return not _lives(int(pid))
+    return not _lives(host, pid)
 
 
-def _lives(pid: int) -> bool:
+def _lives(host: str, pid: str = "") -> bool:
+    """Return whether a process may be alive; it is, if it is not of this machine."""
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        if host == socket.gethostname():
+            os.kill(int(pid), 0)
+    except (ProcessLookupError, ValueError):
         return False
     except OSError:
         pass  # somebody else's
@@ -171,10 +194,10 @@ def _lives(pid: int) -> bool:
 
 
 def _difference(there: dict[str, Any], told: dict[str, Any]) -> str:
-    for key, what in (("scenario", "of"), ("set", "over"), ("points", "points:"), ("seeds", "seeds:")):
+    for key, what in (("scenario", "of"), ("set", "over"), ("points", "points:")):
         if there.get(key) != told[key]:
             was = ", ".join(there[key]) or "seeds alone" if key == "set" and key in there else there.get(key)
             return f"{what} {was}"
     if there.get("twin") != told["twin"]:
         return f"made by twin {there.get('twin')}"
-    return "its scenario, a file that it names or its seeds have changed since"
+    return "its scenario, or a file that it names, has changed since"

@@ -13,7 +13,6 @@ from typing import Any
 
 from twin.errors import RecordingError, TwinError
 from twin.plugins import execution
-from twin.runtime.open_run import run
 from twin.scenario.schema import load
 from twin.scenario.verdict import VERDICT, Verdict
 
@@ -43,7 +42,7 @@ def perform(job: Job) -> dict[str, Any]:
     """
     made = None
     try:
-        job.workshop.mkdir(exist_ok=True)
+        job.workshop.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(prefix=f"{job.folder.name}-", dir=job.workshop))
         text = _verdict(job, made).to_json()
         put(made, text, job.folder)
@@ -78,6 +77,8 @@ def put(made: Path, verdict: str, folder: Path) -> None:
 
 
 def _verdict(job: Job, made: Path) -> Verdict:
+    from twin.runtime.open_run import run  # who plans and waits does without
+
     try:
         with execution():
             scenario = load(job.scenario, job.overrides, execute=True)
@@ -94,7 +95,7 @@ def _verdict(job: Job, made: Path) -> Verdict:
 def lost(job: Job, reason: str) -> dict[str, Any]:
     """Put the folder of a run that gave no result, and return its verdict."""
     verdict = Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason).to_json()
-    job.workshop.mkdir(exist_ok=True)
+    job.workshop.mkdir(parents=True, exist_ok=True)
     made = Path(tempfile.mkdtemp(dir=job.workshop))
     put(made, verdict, job.folder)
     result: dict[str, Any] = json.loads(verdict)

@@ -25,13 +25,14 @@ h1 { font-size: 1.6rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2.2rem 0 .6
 table { border-collapse: collapse; font-variant-numeric: tabular-nums } .wide { overflow-x: auto }
 th, td { padding: .25rem .8rem; border-bottom: 1px solid #e4e4e4; text-align: right; white-space: nowrap }
 th { font-weight: 600; color: #555 } td.text, th.text { text-align: left; white-space: normal }
-.bar { display: inline-block; width: 9rem; height: .7rem; background: #eee; position: relative }
+td.few { text-align: left; color: #c8372d }
+.bar { display: inline-block; width: 7rem; height: .7rem; background: #eee; position: relative }
 .bar i { position: absolute; top: 0; bottom: 0; background: #9cb8d3 }
 .bar b { position: absolute; top: -.15rem; bottom: -.15rem; width: 3px; background: #1f4e79 }
 .bar s { position: absolute; top: -.25rem; bottom: -.25rem; width: 1px; background: #c8372d }
 code { background: #f4f4f4; padding: .1rem .35rem; border-radius: .2rem; font-size: .85rem; user-select: all }
 svg { max-width: 100%; height: auto }
-figure { margin: 0; display: inline-block; max-width: 30rem; vertical-align: top }
+figure { margin: 0; display: inline-block; width: 22rem; vertical-align: top }
 figcaption { font-size: .85rem; color: #555 } .dim { color: #777 }
 """
 
@@ -77,24 +78,26 @@ def _points(summary: SweepSummary) -> Iterable[str]:
     keys = list(points[0].values)
     checks = list(dict.fromkeys(name for point in points for name in point.medians))
     sure = summary.claim["confidence"] if summary.claim else 0.95
-    bounds = "bounds of the pass rate, each" if summary.claim else "interval of the pass rate"
     yield "<h2>Pass rates</h2><div class=wide><table><tr><th></th>"
     yield from (f"<th title='{escape(key)}'>{escape(name)}</th>" for key, name in short_names(keys).items())
-    yield f"<th>runs</th><th>passed</th><th></th><th>{bounds} at {100 * sure:g} %</th>"
+    yield f"<th>runs</th><th>passed</th><th></th><th>{100 * sure:g} % interval</th>"
+    yield "<th class=text>failed</th>"
     yield from (f"<th>{escape(name)}</th>" for name in checks)
-    yield "<th class=text>failed</th></tr>"
+    yield "</tr>"
     for point in points:
         yield f"<tr><td class=text>{_outcome(point.outcome)}</td>"
         yield from (f"<td>{escape(value)}</td>" for value in point.values.values())
         rate = f"{100 * point.passed / point.runs:.4g} %"
         yield f"<td>{point.runs}</td><td>{rate}</td><td>{_bar(point, summary)}</td>"
         yield f"<td>{100 * point.least:.1f} to {100 * point.most:.1f} %</td>"
+        failures = "<br>".join(escape(f"{name} {count}") for name, count in point.failures.items())
+        yield f"<td class=few>{failures}</td>"
         yield from (f"<td>{_number(point.medians.get(name))}</td>" for name in checks)
-        failures = ", ".join(f"{name} {count}" for name, count in point.failures.items())
-        yield f"<td class=text>{escape(failures)}</td></tr>"
+        yield "</tr>"
     yield "</table></div>"
-    if checks:
-        yield "<p class=dim>Columns with names of checks: medians of what they measured.</p>"
+    what = "bounds of the pass rate that hold at any time, each" if summary.claim else "Clopper-Pearson,"
+    medians = " Columns with names of checks: medians of what they measured." if checks else ""
+    yield f"<p class=dim>Interval: {what} at {100 * sure:g} %.{medians}</p>"
     if len(summary.points) > len(points):
         shown = f"The first {len(points)} of {len(summary.points)} points"
         yield f"<p class=dim>{shown}; all are in summary.json.</p>"

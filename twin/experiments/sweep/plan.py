@@ -59,8 +59,8 @@ class Plan:
 
     @property
     def identity(self) -> str:
-        """The hash that tells this sweep from others; how its runs are judged is no part of it."""
-        told = [self.fingerprints, [list(point.items()) for point in self.points], self.seeds]
+        """The hash that tells this sweep from others; with more seeds or another claim it is the same."""
+        told = [self.fingerprints, [list(point.items()) for point in self.points]]
         return hashlib.sha256(json.dumps([*told, version("twin")]).encode()).hexdigest()
 
     def run(self, point: int, turn: int) -> PlannedRun:
@@ -105,20 +105,19 @@ def make_plan(
         TwinError: With every problem of the scenario, such as keys and values that cannot be.
     """
     file, found = resolve(scenario).resolve(), points(axes, samples)
-    problems: dict[str, Problem] = {}
+    refused = _Refused()
     fingerprints = []
     with execution():
         for overrides in found:
+            if refused.knows(overrides):
+                continue
             try:
                 resolved = load(file, overrides, execute=True)
                 fingerprints.append(scenario_fingerprint(resolved))
             except TwinError as fault:
-                for (
-                    problem
-                ) in fault.problems:  # of a key that does not exist once, not for each of its values
-                    problems.setdefault(str(problem).rpartition("unknown key")[2], problem)
-    if problems:
-        raise ScenarioError(problems.values())
+                refused.add(fault.problems, overrides)
+    if refused.problems:
+        raise ScenarioError(refused.problems.values())
     seeds = (resolved.seed,) if seeds is None else tuple(seeds)
     if len(found) * len(seeds) > _MOST_RUNS:
         raise ScenarioError(f"{len(found) * len(seeds)} runs; a sweep has at most {_MOST_RUNS}")
@@ -132,6 +131,31 @@ def make_plan(
         claim=_claim(resolved.pass_rate, pass_rate, confidence),
         recorded=resolved.recording.enabled,
     )
+
+
+class _Refused:
+    """What is wrong with points: told once, and looked for no more often than necessary."""
+
+    def __init__(self) -> None:
+        self.problems: dict[str, Problem] = {}
+        """By what is said, without the value it is said of."""
+        self._values = set[tuple[str, str]]()
+        self._keys = set[str]()
+
+    def knows(self, overrides: Mapping[str, str]) -> bool:
+        return any(item in self._values or item[0] in self._keys for item in overrides.items())
+
+    def add(self, problems: Sequence[Problem], overrides: Mapping[str, str]) -> None:
+        for problem in problems:
+            said = problem.message
+            for key, value in overrides.items():
+                if said.startswith(f"override {key}={value}: "):
+                    said = said.removeprefix(f"override {key}={value}: ")
+                    self._values.add((key, value))
+                    if said in self.problems or said.startswith("unknown key"):
+                        self._keys.add(key)
+                    break
+            self.problems.setdefault(said, problem)
 
 
 def _claim(own: PassRate | None, least: float | None, confidence: float | None) -> PassRate | None:

@@ -27,6 +27,8 @@ _BINS = 10
 _MANY = 3000
 """More points than these are drawn as pixels."""
 _MOST_CHECKS = 6
+_TICKS = 7
+"""Fewer values are named on their axis."""
 
 
 def _figure(columns: int, rows: int, height: float = _HEIGHT) -> tuple[Figure, list[Axes]]:
@@ -95,6 +97,8 @@ def _over(table: Table, column: Column, label: str, checks: Sequence[str]) -> Fi
         ax.set_xlabel(label)
         if names is not None:
             ax.set_xticks(range(len(names)), names, rotation=20 if len(names) > 4 else 0)
+        elif len(np.unique(places)) <= _TICKS:
+            ax.set_xticks(np.unique(places), [f"{place:g}" for place in np.unique(places)])
     _rates(axes[0], places, verdicts == "pass")
     for ax, name in zip(axes[1:], checks, strict=False):
         values = _numbers(table[f"check.{name}"])
@@ -139,6 +143,9 @@ def _rates(ax: Axes, places: np.ndarray[Any, Any], passed: np.ndarray[Any, Any])
 
 def _both(table: Table, keys: tuple[str, str], names: tuple[str, str]) -> Figure:
     """Draw the pass rate over two parameters as coloured fields."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colours = LinearSegmentedColormap.from_list("rates", [_BAD, "#f3ead2", _GOOD])
     figure, (ax,) = _figure(1, 1, 3.2)
     texts = [list(dict.fromkeys(table[key])) for key in keys]
     total = np.zeros((len(texts[1]), len(texts[0])))
@@ -147,7 +154,7 @@ def _both(table: Table, keys: tuple[str, str], names: tuple[str, str]) -> Figure
         total[texts[1].index(y), texts[0].index(x)] += 1
         good[texts[1].index(y), texts[0].index(x)] += verdict == "pass"
     with np.errstate(invalid="ignore"):
-        image = ax.imshow(100 * good / total, cmap="RdYlGn", vmin=0, vmax=100, origin="lower", aspect="auto")
+        image = ax.imshow(100 * good / total, cmap=colours, vmin=0, vmax=100, origin="lower", aspect="auto")
     for axis, name, values in zip((ax.xaxis, ax.yaxis), names, texts, strict=True):
         axis.set_ticks(range(len(values)), [f"{v:g}" if isinstance(v, float) else str(v) for v in values])
         axis.set_label_text(name)

@@ -9,6 +9,7 @@ import json
 import logging
 import os
 import shutil
+import socket
 import tempfile
 import time
 from pathlib import Path
@@ -19,9 +20,12 @@ from twin.experiments.processes import Lost
 from twin.experiments.sweep.one_run import Job, carried, put
 from twin.scenario.verdict import VERDICT
 
+_REACHED_S = 10.0
+"""So long a head may take to answer [s]."""
+
 
 class RayCluster:
-    """As many runs at a time as there are cores; the machines have the files where they are here."""
+    """As many runs at a time as there are cores; all machines need the scenario where it is here."""
 
     def __init__(self, address: str, most: int | None = None, *, time_limit_s: float | None = None) -> None:
         """Join.
@@ -44,6 +48,7 @@ class RayCluster:
             ) from None
         self._ray, self._time_limit_s = ray, time_limit_s
         try:
+            _reach(address)
             ray.init(
                 address=None if address == "local" else address,
                 include_dashboard=False if address == "local" else None,
@@ -107,9 +112,17 @@ class RayCluster:
         return job, _written(job, files)
 
 
+def _reach(address: str) -> None:
+    """Raise OSError if nobody listens there: Ray itself would wait for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if colon:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=_REACHED_S):
+            pass
+
+
 def _written(job: Job, files: dict[str, bytes]) -> dict[str, Any]:
     try:
-        job.workshop.mkdir(exist_ok=True)
+        job.workshop.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=job.workshop))
         try:
             for name, content in files.items():

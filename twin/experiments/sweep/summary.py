@@ -116,14 +116,13 @@ def command(plan: Plan, run: PlannedRun) -> str:
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Return the shortest ends of dotted keys that differ from each other: `steps.0.linear`, `linear`."""
+    """Return the shortest ends of dotted keys that differ from each other and begin with a word."""
     names = {}
     for key in keys:
         parts = key.split(".")
         ends = [".".join(parts[-count:]) for count in range(1, len(parts) + 1)]
-        names[key] = next(
-            end for end in ends if sum(f".{other}".endswith(f".{end}") for other in keys) == 1 or end == key
-        )
+        alone = (end for end in ends if sum(f".{other}".endswith(f".{end}") for other in keys) == 1)
+        names[key] = next((end for end in alone if not end[0].isdecimal()), key)
     return names
 
 

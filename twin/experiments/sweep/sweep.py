@@ -11,7 +11,7 @@ from typing import Literal
 
 from twin.errors import RecordingError
 from twin.experiments.processes import Processes
-from twin.experiments.sweep.folder import ResultFolder
+from twin.experiments.sweep.folder import OUTPUT, ResultFolder
 from twin.experiments.sweep.judging import PointJudge
 from twin.experiments.sweep.making import Backend, Making, RunVerdict
 from twin.experiments.sweep.one_run import perform
@@ -22,6 +22,7 @@ from twin.experiments.sweep.table import make_table, write_parquet
 from twin.files.writing import write_whole
 
 Recordings = Literal["none", "few", "failures", "all"]
+_PRELOADED = (perform.__module__, "twin.runtime.open_run")
 FEW = 8
 """So many failing runs at most are recorded if nothing else is asked for, the first of each point."""
 _LOOK_S = 5.0
@@ -54,8 +55,8 @@ def local(processes: int, folder: Path, time_limit_s: float | None = None) -> Ba
         folder: Of the results; takes what they print.
         time_limit_s: Of one run [s of wall time].
     """
-    log = folder / "output.log"
-    return Processes(perform, processes, preload=perform.__module__, time_limit_s=time_limit_s, log=log)
+    log = folder / OUTPUT
+    return Processes(perform, processes, preload=_PRELOADED, time_limit_s=time_limit_s, log=log)
 
 
 def sweep(
@@ -65,6 +66,7 @@ def sweep(
     *,
     shard: tuple[int, int] = (1, 1),
     record: Recordings = "few",
+    retry_errors: bool = False,
     page: bool = True,
     progress: Callable[[SweepProgress], None] = lambda _: None,
 ) -> SweepResult:
@@ -76,6 +78,7 @@ def sweep(
         backend: Who makes the runs; it is closed in the end.
         shard: Which share of the runs is this process's, of how many: from (1, n) to (n, n).
         record: Which runs get a recording. Those that were made without one are made again.
+        retry_errors: Whether runs that ended in an error before are made again.
         page: Whether there is to be a `report.html`.
         progress: Called when runs have ended.
 
@@ -85,7 +88,8 @@ def sweep(
     try:
         folder = ResultFolder(path, plan)
         try:
-            result = _Sweep(plan, folder, backend, shard, record, progress).run()
+            under_way = _Sweep(plan, folder, backend, shard, record, progress)
+            result = under_way.run(retry_errors=retry_errors)
             if result.complete:
                 _write(result, page=page)
             return result
@@ -131,12 +135,15 @@ class _Sweep:
         self.looked = self.told = time.monotonic()
         self.different: list[PlannedRun] = []
 
-    def run(self) -> SweepResult:
+    def run(self, *, retry_errors: bool) -> SweepResult:
         share, shares = self.shard
         known = self.folder.known()
         mine, self.others = list[PlannedRun](), list[PlannedRun]()
         for index, run in enumerate(self.plan.in_turn()):
             verdict = self.folder.verdict(run) if run.key in known else None
+            if retry_errors and verdict is not None and verdict["verdict"] == "error":
+                self.folder.forget(run)
+                verdict = None
             if verdict is not None:
                 self._count(run, verdict)
             elif index % shares == share - 1:

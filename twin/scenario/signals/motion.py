@@ -109,7 +109,7 @@ class _Derivative(RobotSignal):
         for then, before in self._last:
             value = (value - before) / (time_s - then)
             now.append((time_s, value))
-        self._last = now[: self.order + 1]
+        self._last = now[: self.order]
         return float(np.hypot(*value)) if len(now) > self.order else None
 
 

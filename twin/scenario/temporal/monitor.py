@@ -170,7 +170,7 @@ class _Open(NamedTuple):
 
 
 class _Until(_Node):
-    """`first` until `then` within `span` [ns], at the least: what comes soon after may count, too."""
+    """`first` until `then`, which must come within `span` [ns]."""
 
     def __init__(self, first: _Node, then: _Node, span: int, asked: Window) -> None:
         super().__init__(asked)
@@ -280,21 +280,17 @@ class Monitor:
                 return self._until(first, then, window, asked)
 
     def _until(self, first: Formula, then: Formula, window: Window, asked: Window) -> _Node:
-        """Make an until of a window of three: `first` before it, `then` in it, both from its begin on."""
+        """Make an until of a window of two parts: `first` before the window, and an until at its begin."""
         low, high = window.low, window.high
         span = FOREVER if high == FOREVER else high - low
         inner = _later(asked, Window(low, low))
         reach = _later(inner, Window(0, span))
         made: _Node = _Until(self._made(first, reach), self._made(then, reach), span, inner)
-        if low:
-            made = _Always(made, Window(low, low), asked)
-        parts = [made]
-        if low:
-            before = stl.Always(first, Window(0, low - 1))
-            parts.append(self._made(before, asked))
-        if high != FOREVER:
-            parts.append(self._made(stl.eventually(then, window), asked))
-        return parts[0] if len(parts) == 1 else _And(parts)
+        if not low:
+            return made
+        made = _Always(made, Window(low, low), asked)
+        before = self._made(stl.Always(first, Window(0, low - 1)), asked)
+        return _And([made, before])
 
 
 def _aligned(nodes: list[_Node]) -> list[tuple[int, int, list[Margin]]]:

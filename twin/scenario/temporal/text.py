@@ -90,6 +90,7 @@ class _Parser:
         while at < end:
             match = _TOKEN.match(self._text, at)
             if match is None:
+                at = end - len(self._text[at:end].lstrip())
                 raise self._wrong(at, "what stands there begins no signal, number or operator")
             kind = str(match.lastgroup)
             quoted = kind in ("single", "double")
