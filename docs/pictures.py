@@ -1,4 +1,4 @@
-"""Makes the pictures: of robots and an environment by `python docs/pictures.py`, README's of a recording.
+"""Makes the pictures: of robots and an environment without arguments, README's of a recording as argument.
 
 MuJoCo draws them without a display (EGL), the Rerun viewer the recording without a window (Vulkan).
 """

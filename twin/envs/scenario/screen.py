@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -41,11 +39,10 @@ class Screen:
             RecordingError: There is no viewer, or it does not start.
         """
         if self._mode == "human" and self._address is None:
+            from twin.recording.player import has_display
             from twin.recording.view.live_viewer import live_viewer
 
-            shown = ("DISPLAY", "WAYLAND_DISPLAY")
-            web = sys.platform.startswith("linux") and not any(os.environ.get(name) for name in shown)
-            viewer = self._held.enter_context(live_viewer(web=web))
+            viewer = self._held.enter_context(live_viewer(web=not has_display()))
             self._address, self.page_url = viewer.data_url, viewer.page_url
         return self._address
 
@@ -57,9 +54,9 @@ class Screen:
         """
         if self._mode != "rgb_array":
             return None
-        world = episode.world
         from twin.envs.pictures import Camera, Mark, Placed
 
+        world = episode.world
         if self._camera is None or self._of is not world:
             self._close_camera()
             self._camera, self._of = Camera(world.model_to_see(), *self._size), world
