@@ -6,14 +6,16 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import twin
+from tests.experiments.conftest import ARCS
 from twin.errors import RecordingError
-from twin.experiments.diff import Difference, Side, compare, made_again, of_path
+from twin.experiments.diff import Difference, Divergence, Side, compare, made_again, of_path
 from twin.experiments.diff.changes import since
 from twin.experiments.diff.difference import PHYSICS
 from twin.recording.hashes import HASHES
@@ -24,18 +26,22 @@ from twin.scenario.schema import load
 Make = Callable[..., Side]
 
 
-@pytest.fixture
-def make(arcs: Path, tmp_path: Path) -> Make:
-    """Return what runs the scenario into a folder, of which only the hashes are left."""
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Make:
+    """Return what runs the scenario, once for each set of overrides; only the hashes are left of a run."""
+    place = tmp_path_factory.mktemp("runs")
+    file = place / "arcs.yaml"
+    file.write_text(ARCS, encoding="utf-8")
 
+    @cache
     def run(**overrides: Any) -> Side:
-        folder = tmp_path / f"run{len(list(tmp_path.glob('run*')))}"
+        folder = place / f"run{len(list(place.iterdir()))}"
         twin.run(
-            arcs, overrides={key.replace("__", "."): each for key, each in overrides.items()}, out=folder
+            file, overrides={key.replace("__", "."): each for key, each in overrides.items()}, out=folder
         )
-        for file in folder.iterdir():
-            if file.name != HASHES:
-                file.unlink()
+        for left in folder.iterdir():
+            if left.name != HASHES:
+                left.unlink()
         return of_path(folder)
 
     return run
@@ -67,9 +73,9 @@ def brute_force(file: Path, overrides: dict[str, str]) -> tuple[int, int, str]:
     raise AssertionError("no difference")
 
 
-def test_a_millionth_in_a_command_is_located_in_runs_that_are_over(arcs: Path, make: Make) -> None:
+def test_a_millionth_in_a_command_is_located_in_runs_that_are_over(arcs: Path, kept: Make) -> None:
     planted = {"mission.steps.1.linear": "0.200001"}
-    a, b = make(), make(mission__steps__1__linear=0.200001)
+    a, b = kept(), kept(mission__steps__1__linear=0.200001)
     tick, time_ns, topic = brute_force(arcs, planted)
     arcs.unlink()  # last week's file is gone
 
@@ -86,37 +92,36 @@ def test_a_millionth_in_a_command_is_located_in_runs_that_are_over(arcs: Path, m
     assert times == sorted(times)
 
 
-def test_the_first_physics_step_that_differs_is_named(make: Make) -> None:
-    found = compare(make(), make(robots__0__pose={"x": 1e-6}))
+def test_the_first_physics_step_that_differs_is_named(kept: Make) -> None:
+    found = compare(kept(), kept(robots__0__pose__x=1e-6))
     physics = next(one for one in found.first if one.topic == PHYSICS)
     assert (physics.type, physics.tick, physics.time_ns) == ("step 1", 1, 2_000_000)
     assert (physics.field, physics.a) == ("x of diff_bot/base_footprint", pytest.approx(0.0, abs=1e-6))
     assert physics.change == pytest.approx(1e-6, rel=1e-3)
 
 
-def test_the_seed_shows_first_where_noise_is_published(arcs: Path, make: Make) -> None:
-    found = compare(make(), make(seed=2))
-    first = found.first[0]
-    assert (first.tick, first.time_ns, first.topic) == brute_force(arcs, {"seed": "2"})
-    assert all(one.topic != PHYSICS for one in found.first)  # driven open loop: noise moves nothing
+def test_the_seed_shows_where_noise_is_published_and_nowhere_else(kept: Make) -> None:
+    found = compare(kept(), kept(seed=2))
+    assert found.first[0].topic == "/imu"  # the first that is noisy
+    assert all(one.topic not in (PHYSICS, "/cmd_vel") for one in found.first)  # driven open loop
 
 
-def test_the_same_run_is_the_same_wherever_it_comes_from(arcs: Path, make: Make) -> None:
-    kept = make()
-    for other in (make(), of_path(arcs), of_path(Path(kept.name) / HASHES), made_again(kept)):
-        found = compare(kept, other)
+def test_the_same_run_is_the_same_wherever_it_comes_from(arcs: Path, kept: Make) -> None:
+    first = kept()
+    for other in (of_path(arcs), of_path(Path(first.name) / HASHES), made_again(first)):
+        found = compare(first, other)
         assert (found.same, found.first, found.second) == (True, (), None)
         assert found.digest_a == found.digest_b is not None
 
 
-def test_what_changes_nothing_is_told_as_the_same_run(make: Make) -> None:
-    found = compare(make(), make(description="other words"))
+def test_what_changes_nothing_is_told_as_the_same_run(kept: Make) -> None:
+    found = compare(kept(), kept(description="other words"))
     assert found.same
     assert [change.key for change in found.changes] == ["description"]
 
 
-def test_a_run_that_ends_earlier_lacks_messages(make: Make) -> None:
-    a, b = make(), make(duration="2.5 s")
+def test_a_run_that_ends_earlier_lacks_messages(kept: Make) -> None:
+    a, b = kept(), kept(duration="2.5 s")
     found = compare(a, b)
     first = found.first[0]
     assert (first.field, first.a, first.b) == ("", "message", None)
@@ -125,12 +130,12 @@ def test_a_run_that_ends_earlier_lacks_messages(make: Make) -> None:
 
 
 def test_without_the_files_of_then_the_hashes_still_name_second_and_topics(
-    tmp_path: Path, make: Make
+    tmp_path: Path, kept: Make
 ) -> None:
     robot = tmp_path / "robot.urdf.xacro"
     shipped = twin.load_robot("diff_bot").description.source
     shutil.copy(shipped, robot)
-    a = make(robots__0__model="./robot.urdf.xacro", robots__0__name="diff_bot")
+    a = kept(robots__0__model=str(robot), robots__0__name="diff_bot")
     changed = robot.read_text("utf-8").replace('"wheel_radius" value="0.05"', '"wheel_radius" value="0.051"')
     assert changed != robot.read_text("utf-8")
     robot.write_text(changed, encoding="utf-8")
@@ -163,18 +168,18 @@ def test_a_script_that_took_part_is_not_kept(arcs: Path, tmp_path: Path) -> None
     ("change", "why"),
     [({"clock": "free"}, "other processes took part"), ({"scenario": {}}, "was not read from a file")],
 )
-def test_what_is_not_known_whole_is_not_made_again(make: Make, change: dict[str, Any], why: str) -> None:
-    a = make()
+def test_what_is_not_known_whole_is_not_made_again(kept: Make, change: dict[str, Any], why: str) -> None:
+    a = kept()
     unknown = replace(a, run=replace(a.run, provenance=replace(a.run.provenance, **change)))
     with pytest.raises(RecordingError, match=why):
         made_again(unknown)
-    found = compare(unknown, make(seed=2))
+    found = compare(unknown, kept(seed=2))
     assert found.second == 0
     assert why in found.notes[0]
 
 
-def test_other_versions_are_named(make: Make) -> None:
-    made = make().run.provenance
+def test_other_versions_are_named(kept: Make) -> None:
+    made = kept().run.provenance
     older = replace(made, versions={**made.versions, "mujoco": "3.1.4"}, cpu="an abacus")
     assert list(since(made)) == []
     assert [text.partition(" (")[0] for text in since(older)] == ["version of mujoco", "cpu"]
@@ -192,10 +197,11 @@ def test_a_folder_without_is_told(tmp_path: Path) -> None:
         of_path(tmp_path)
 
 
-def test_json_has_all_that_was_found(make: Make) -> None:
-    found: Difference = compare(make(), make(robots__0__pose={"x": 1e-6}))
+def test_json_has_all_that_was_found() -> None:
+    one = Divergence(topic="/a", type="b", time_ns=1, tick=1, field="x", a=1.0, b=3.0)
+    found = Difference(a="a", b="b", digest_a="1", digest_b="2", same=False, first=(one,))
     values = json.loads(json.dumps(found.to_dict()))
-    assert values["first"][0]["change"] == found.first[0].change
+    assert values["first"][0]["change"] == 2.0
     assert values["same"] is False
 
 

@@ -34,8 +34,9 @@ def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None
     first: list[Divergence] = []
     notes: list[str] = []
     if found.first is not None:
-        one, other = (_replay(side, found, progress, notes) for side in (a, b))
-        first = list(_divergences(found, one, other))
+        one = _replay(a, found, progress, notes)
+        if one.unlike != 0:  # else there is nothing to compare with
+            first = list(_divergences(found, one, _replay(b, found, progress, notes)))
     elif not same:
         notes.append("the digests differ though no short hash does: one in four thousand million")
     return Difference(

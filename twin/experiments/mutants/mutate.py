@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from twin.errors import PluginError, ScenarioError
 from twin.experiments.mutants.registry import MUTANTS
-from twin.experiments.mutants.trial import FAULT, NOT_HERE, MutantTrial
+from twin.experiments.mutants.trial import DECIDED, FAULT, NOT_HERE, MutantTrial
 from twin.experiments.trials import Trial, Trials
 from twin.scenario.source import Source
 
@@ -92,6 +92,8 @@ def _outcome(mutant: str, says: str, verdict: Mapping[str, Any], digest: str) ->
     if verdict["error"] is not None:
         return Outcome(mutant=mutant, says=says, fate="caught", why=verdict["error"])
     failed = [check for check in verdict["checks"] if not check["passed"]]
+    # Of a run that was ended early the others only lack what would have come.
+    failed = [check for check in failed if check["name"] in verdict[DECIDED]] or failed
     if failed:
         by = tuple(check["name"] for check in failed)
         first = failed[0]

@@ -23,6 +23,8 @@ from twin.sim.world import World
 
 NOT_HERE = "not_here"
 """Key of the answer for a mutant that has nothing to spoil: what the scenario lacks."""
+DECIDED = "decided"
+"""Key of the answer for the names of the checks that ended the run; empty: it went on to its end."""
 FAULT = "fault"
 """Key of the answer for a mutant that is wrong itself: what and where."""
 
@@ -40,11 +42,12 @@ class MutantTrial(Trial):
         return json.dumps([super().key, self.mutant, hash_of(self.mutant.rpartition(":")[0])])
 
     def perform(self) -> dict[str, Any]:
-        """Run, and return the content of the verdict, or `NOT_HERE`, or `FAULT`."""
+        """Run until a check fails, and return the content of the verdict, or `NOT_HERE`, or `FAULT`."""
+        decided: list[str] = []
         plugin = MUTANTS.find(self.mutant)
         try:
             with execution():
-                verdict = self._run(plugin.create())
+                verdict = self._run(plugin.create(), decided)
         except NotHere as fault:
             return {NOT_HERE: str(fault)}
         except PluginError as fault:
@@ -54,11 +57,12 @@ class MutantTrial(Trial):
         except TwinError as fault:
             verdict = self.broken(str(fault))
         values: dict[str, Any] = json.loads(verdict.to_json())
-        return values
+        return values | {DECIDED: decided}
 
-    def _run(self, mutant: Mutant) -> Verdict:
+    def _run(self, mutant: Mutant, decided: list[str]) -> Verdict:
         data = deepcopy(dict(self.source.data))
         mutant.edit(data)
+        data.setdefault("early_stop", "failed")  # one that holds to its end is the run that it was without
         try:
             scenario = load_again(Source(self.source.file, data), execute=True)
         except ScenarioError as fault:
@@ -75,4 +79,5 @@ class MutantTrial(Trial):
             sites[0].check()
             mutant.adjust(run.run)
             run.advance_to_end()
+            decided += [check.name for check in run.run.checks if check.decided is False]
             return run.finish()

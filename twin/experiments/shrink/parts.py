@@ -45,8 +45,9 @@ def tasks(data: Data) -> list[Part]:
 
 
 def inside(data: Data, parts: Iterable[Part]) -> list[Part]:
-    """Return the items and keys of parts."""
-    return [child for part in parts if len(part.locs) == 1 for child in _children(data, part.locs[0])]
+    """Return the keys of groups of keys; a list item, such as a fault, is there whole or not at all."""
+    places = [part.locs[0] for part in parts if len(part.locs) == 1]
+    return [child for loc in places if isinstance(loc[-1], str) for child in _children(data, loc)]
 
 
 def without(data: Data, parts: Iterable[Part]) -> dict[str, Any]:

@@ -61,6 +61,7 @@ def shrink(source: Source, overrides: Mapping[str, str], trials: Trials) -> Shru
     """
     given = Candidates(source, trials)
     data = given.with_overrides(source.data, overrides)
+    data.pop("early_stop", None)  # all that fail are to fail again, not the first of them
     data, checks, removed = _failing_alone(given, data)
     before_s = given.duration_s(data)
 
