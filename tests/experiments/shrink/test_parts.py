@@ -53,6 +53,11 @@ def test_causes_are_faults_obstacles_and_parameters() -> None:
     ]
 
 
+def test_faults_and_obstacles_go_whole() -> None:
+    """A fault without its `at`, from the start on, would be another fault and no simpler one."""
+    assert inside(DATA, causes(DATA)[1:5]) == []
+
+
 def test_tasks_are_steps_and_robots_with_all_that_names_them() -> None:
     parts = tasks(DATA)
     assert [part.name for part in parts] == [

@@ -18,7 +18,7 @@ from twin.runtime.open_run import run
 from twin.scenario.schema import load
 from twin.scenario.source import Source
 
-TWELVE = {
+TWELVE: dict[str, Any] = {
     "name": "twelve",
     "seed": 1,
     "duration": "3 s",
@@ -60,7 +60,7 @@ def test_of_twelve_faults_the_one_that_matters_is_left(tmp_path: Path) -> None:
     with Trials(count=2) as trials:
         found = shrink(source(TWELVE, tmp_path), {}, trials)
     assert found.left == ("faults.0 encoder",)
-    assert found.source.data["faults"] == [{"encoder": {"joint": "wheel_right_joint", "factor": 0.8}}]
+    assert found.source.data["faults"] == [TWELVE["faults"][6]]
     assert found.checks == ("odometry_drift",)
     assert {"robots.0.command_latency: 20 ms", "world.obstacles.0 box", "faults.9 encoder"} <= set(
         found.removed
