@@ -10,10 +10,11 @@ from string import Template
 from typing import Any
 
 from twin.errors import RecordingError, SimulationError
-from twin.experiments.report.told import Moment, Told, read_run, runs_in
+from twin.experiments.report.told import Moment, Told, read_run
 from twin.files.writing import check_file, write_whole
-from twin.scenario.quantities import quantity
-from twin.scenario.verdict import VERDICT
+from twin.scenario.quantities import quantity, seconds
+from twin.scenario.verdict import VERDICT, runs_in
+from twin.scenario.verdict_text import moment_of, reasons
 
 _TEMPLATE = Path(__file__).with_name("page.html")
 _WORDS = {"pass": "PASS", "fail": "FAIL", "error": "ERROR"}
@@ -39,9 +40,7 @@ def write_report(folder: Path, file: Path) -> int:
         told = read_run(folder)
         page, count = _page(f"{told.title}: {_WORDS[told.word]}", run_section(told, whole=True)), 1
     else:
-        runs = list(runs_in(folder))
-        if not runs:
-            raise RecordingError(f"{folder}: no run in this folder; a run's folder holds {VERDICT}")
+        runs = runs_in(folder)
         page, count = _page(f"{len(runs)} runs in {folder.name}", many_section(folder, runs)), len(runs)
     write_whole(file, page)
     return count
@@ -88,8 +87,8 @@ def run_section(told: Told, *, whole: bool) -> str:
     parts = [f"<{level}>{_badge(told.word)}{escape(told.title)}</{level}>"]
     facts = [
         ("seed", str(verdict["seed"])),
-        ("simulated", _seconds(metrics.get("sim_time_s"))),
-        ("took", _seconds(metrics.get("wall_time_s"))),
+        ("simulated", seconds(metrics.get("sim_time_s"))),
+        ("took", seconds(metrics.get("wall_time_s"))),
         ("finished", told.written),
     ]
     parts.append(
@@ -194,8 +193,7 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
             margin = check.get("margin")
             text = "" if margin is None else quantity(margin, check["unit"], check["limit"])
             cells.append(f"<td class=number>{escape(text)}</td>")
-        at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
-        cells += [f"<td class=number>{'' if at is None else f'{at:.2f} s'}</td>", _cell(check["reason"])]
+        cells += [f"<td class=number>{seconds(moment_of(check), 2)}</td>", _cell(check["reason"])]
         rows.append(["" if check["passed"] else "bad", *cells])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
     return _table("Every check must hold for the run to pass", heads, rows)
@@ -205,7 +203,7 @@ def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for fault in faults:
         landed = fault["outcome"] == "landed"
-        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        times = (seconds(fault[key], 2) for key in ("at_s", "end_s"))
         cells = [
             f'<td class="mark {"pass" if landed else "fail"}">{fault["outcome"].replace("_", " ")}</td>',
             f'<th scope="row">{escape(fault["name"])}</th>',
@@ -275,8 +273,7 @@ def _log(told: Told) -> str:
 
 def _row_of_run(told: Told, link: str) -> list[str]:
     verdict, metrics = told.verdict, told.verdict["metrics"]
-    reasons = [f"{c['name']}: {c['reason']}" for c in verdict["checks"] if not c["passed"]]
-    reason = str(verdict["error"] or "; ".join(reasons)).partition("\n")[0]
+    reason = "; ".join(reasons(verdict)).partition("\n")[0]
     title = escape(told.title)
     if link:
         title = f'<a href="{link}">{title}</a>'
@@ -285,8 +282,8 @@ def _row_of_run(told: Told, link: str) -> list[str]:
         f'<td class="mark {told.word}">{_WORDS[told.word]}</td>',
         f'<th scope="row">{title}</th>',
         f"<td class=number>{verdict['seed']}</td>",
-        f"<td class=number>{_seconds(metrics.get('sim_time_s'))}</td>",
-        f"<td class=number>{_seconds(metrics.get('wall_time_s'))}</td>",
+        f"<td class=number>{seconds(metrics.get('sim_time_s'))}</td>",
+        f"<td class=number>{seconds(metrics.get('wall_time_s'))}</td>",
         _cell(reason),
     ]
 
@@ -311,10 +308,6 @@ def _cell(text: object) -> str:
 
 def _badge(word: str) -> str:
     return f'<span class="badge {word}">{_WORDS[word]}</span>'
-
-
-def _seconds(value: float | None) -> str:
-    return "" if value is None else f"{value:.1f} s"
 
 
 def _page(title: str, body: str) -> str:

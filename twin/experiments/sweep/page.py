@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from html import escape
 from importlib.metadata import version
 from itertools import islice
-from typing import Any
 
 from twin.errors import RecordingError
+from twin.experiments.short_names import short_names
 from twin.experiments.sweep.plan import PlannedRun
 from twin.experiments.sweep.plots import paths, plots
 from twin.experiments.sweep.result import SweepResult
-from twin.experiments.sweep.summary import PointSummary, SweepSummary, command, short_names
+from twin.experiments.sweep.summary import PointSummary, SweepSummary, command
+from twin.scenario.verdict_text import reasons
 
 _MOST_POINTS, _MOST_FAILURES = 500, 40
 _STYLE = """
@@ -132,17 +133,11 @@ def _failures(result: SweepResult) -> Iterable[str]:
     yield "<div class=wide><table><tr><th class=text>why</th><th class=text>again</th></tr>"
     for run, verdict in shown[:_MOST_FAILURES]:
         again = escape(command(result.plan, run))
-        yield f"<tr><td class=text>{escape(_why(verdict))}</td><td class=text><code>{again}</code></td></tr>"
+        why = escape("; ".join(reasons(verdict)))
+        yield f"<tr><td class=text>{why}</td><td class=text><code>{again}</code></td></tr>"
     yield "</table></div>"
     if len(shown) > _MOST_FAILURES:
         yield f"<p class=dim>The first {_MOST_FAILURES}; all are in results.parquet.</p>"
-
-
-def _why(verdict: Mapping[str, Any]) -> str:
-    if verdict["error"] is not None:
-        return str(verdict["error"])
-    failed = (check for check in verdict["checks"] if not check["passed"])
-    return "; ".join(f"{check['name']}: {check['reason']}" for check in failed)
 
 
 def _pictures(result: SweepResult, runs: Iterable[PlannedRun]) -> Iterable[str]:

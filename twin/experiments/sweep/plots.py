@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from twin.experiments.sequential import clopper_pearson
-from twin.experiments.sweep.summary import short_names
+from twin.experiments.short_names import short_names
 from twin.experiments.sweep.table import Column, Table
 
 if TYPE_CHECKING:
