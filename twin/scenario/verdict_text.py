@@ -21,20 +21,22 @@ def moment_of(check: Mapping[str, Any]) -> float | None:
     return at
 
 
+def numbers_of(check: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    """Return value, limit, margin and moment of a check as people read them; empty: it has no such."""
+    value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
+    margin = check.get("margin")
+    left = "" if margin is None else quantity(margin, check["unit"], check["limit"])
+    return value, limit, left, seconds(moment_of(check), 2)
+
+
 def lines_of(verdict: Mapping[str, Any]) -> Iterator[str]:
     """Yield why checks do not hold, then the table of all."""
-    checks = verdict["checks"]
     yield from reasons(verdict)
-    numbers = ["value", "limit", *(["margin"] if any(c.get("margin") is not None for c in checks) else [])]
-    rows = [["", "check", *numbers, "at"]]
-    for check in checks:
-        shown = [
-            "" if check.get(key) is None else quantity(check[key], check["unit"], check["limit"])
-            for key in numbers
-        ]
-        rows.append(
-            ["ok" if check["passed"] else "FAIL", check["name"], *shown, seconds(moment_of(check), 2)]
-        )
+    rows: list[tuple[str, ...]] = [("", "check", "value", "limit", "margin", "at")]
+    checks = verdict["checks"]
+    rows += [("ok" if check["passed"] else "FAIL", check["name"], *numbers_of(check)) for check in checks]
+    if not any(row[4] for row in rows[1:]):
+        rows = [(*row[:4], row[5]) for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         padded = [

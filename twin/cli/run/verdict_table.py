@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from twin.scenario.quantities import quantity, seconds
-from twin.scenario.verdict_text import moment_of, reasons
+from twin.scenario.quantities import seconds
+from twin.scenario.verdict_text import numbers_of, reasons
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -30,11 +30,7 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        margin = (
-            quantity(check["margin"], check["unit"], check["limit"]) if check["margin"] is not None else ""
-        )
-        table.add_row(mark, Text(check["name"]), value, limit, margin, seconds(moment_of(check), 2))
+        table.add_row(mark, Text(check["name"]), *numbers_of(check))
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in reasons(verdict)]

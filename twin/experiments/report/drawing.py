@@ -22,6 +22,13 @@ _WALL_FROM, _WALL_TO = 0.05, 0.6
 """Solids between these heights are in the way of a robot, and drawn from above [m]."""
 
 
+_TRAILS: tuple[tuple[str, str, str, Any], ...] = (
+    ("odometry", "odometry", "odometry alone", (0, (1, 1.2))),
+    ("estimate", "belief", "belief", "-"),
+)
+"""Kind of a trail, its colour, its name, how its line is drawn."""
+
+
 def trajectory(told: Told, moments: list[Moment], size: tuple[float, float] = (WIDTH, 5.2)) -> str:
     """Return the floor from above: map or solids, plans, where robots were and believed to be, as SVG.
 
@@ -44,42 +51,14 @@ def trajectory(told: Told, moments: list[Moment], size: tuple[float, float] = (W
             axes.plot(
                 *_thinned(truth).T, color=ROLES["truth"], lw=3.2, alpha=0.75, label=f"truth{name}", zorder=4
             )
-            for kind, role, text in (
-                ("odometry", "odometry", "odometry alone"),
-                ("estimate", "belief", "belief"),
-            ):
-                line = told.trail(robot, kind)
+            for kind, role, text, style in _TRAILS:
+                line = _thinned(told.trail(robot, kind))
                 if len(line):
-                    style: Any = "-" if role == "belief" else (0, (1, 1.2))
-                    axes.plot(
-                        *_thinned(line).T,
-                        color=ROLES[role],
-                        lw=1.3,
-                        ls=style,
-                        label=f"{text}{name}",
-                        zorder=5,
-                    )
-            if len(truth):
-                axes.plot(
-                    *truth[0],
-                    "o",
-                    color=ROLES["ink"],
-                    ms=7,
-                    mfc=ROLES["paper"],
-                    mew=1.6,
-                    zorder=6,
-                    label=None if several else "start",
-                )
-                axes.plot(
-                    *truth[-1],
-                    "s",
-                    color=ROLES["ink"],
-                    ms=7,
-                    mfc=ROLES["paper"],
-                    mew=1.6,
-                    zorder=6,
-                    label=None if several else "end",
-                )
+                    axes.plot(*line.T, color=ROLES[role], lw=1.3, ls=style, label=f"{text}{name}", zorder=5)
+            ink: dict[str, Any] = {"color": ROLES["ink"], "mfc": ROLES["paper"], "ms": 7, "mew": 1.6}
+            for point, mark, text in ((truth[:1], "o", "start"), (truth[-1:], "s", "end")):
+                if len(point):
+                    axes.plot(*point.T, mark, **ink, zorder=6, label=None if several else text)
         for number, moment in enumerate(moments, 1):
             for robot in told.robots[:1]:
                 times, truth = told.truth(robot)

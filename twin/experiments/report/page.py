@@ -12,9 +12,9 @@ from twin.errors import RecordingError, SimulationError
 from twin.experiments.report.html import badge, cell, page, table
 from twin.experiments.report.told import Moment, Told, read_run
 from twin.files.writing import check_file, write_whole
-from twin.scenario.quantities import quantity, seconds
+from twin.scenario.quantities import seconds
 from twin.scenario.verdict import VERDICT, runs_in
-from twin.scenario.verdict_text import moment_of, reasons
+from twin.scenario.verdict_text import numbers_of, reasons
 
 _MOST_PHOTOS, _MOST_LINES = 6, 200
 _MOST_SHOWN = 8
@@ -178,19 +178,14 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for check in checks:
         mark = ("pass", "✓ holds") if check["passed"] else ("fail", "✗ fails")
+        value, limit, margin, at = numbers_of(check)
+        numbers = [value, limit, margin, at] if has_margin else [value, limit, at]
         cells = [
             f'<td class="mark {mark[0]}">{mark[1]}</td>',
             f'<th scope="row">{escape(check["name"])}</th>',
-            *(
-                f"<td class=number>{escape(quantity(check[key], check['unit'], check['limit']))}</td>"
-                for key in ("value", "limit")
-            ),
+            *(f"<td class=number>{escape(number)}</td>" for number in numbers),
+            cell(check["reason"]),
         ]
-        if has_margin:
-            margin = check.get("margin")
-            text = "" if margin is None else quantity(margin, check["unit"], check["limit"])
-            cells.append(f"<td class=number>{escape(text)}</td>")
-        cells += [f"<td class=number>{seconds(moment_of(check), 2)}</td>", cell(check["reason"])]
         rows.append(["" if check["passed"] else "bad", *cells])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
     return table("Every check must hold for the run to pass", heads, rows)
