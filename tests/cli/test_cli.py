@@ -288,6 +288,7 @@ def test_what_became_of_faults_is_told() -> None:
     assert "demo: the fault ice had no effect: 0 of 9 ticks" in many
     assert "demo: the fault late did not happen" in many
     assert "the fault loss" not in many
+    assert "demo and 2 more: the fault late did not happen" in printed(many_report([verdict] * 3))
 
 
 def test_a_failed_check_is_1_with_its_reason(demo: Path, runtime: FakeRuntime, invoke: Invoke) -> None:
@@ -331,9 +332,10 @@ def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, i
     assert (code, out) == (2, "")
     assert err.splitlines() == [
         f"error: {demo}:2: duration: must have a unit of time (s, ms, us, min, h), not '1 kg'",
-        f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? Valid: closed_loop, delivered, "
-        "driven_distance, energy, final_pose, localisation_error, map_accuracy, map_coverage, mission_failed, mission_succeeded, no_collision, odometry_drift, "
-        "path_on_circle, recoveries, time_limit, tote_slip",
+        f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? Valid: always, closed_loop, delivered, "
+        "driven_distance, energy, eventually, final_pose, finally, formula, localisation_error, map_accuracy, map_coverage, "
+        "mission_failed, mission_succeeded, never, no_collision, odometry_drift, path_on_circle, reaches, recoveries, "
+        "time_limit, tote_slip, until, within",
         "2 problems",
     ]
     assert not runtime.calls

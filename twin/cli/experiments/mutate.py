@@ -44,9 +44,8 @@ def mutate(
         typer.Option("--min-score", min=0.0, max=1.0, metavar="SHARE", help="Fail if fewer are caught."),
     ] = 0.0,
     jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
-    ] = None,
+        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Runs at a time; 0: one per core.")
+    ] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Run a scenario with known-bad stacks, and tell which of them its checks catch.
@@ -75,7 +74,7 @@ def mutate(
         def told(made: int) -> None:
             status.update(f"{source.data['name']}: {made} runs")
 
-        with Trials(count=jobs or os.cpu_count() or 1, told=told) as trials:
+        with Trials(count=jobs or len(os.sched_getaffinity(0)), told=told) as trials:
             report = mutated(source, trials, mutant or ())
     if json:
         sys.stdout.write(json_module.dumps(report.to_dict(), indent=2, ensure_ascii=False) + "\n")

@@ -39,9 +39,8 @@ def shrink(
         ),
     ] = None,
     jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
-    ] = None,
+        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Runs at a time; 0: one per core.")
+    ] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Reduce a failing scenario to the smallest that fails the same checks, and write it.
@@ -65,7 +64,7 @@ def shrink(
         def told(made: int) -> None:
             status.update(f"{name}: {made} runs")
 
-        with Trials(count=jobs or os.cpu_count() or 1, told=told) as trials:
+        with Trials(count=jobs or len(os.sched_getaffinity(0)), told=told) as trials:
             found = shrunk(source, overrides, trials)
     comments = [
         f"Shrunk from {scenario}: the smallest that still fails {', '.join(found.checks)}.",

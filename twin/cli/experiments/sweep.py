@@ -54,8 +54,8 @@ def sweep(
         float | None, typer.Option(help="How sure that judgement is to be.", show_default="0.95")
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", min=1, help="Runs at a time.", show_default="all cores")
-    ] = None,
+        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Runs at a time; 0: one per core.")
+    ] = 0,
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Make the I-th of N shares of the runs, from 1/N to N/N.")
     ] = "1/1",
@@ -65,7 +65,7 @@ def sweep(
     ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall."),
+        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall clock."),
     ] = None,
     retry_errors: Annotated[
         bool, typer.Option("--retry-errors", help="Make runs again that ended in an error before.")
@@ -146,14 +146,14 @@ def _share(text: str) -> tuple[int, int]:
     return share, shares
 
 
-def _backend(ray: str | None, jobs: int | None, folder: Path, time_limit: float | None) -> Backend:
+def _backend(ray: str | None, jobs: int, folder: Path, time_limit: float | None) -> Backend:
     if ray is not None:
         from twin.experiments.sweep.ray_cluster import RayCluster
 
-        return RayCluster(ray, jobs, time_limit_s=time_limit)
+        return RayCluster(ray, jobs or None, time_limit_s=time_limit)
     from twin.experiments.sweep.sweep import local
 
-    return local(jobs or os.cpu_count() or 1, folder, time_limit)
+    return local(jobs or len(os.sched_getaffinity(0)), folder, time_limit)
 
 
 @contextmanager

@@ -68,13 +68,14 @@ def run_batch(
         str, typer.Option("-m", "--tag", metavar="EXPR", help="Only tests with such tags, as pytest -m.")
     ] = "",
     jobs: Annotated[
-        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Run N at once; 0: one per core.")
+        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Runs at a time; 0: one per core.")
     ] = 1,
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Only the I-th of N parts, for N machines.")
     ] = "1/1",
     time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End runs that take longer, by the wall clock.")
+        float | None,
+        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall clock."),
     ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write one JUnit file over all runs.")
@@ -104,6 +105,8 @@ def run_batch(
     if show:
         for case in cases:
             sys.stdout.write(f"{case.name}\n")
+        if wrong := [case.error for case in cases if case.error]:
+            raise ScenarioError("\n".join(wrong))
         return
     if junit is not None:
         check_file(junit, "--junit")
