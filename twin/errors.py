@@ -132,10 +132,14 @@ def nearest(word: str, valid: Iterable[str]) -> str:
     "did you mean 'lidar'? Valid: imu, lidar"
     >>> nearest("rang_7", [f"range_{i}" for i in range(100)])
     "did you mean 'range_7'? Valid: range_7, range_97, range_87, range_79, range_78, and 95 more"
+    >>> nearest("dock", [])
+    'there are none'
     """
     import difflib
 
     names = sorted(valid)
+    if not names:
+        return "there are none"
     # Comparing very many names takes long, as a file may name as many unknown ones.
     likely = names if len(names) <= COMPARED else [name for name in names if name.lower() == word.lower()]
     close = difflib.get_close_matches(word, likely, n=ALIKE, cutoff=0.5)

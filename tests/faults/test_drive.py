@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -78,6 +79,17 @@ def test_enough_friction_is_no_fault(drive: Drive) -> None:
     report = drive("[friction: 0.7]", AHEAD).reports["friction"]
     assert report.outcome == "no_effect"
     assert report.effect.startswith("wheels at the limit of friction in 0 of 7")
+    assert 0 < int(re.search(r"used at most (\d+) % of it", report.effect)[1]) < 98  # type: ignore[index]
+
+
+def test_a_wheel_without_grip_that_rolls_straight_on_needs_none(drive: Drive) -> None:
+    plain = drive("", AHEAD)
+    slips = drive("[wheel_slip: {joint: wheel_left_joint, factor: 0.02, at: 1 s, duration: 0.2 s}]", AHEAD)
+    (report,) = slips.reports.values()
+    assert report.outcome == "no_effect"
+    assert report.effect.endswith("0 of 10 ticks; they used at most 0 % of it")
+    assert slips.pose.x == pytest.approx(plain.pose.x, abs=1e-9)
+    assert slips.pose.yaw == pytest.approx(plain.pose.yaw, abs=1e-9)
 
 
 def test_a_weak_motor_is_slow_and_its_side_lags(drive: Drive) -> None:

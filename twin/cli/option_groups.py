@@ -15,8 +15,7 @@ Overrides = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")]
 Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
+    int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Runs at a time; 0: one per core.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")]
 

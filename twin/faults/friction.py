@@ -20,19 +20,22 @@ class Sliding:
 
     def __init__(self) -> None:
         self.touched = self.slid = 0
+        self._most = 0.0
 
     def add(self, fault: Fault, geoms: list[int], factor: float) -> None:
         """Look at the last physics step; `factor` of their friction the shapes have now."""
         grip = fault.context.world.alterations.grip(geoms)
         self.touched += grip.touches
+        self._most = max(self._most, grip.share)
         self.slid += grip.share * max(1.0, factor) >= (_AT_LIMIT if factor <= 1.0 else 1.0)
 
     @property
     def effect(self) -> Effect:
         """What came of it."""
-        return Effect(
-            self.slid > 0, f"wheels at the limit of friction in {self.slid} of {self.touched} ticks"
-        )
+        text = f"wheels at the limit of friction in {self.slid} of {self.touched} ticks"
+        if self.touched and not self.slid:
+            text += f"; they used at most {100.0 * self._most:.0f} % of it"
+        return Effect(self.slid > 0, text)
 
 
 class Friction(FaultOfRobot):

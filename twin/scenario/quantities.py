@@ -10,6 +10,8 @@ def quantity(value: float | bool | None, unit: str, limit: float | bool | None) 
 
     >>> quantity(0.00123, "m", 0.002), quantity(True, "", True)
     ('1.23 mm', 'yes')
+    >>> quantity(-1e-9, "rad", None)
+    '0 deg'
     """
     if value is None:
         return "-"
@@ -19,7 +21,7 @@ def quantity(value: float | bool | None, unit: str, limit: float | bool | None) 
         value, unit = math.degrees(value), unit.replace("rad", "deg")
     if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
         value, unit = value * 1e3, "mm"
-    return f"{round(value, 3):.5g} {unit}".rstrip()
+    return f"{round(value, 3) + 0.0:.5g} {unit}".rstrip()  # + 0.0: no sign of a zero
 
 
 def seconds(value: float | None, digits: int = 1) -> str:

@@ -232,6 +232,8 @@ def test_options_that_change_the_spaces_are_refused(make: MakeEnv, small: Path) 
         GymError, match="the options of reset change the spaces of the environment of 'small'"
     ):
         env.reset(options={"duration": "30 s"})
+    with pytest.raises(GymError, match="the options of reset are 3; valid are keys of the scenario"):
+        env.reset(options=3)  # type: ignore[arg-type]
     with pytest.raises(GymError, match="call reset"):
         env.step(np.zeros(2))
     env.reset()

@@ -8,6 +8,7 @@ import pytest
 
 from twin.errors import ScenarioError
 from twin.experiments.suite.cases import cases_in, cases_of
+from twin.experiments.suite.selection import selected
 from twin.scenario.schema import load
 
 SCENARIO = """\
@@ -67,6 +68,11 @@ def test_names_of_keys_are_as_long_as_it_takes_to_tell_them_apart(tmp_path: Path
     file = tmp_path / "two.yaml"
     file.write_text(two + "test: {grid: {robots.0.pose.x: [1], robots.1.pose.x: [-1]}}\n", encoding="utf-8")
     assert [case.name for case in cases_of(file)] == ["demo[0.pose.x=1,1.pose.x=-1]"]
+
+
+def test_a_test_keeps_its_number_whichever_are_chosen(tmp_path: Path) -> None:
+    cases = cases_in([write(tmp_path, "test: {seeds: 1..4}\n")])
+    assert [case.number for case in selected(cases, shard=(2, 2))] == [2, 4]
 
 
 def test_twin_run_does_not_look_at_the_key(tmp_path: Path) -> None:

@@ -119,6 +119,7 @@ def test_side_by_side_the_results_are_those_of_one_after_the_other(
     assert len({result["digest"] for result in beside}) == 4  # three runs, and none
     documents = [junit_xml([timeless(result) for result in results]) for results in (beside, in_turn[:5])]
     assert documents[0] == documents[1]
+    assert len(list(run_all(cases[3:4], tmp_path))) == 1, "into the folder that this test had before"
     names = sorted(run.name for run in tmp_path.iterdir())
     assert names == ["01-spin-seed=1", "02-spin-seed=2", "03-spin", "04-c_test", "05-spin-seed=3"]
 

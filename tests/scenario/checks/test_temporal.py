@@ -185,7 +185,7 @@ def test_what_is_decided_is_known_before_the_end() -> None:
             "always: {that: speed > 1, after: 2, before: 1 s}",
             r"before \(1 s\) must not be less than after \(2 s\)",
         ),
-        ('formula: "always[0, 60](speed > 1"', r"at character 24 \(''\): the end instead of \)"),
+        ('formula: "always[0, 60](speed > 1"', r"(?<=:5: )at character 24: the end instead of \)"),
         (
             'formula: "alway speed > 1"',
             "at character 1 .*'alway' instead of an operator.*did you mean 'always'",
@@ -194,6 +194,9 @@ def test_what_is_decided_is_known_before_the_end() -> None:
             'formula: "always[5, 1] speed > 1"',
             "a window must begin at 0 or later, and not end before it begins",
         ),
+        ("always: {signal: speed, within: [2, 1]}", "within takes the least value first"),
+        ("always: yaw within [20 deg, 0.1]", "at character 1 .*within takes the least value first"),
+        ("reaches: {zone: dock}", "zone 'dock', which the arena lacks; there are none"),
         ('formula: "distance_to(1 m) > 2"', r"distance_to takes \(x, y\), not \(1 m\)"),
         ('formula: "distance_to(1 m, 2 kg) > 2"', "y of distance_to must have a unit of length"),
         ('formula: "speed % 3"', "begins no signal, number or operator"),

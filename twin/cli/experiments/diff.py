@@ -45,11 +45,13 @@ def diff(
 
     Exit code 0: they are the same run; 1: they differ; 2: one of them is missing or cannot be made.
     """
+    from twin.bridge.programs.console_log import show_warnings
     from twin.cli.run.once import run_progress
     from twin.cli.run.options import parse_overrides
     from twin.experiments.diff import compare, made_again, of_path
 
     overrides = parse_overrides(set or (), seed)
+    show_warnings()
     with run_progress("diff") as progress:
         one = of_path(a, progress=progress)
         other = of_path(b, overrides, progress) if b is not None else made_again(one, overrides, progress)

@@ -39,7 +39,7 @@ def mutate(
         float,
         typer.Option("--min-score", min=0.0, max=1.0, metavar="SHARE", help="Fail if fewer are caught."),
     ] = 0.0,
-    jobs: Jobs = None,
+    jobs: Jobs = 0,
     json: AsJson = False,
 ) -> None:
     """Run a scenario with known-bad stacks, and tell which of them its checks catch.
@@ -68,7 +68,7 @@ def mutate(
         def told(made: int) -> None:
             status.update(f"{source.data['name']}: {made} runs")
 
-        with Trials(count=jobs or os.cpu_count() or 1, told=told) as trials:
+        with Trials(count=jobs or len(os.sched_getaffinity(0)), told=told) as trials:
             report = mutated(source, trials, mutant or ())
     if json:
         print_json(report.to_dict())

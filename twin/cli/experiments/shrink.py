@@ -34,7 +34,7 @@ def shrink(
             "--output", "-o", metavar="FILE", help="The file to write.", show_default="<scenario>_shrunk.yaml"
         ),
     ] = None,
-    jobs: Jobs = None,
+    jobs: Jobs = 0,
     json: AsJson = False,
 ) -> None:
     """Reduce a failing scenario to the smallest that fails the same checks, and write it.
@@ -58,7 +58,7 @@ def shrink(
         def told(made: int) -> None:
             status.update(f"{name}: {made} runs")
 
-        with Trials(count=jobs or os.cpu_count() or 1, told=told) as trials:
+        with Trials(count=jobs or len(os.sched_getaffinity(0)), told=told) as trials:
             found = shrunk(source, overrides, trials)
     comments = [
         f"Shrunk from {scenario}: the smallest that still fails {', '.join(found.checks)}.",

@@ -50,7 +50,7 @@ def sweep(
     confidence: Annotated[
         float | None, typer.Option(help="How sure that judgement is to be.", show_default="0.95")
     ] = None,
-    jobs: Jobs = None,
+    jobs: Jobs = 0,
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Make the I-th of N shares of the runs, from 1/N to N/N.")
     ] = "1/1",
@@ -60,7 +60,7 @@ def sweep(
     ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall."),
+        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall clock."),
     ] = None,
     retry_errors: Annotated[
         bool, typer.Option("--retry-errors", help="Make runs again that ended in an error before.")
@@ -134,14 +134,14 @@ def sweep(
     raise typer.Exit(EXIT_CODES[summary.outcome])
 
 
-def _backend(ray: str | None, jobs: int | None, folder: Path, time_limit: float | None) -> Backend:
+def _backend(ray: str | None, jobs: int, folder: Path, time_limit: float | None) -> Backend:
     if ray is not None:
         from twin.experiments.sweep.ray_cluster import RayCluster
 
-        return RayCluster(ray, jobs, time_limit_s=time_limit)
+        return RayCluster(ray, jobs or None, time_limit_s=time_limit)
     from twin.experiments.sweep.sweep import local
 
-    return local(jobs or os.cpu_count() or 1, folder, time_limit)
+    return local(jobs or len(os.sched_getaffinity(0)), folder, time_limit)
 
 
 @contextmanager

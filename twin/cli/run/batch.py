@@ -14,7 +14,7 @@ import typer
 
 from twin.cli import completion
 from twin.cli.console import print_json, stderr, stdout
-from twin.cli.option_groups import AsJson
+from twin.cli.option_groups import AsJson, Jobs
 from twin.cli.run.batch_progress import batch_progress
 from twin.cli.run.folders import results_folder
 from twin.cli.run.options import RunOptions
@@ -68,14 +68,13 @@ def run_batch(
     tag: Annotated[
         str, typer.Option("-m", "--tag", metavar="EXPR", help="Only tests with such tags, as pytest -m.")
     ] = "",
-    jobs: Annotated[
-        int, typer.Option("-j", "--jobs", min=0, metavar="N", help="Run N at once; 0: one per core.")
-    ] = 1,
+    jobs: Jobs = 1,
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Only the I-th of N parts, for N machines.")
     ] = "1/1",
     time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End runs that take longer, by the wall clock.")
+        float | None,
+        typer.Option(min=0.1, metavar="SECONDS", help="End a run that takes longer, by the wall clock."),
     ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write one JUnit file over all runs.")
@@ -106,6 +105,8 @@ def run_batch(
     if show:
         for case in cases:
             sys.stdout.write(f"{case.name}\n")
+        if wrong := [case.error for case in cases if case.error]:
+            raise ScenarioError("\n".join(wrong))
         return
     if junit is not None:
         check_file(junit, "--junit")

@@ -85,14 +85,18 @@ def many_report(verdicts: Sequence[Mapping[str, Any]], folder: Path | None = Non
             (verdict["digest"] or "")[:12],
         )
     said = []
+    idle: dict[tuple[str, str, str], list[str]] = {}
     for verdict in verdicts:
         said += [Text(f"{_name(verdict)}: {reason}", style="red") for reason in reasons(verdict)]
         if verdict["verdict"] != "pass" and verdict["command"]:
             said.append(Text(f"  run it again: {verdict['command']}", style="dim"))
         for fault in verdict["faults"]:
             if fault["outcome"] != "landed":
-                what = f"{_name(verdict)}: the fault {fault['name']} {_told(fault)}"
-                said.append(Text(what, style=_OUTCOME[fault["outcome"]]))
+                which = (fault["name"], _told(fault), _OUTCOME[fault["outcome"]])
+                idle.setdefault(which, []).append(_name(verdict))
+    for (fault, told, style), names in idle.items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        said.append(Text(f"{names[0]}{more}: the fault {fault} {told}", style=style))
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
     style = STYLE["pass" if passed == len(verdicts) else "fail"]
     lines = [*said, Text(f"{passed} of {len(verdicts)} passed", style=style)]

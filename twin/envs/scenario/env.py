@@ -101,6 +101,10 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         Raises:
             TwinError: The run cannot be made, its spaces are others, or the agent is never asked.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise GymError(
+                f"the options of reset are {options!r}; valid are keys of the scenario with values"
+            )
         first = self._np_random is None
         super().reset(seed=self._read.seed if first and seed is None else seed)
         if seed is None:

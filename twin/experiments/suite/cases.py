@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ class Case:
     overrides: Mapping[str, str] = field(default_factory=dict)
     """Dotted keys -> YAML text."""
     tags: tuple[str, ...] = ()
+    number: int = field(default=0, compare=False)
+    """Among all that files make, from 1 on: so its folder is the same, whichever tests are chosen."""
     error: str = ""
     """Why it cannot be run: what is wrong with the key `test` of the file."""
 
@@ -61,7 +63,7 @@ def cases_in(files: Iterable[Path]) -> list[Case]:
             found += cases_of(file)
         except TwinError as fault:
             found.append(Case(file=file, name=file.stem, error=str(fault)))
-    return found
+    return [replace(case, number=number) for number, case in enumerate(found, 1)]
 
 
 def cases_of(file: Path) -> list[Case]:

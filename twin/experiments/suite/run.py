@@ -99,10 +99,11 @@ def run_all(
     Raises:
         RecordingError: A folder or verdict cannot be written.
     """
-    digits = max(2, len(str(len(cases))))
+    numbers = [case.number or i for i, case in enumerate(cases, 1)]
+    digits = max(2, *(len(str(number)) for number in numbers)) if numbers else 2
     waiting = deque(
-        Job(number=i, case=case, folder=folder / f"{i:0{digits}d}-{case.folder}", record=record)
-        for i, case in enumerate(cases, 1)
+        Job(number=i, case=case, folder=folder / f"{number:0{digits}d}-{case.folder}", record=record)
+        for i, (number, case) in enumerate(zip(numbers, cases, strict=True), 1)
     )
     done: dict[int, Result] = {}
     told = 0

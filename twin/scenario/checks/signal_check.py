@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Collection
 from typing import Any
@@ -50,6 +51,11 @@ class SignalCheck(Check):
     def sentence(self, predicate: Predicate, margin: Margin) -> str:
         """Return why it failed, by the predicate whose value it was."""
         value, unit = margin.value, self._unit(predicate)
+        if isinstance(value, float) and unit.startswith("rad"):
+            value, unit = (
+                round(math.degrees(value), 9) + 0.0,
+                unit.replace("rad", "deg", 1),
+            )  # as the table has it
         said = f"{value:.4g} {unit}".rstrip() if isinstance(value, float) else repr(value)
         return f"{predicate.signal} was {said} at {margin.at_ns / 1e9:.2f} s"
 

@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema
 
 from twin.scenario.signals.reference import Reference
 from twin.scenario.temporal import And, Formula, one_of
-from twin.scenario.temporal.text import Raw, parse
+from twin.scenario.temporal.text import NO_RANGE, Raw, is_empty, parse
 from twin.strict_yaml import Fault, Faults, StrictModel
 
 _RELATIONS = {
@@ -73,7 +73,7 @@ class FormulaModel(StrictModel):
         try:
             return parse(text, self.compared)
         except ValueError as wrong:
-            raise Faults([Fault((key,), f"{key}: {wrong}")]) from None
+            raise Faults([Fault((key,), str(wrong))]) from None
 
 
 class Statement(FormulaModel):
@@ -138,6 +138,8 @@ class Statement(FormulaModel):
                 faults.append(Fault((key,), f"{key}: {wrong}"))
         if faults:
             raise Faults(dict.fromkeys(faults))
+        if self.within is not None and is_empty(*found[-2:]):
+            raise Faults([Fault(("within",), NO_RANGE)])
         return found[0] if len(found) == 1 else And(tuple(found))
 
     def words(self) -> str:

@@ -27,6 +27,7 @@ from twin.scenario.temporal.formula import (
     And,
     Finally,
     Formula,
+    Predicate,
     Until,
     Window,
     depth,
@@ -45,6 +46,7 @@ Compare = Callable[[str, str, Raw], Formula]
 
 DEEPEST = 40
 """So deeply may formulas be nested."""
+NO_RANGE = "within takes the least value first, then the largest"
 _UNARY = {"always": Always, "eventually": eventually, "never": never}
 _BINARY = {"until": Until, "unless": unless}
 KEYWORDS = ("not", "and", "or", "implies", "within", "finally", "true", "false", "inf", *_UNARY, *_BINARY)
@@ -169,6 +171,8 @@ class _Parser:
             high = self._raw()
             self._need("]")
             both = (self._predicate_of(signal, ">=", low), self._predicate_of(signal, "<=", high))
+            if is_empty(*both):
+                raise self._wrong(signal.at, NO_RANGE)
             return And(both)
         for relation in _RELATIONS:
             if self._take(relation):
@@ -251,7 +255,15 @@ class _Parser:
         return self._wrong(token.at, f"{found} instead of {what}{hint}")
 
     def _wrong(self, at: int, message: str) -> ValueError:
-        return ValueError(f"at character {at + 1} ('{self._text[at : at + 20].strip()}'): {message}")
+        there = self._text[at : at + 20].strip()
+        quoted = f" ('{there}')" if there else ""
+        return ValueError(f"at character {at + 1}{quoted}: {message}")
+
+
+def is_empty(low: Formula, high: Formula) -> bool:
+    """Return whether no number fulfils both ends of a `within`."""
+    ends = [end.limit for end in (low, high) if isinstance(end, Predicate) and isinstance(end.limit, float)]
+    return len(ends) == 2 and ends[0] > ends[1]
 
 
 def nanoseconds(raw: Raw) -> int:
